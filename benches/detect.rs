@@ -15,18 +15,18 @@ use voodoo_detect::Detector;
 #[path = "../crates/voodoo-core/tests/scene/mod.rs"]
 mod scene;
 
-/// Depth of the wall and of the board, in the images' millimetres.
+/// Depth of the wall and of the board, in the images' millimeters.
 const WALL: u16 = 4500;
 const BOARD: u16 = 3200;
 
-fn look(criterion: &mut Criterion) {
+fn detect(criterion: &mut Criterion) {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let poses = scene::standing(&body);
     let mut group = criterion.benchmark_group("a look for a person, one thread");
     for (width, height, focal) in [(160, 124, 145.0), (320, 240, 277.0), (640, 480, 560.0)] {
         let camera = scene::DepthCamera { width, height, focal };
-        let (mut pixels, seen) = camera.shoot(&body, &poses, 0.01, &mut scene::Noise(3));
-        assert!(seen > 0, "the person is in the image");
+        let (mut pixels, visible) = camera.shoot(&body, &poses, 0.01, &mut scene::Noise(3));
+        assert!(visible > 0, "the person is in the image");
         for (index, pixel) in pixels.iter_mut().enumerate() {
             let [across, down] = [index % width, index / width];
             let board = across < width / 8 && down > height / 3;
@@ -65,6 +65,6 @@ fn weights(criterion: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(600));
-    targets = look, weights
+    targets = detect, weights
 }
 criterion_main!(benches);

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use voodoo_core::Frame;
 use voodoo_core::HumanModel;
-use voodoo_core::Options;
+use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Config, People};
 use voodoo_detect::Detector;
@@ -63,13 +63,13 @@ fn persons(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("frame of 320x240, by persons");
     for count in [1, 2, 4] {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let people = People::new(body, Config::default(), Options::default()).unwrap();
+        let people = People::new(body, Config::default(), PeopleOptions::default()).unwrap();
         let people = people.with_detector(Box::new(Detector::new()));
         let mut room = Room { people, images: images(count), frames: 0 };
         let start = Instant::now();
         (0..2 * PERIOD).for_each(|_| room.frame());
         let mean = start.elapsed().as_secs_f64() / (2 * PERIOD) as f64;
-        let there = room.people.there().count();
+        let there = room.people.present().count();
         println!("{count} person(s), {there} found: {:.2} ms a frame from the first on", 1e3 * mean);
         group.bench_function(BenchmarkId::from_parameter(count), |b| b.iter(|| room.frame()));
     }

@@ -24,11 +24,11 @@ from voodoo.recordings import open_recording
 from voodoo.sensors.settings import FrontEndSettings
 
 PICTURES = {"color", "skin"}
-"""Kinds of inputs that look at colour pictures."""
+"""Kinds of inputs that look at color pictures."""
 
 
 def in_memory(path: Path, use: set[str]) -> InMemory:
-    """A recording with its colour pictures decoded, if they are in use."""
+    """A recording with its color pictures decoded, if they are in use."""
     source = open_recording(path)
     frames = list(source)
     for frame in frames:

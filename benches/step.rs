@@ -87,12 +87,12 @@ fn tracker_of(body: &Body, config: Config) -> Tracker {
 /// The standing person, and the same 4 cm aside and turned by 0.1 rad.
 fn two_poses(body: &Body) -> [Vec<Pose>; 2] {
     let first = scene::standing(body);
-    let centre = first[0].translation;
+    let center = first[0].translation;
     let turn = Quat::from_axis_angle(Vec3::Z, 0.1);
     let second = first
         .iter()
         .map(|pose| {
-            let place = centre + turn * (pose.translation - centre) + Vec3::new(0.02, 0.035, 0.0);
+            let place = center + turn * (pose.translation - center) + Vec3::new(0.02, 0.035, 0.0);
             Pose::from_parts(place, turn * pose.rotation)
         })
         .collect();
@@ -189,7 +189,7 @@ fn images(criterion: &mut Criterion) {
             let camera = scene::DepthCamera { width, height, focal };
             let mut noise = scene::Noise(3);
             let [first, second] = two_poses(&body).map(|poses| camera.shoot(&body, &poses, 0.01, &mut noise));
-            let seen = first.1;
+            let visible = first.1;
             let (first, second) = ([camera.image(&first.0)], [camera.image(&second.0)]);
             for (solver, name, threads) in [
                 (SolverKind::Limbwise, "limbwise", 1),
@@ -203,7 +203,7 @@ fn images(criterion: &mut Criterion) {
                 let mut bench = Bench { tracker: tracker_of(&body, config), instants, frames: 0 };
                 let (time, steps) = bench.typical(201);
                 println!(
-                    "{width}x{height}, {limbs}, {seen} pixels on the body, {name}, {threads} thread(s): {:.3} ms a frame of {steps:.1} ICP steps",
+                    "{width}x{height}, {limbs}, {visible} pixels on the body, {name}, {threads} thread(s): {:.3} ms a frame of {steps:.1} ICP steps",
                     time * 1e3
                 );
                 group.bench_function(

@@ -44,28 +44,28 @@ def joints_of(blob: np.ndarray, stature: float, camera: np.ndarray) -> list[tupl
     away /= np.linalg.norm(away)
     right = np.cross(away, (0.0, 0.0, 1.0))  # of the image, which is the person's left
 
-    def level(share: float) -> np.ndarray:
-        return blob[np.abs(blob[:, 2] - share * stature) < 0.04 * stature]
+    def level(fraction: float) -> np.ndarray:
+        return blob[np.abs(blob[:, 2] - fraction * stature) < 0.04 * stature]
 
     joints = []
-    for name, share in MIDDLE.items():
-        slab = level(share)
+    for name, fraction in MIDDLE.items():
+        slab = level(fraction)
         if len(slab):
             place = np.median(slab, axis=0) + 0.1 * away
-            joints.append((name, np.array([*place[:2], share * stature])))
-    for joint, (share, inwards) in SIDES.items():
-        slab = level(share)
+            joints.append((name, np.array([*place[:2], fraction * stature])))
+    for joint, (fraction, inwards) in SIDES.items():
+        slab = level(fraction)
         if len(slab):
             across = (slab - middle) @ right
             depth = np.median((slab - middle) @ away) + 0.07
             for side, extreme in (("l", across.max() - inwards), ("r", across.min() + inwards)):
                 place = middle + extreme * right + depth * away
-                joints.append((f"{side}_{joint}", np.array([*place[:2], share * stature])))
+                joints.append((f"{side}_{joint}", np.array([*place[:2], fraction * stature])))
     return joints
 
 
 def main() -> float:
-    """Track the bundled recording; returns the mean error of its joints in metres."""
+    """Track the bundled recording; returns the mean error of its joints in meters."""
     recording = open_recording(sample_path())
     detector = CallableDetector(standing_person, joints=JOINTS)
     tracker = voodoo.Tracker(voodoo.Body.human(model="measured"), detector=detector)

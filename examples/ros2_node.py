@@ -35,13 +35,15 @@ class Skeletons(Node):
         self.follower = Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
         types = {"/tf": TFMessage, f"{BODY}/joint_states": JointState, f"{BODY}/markers": MarkerArray}
         self.outputs = {name: self.create_publisher(kind, name, 10) for name, kind in types.items() if kind}
-        self.hear(depth, Image, IMAGE, qos_profile_sensor_data)
-        self.hear(self.feed.info_topic(depth), CameraInfo, CAMERA_INFO, qos_profile_sensor_data)
+        self.on_message(depth, Image, IMAGE, qos_profile_sensor_data)
+        self.on_message(self.feed.info_topic(depth), CameraInfo, CAMERA_INFO, qos_profile_sensor_data)
         if TFMessage is not None:
-            self.hear("/tf", TFMessage, TF, 100)
-            self.hear("/tf_static", TFMessage, TF, QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+            self.on_message("/tf", TFMessage, TF, 100)
+            self.on_message(
+                "/tf_static", TFMessage, TF, QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            )
 
-    def hear(self, topic: str, kind: type, name: str, qos: QoSProfile | int) -> None:
+    def on_message(self, topic: str, kind: type, name: str, qos: QoSProfile | int) -> None:
         self.create_subscription(kind, topic, lambda raw: self.take(topic, name, raw), qos, raw=True)
 
     def take(self, topic: str, kind: str, raw: bytes) -> None:

@@ -35,7 +35,7 @@ def true_poses(t: float) -> dict[str, np.ndarray]:
     return {"foot": np.eye(4), "lower_arm": lower, "upper_arm": upper, "shade": shade}
 
 
-def seen(lamp: voodoo.Body, poses: dict[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
+def observed(lamp: voodoo.Body, poses: dict[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
     """300 noisy points (3 mm) on every limb."""
     clouds = []
     for limb in lamp.limbs:
@@ -49,7 +49,7 @@ def seen(lamp: voodoo.Body, poses: dict[str, np.ndarray], rng: np.random.Generat
 
 
 def main() -> float:
-    """Track four seconds at 30 Hz; returns the mean error of the bulb in metres."""
+    """Track four seconds at 30 Hz; returns the mean error of the bulb in meters."""
     lamp = voodoo.Body.load(HERE / "bodies" / "lamp.toml")
     tracker = voodoo.Tracker(lamp)
     tracker.reset_pose(true_poses(0.0))
@@ -57,7 +57,7 @@ def main() -> float:
     for index in range(120):
         poses = true_poses(index / 30.0)
         frame = voodoo.Frame(stamp=index / 30.0)
-        frame.add_points(seen(lamp, poses, rng))
+        frame.add_points(observed(lamp, poses, rng))
         estimate = tracker.step(frame)
         bulb = (poses["shade"] @ [0.0, 0.0, 0.10, 1.0])[:3]
         errors.append(float(np.linalg.norm(estimate.joints["bulb"] - bulb)))

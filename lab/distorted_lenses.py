@@ -67,14 +67,14 @@ def through(name: str, camera: voodoo.Camera) -> voodoo.Camera:
     model, coefficients = LENSES[name]
     unit = voodoo.Camera(2, 2, 1.0, 1.0, 0.0, 0.0, coefficients, model)  # type: ignore[arg-type]
     half = (camera.width - 1) / 2.0
-    share = half / camera.fx / float(unit.project([[half / camera.fx, 0.0, 1.0]])[0, 0])
-    return replace(camera, fx=camera.fx * share, fy=camera.fy * share, distortion=coefficients, model=model)  # type: ignore[arg-type]
+    fraction = half / camera.fx / float(unit.project([[half / camera.fx, 0.0, 1.0]])[0, 0])
+    return replace(camera, fx=camera.fx * fraction, fy=camera.fy * fraction, distortion=coefficients, model=model)  # type: ignore[arg-type]
 
 
 def sampled(name: str, camera: voodoo.Camera, seed: int) -> voodoo.Camera:
     """The same beside the recorded pixels, another way for each seed: the pinhole, too, has to be sampled."""
-    share, x, y = np.random.default_rng(seed).uniform((0.94, -0.5, -0.5), (0.99, 0.5, 0.5)).tolist()
-    beside = replace(camera, fx=share * camera.fx, fy=share * camera.fy, cx=camera.cx + x, cy=camera.cy + y)
+    fraction, x, y = np.random.default_rng(seed).uniform((0.94, -0.5, -0.5), (0.99, 0.5, 0.5)).tolist()
+    beside = replace(camera, fx=fraction * camera.fx, fy=fraction * camera.fy, cx=camera.cx + x, cy=camera.cy + y)
     return beside if name == "pinhole" else through(name, beside)
 
 
@@ -132,7 +132,7 @@ def walking(name: str, seed: int) -> Iterator[Step]:
 
 def picture(step: Step) -> np.ndarray:
     """The model over the depth image."""
-    depth = step.item.image * step.item.metres_per_unit
+    depth = step.item.image * step.item.meters_per_unit
     gray = np.where(depth > 0.0, np.clip(255.0 * (4.5 - depth) / 3.5, 30, 255), 0).astype(np.uint8)
     scale = 960.0 / step.item.camera.width
     gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)

@@ -1,4 +1,4 @@
-"""A made-up person in clothes before patterned walls, seen by several colour cameras, as a bag and as videos."""
+"""A made-up person in clothes before patterned walls, seen by several color cameras, as a bag and as videos."""
 
 import json
 from functools import cache
@@ -45,7 +45,7 @@ def pose(number):
 
 @cache
 def wall(number):
-    """What a camera sees without anybody: grey-green patches."""
+    """What a camera sees without anybody: gray-green patches."""
     chance = np.random.default_rng(number)
     patches = chance.integers(90, 170, (9, 12, 3)) * np.array([0.9, 1.0, 0.8])
     return cv2.resize(patches.astype(np.uint8), (CAMERA.width, CAMERA.height), interpolation=cv2.INTER_CUBIC)
@@ -54,10 +54,10 @@ def wall(number):
 def picture(scene, number, time):
     """(H, W, 3) BGR of a camera at a time [s]."""
     poses, _ = scene.truth(time)
-    seen = render_depth(scene.body, poses, camera=CAMERA, world_from_sensor=pose(number))
-    colours = np.array([_CLOTHES.get(name.split("_")[-1], _SHIRT) for name in seen.limb_names])
+    observed = render_depth(scene.body, poses, camera=CAMERA, world_from_sensor=pose(number))
+    colors = np.array([_CLOTHES.get(name.split("_")[-1], _SHIRT) for name in observed.limb_names])
     image = wall(number).copy()
-    image[seen.limb >= 0] = colours[seen.limb[seen.limb >= 0]]
+    image[observed.limb >= 0] = colors[observed.limb[observed.limb >= 0]]
     noise = np.random.default_rng((number, round(1e4 * time))).normal(0.0, 2.0, image.shape)
     return np.clip(cv2.GaussianBlur(image, (0, 0), 0.6) + noise, 0, 255).astype(np.uint8)
 

@@ -214,15 +214,15 @@ class Tracker:
 
 CAMERA = Camera(width=80, height=60, fx=60.0, fy=60.0, cx=39.5, cy=29.5)
 BASE_FROM_CAMERA = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
-"""One metre above base_link, looking along its x."""
+"""One meter above base_link, looking along its x."""
 
 
 def depth_of(joints, stamp=0.0):
     """The body as a flat depth image at its mean distance, nothing around it."""
     body, estimate = pose(joints)
     mask = body_mask(body, estimate, CameraView(CAMERA, BASE_FROM_CAMERA), width=80, height=60)
-    millimetres = round(1000.0 * float(np.mean([position[0] for position in joints.values()])))
-    image = np.where(mask, millimetres, 0).astype(np.uint16)
+    millimeters = round(1000.0 * float(np.mean([position[0] for position in joints.values()])))
+    image = np.where(mask, millimeters, 0).astype(np.uint16)
     return DepthImage("depth", stamp, image, 0.001, CAMERA, BASE_FROM_CAMERA)
 
 

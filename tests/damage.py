@@ -37,7 +37,7 @@ def write(path: Path, entries: list[Entry]) -> Path:
 
 
 def sound() -> list[Entry]:
-    """The messages of the bundled recording: 90 frames of depth and colour."""
+    """The messages of the bundled recording: 90 frames of depth and color."""
     return entries_of(sample_path() / "bag")
 
 

@@ -16,14 +16,14 @@ SECONDS = 300
 def environment(folder: Path, extra: str) -> Path:
     """Its Python, with all that this one has and the requirements of the extra; the test is skipped without an index."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    wanted = parse_toml(text, source="pyproject", error=ValueError)["project"]["optional-dependencies"][extra]
+    expected = parse_toml(text, source="pyproject", error=ValueError)["project"]["optional-dependencies"][extra]
     venv.create(folder, with_pip=True)
     python = folder / "bin" / "python"
     (own,) = folder.glob("lib/python*/site-packages")
     paths = [sysconfig.get_path("purelib"), sysconfig.get_path("platlib")]
     (own / "tests.pth").write_text("\n".join(dict.fromkeys(paths)) + "\n")
     done = subprocess.run(
-        [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted],
+        [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *expected],
         capture_output=True, text=True, timeout=SECONDS, check=False,
     )  # fmt: skip
     if done.returncode:

@@ -310,7 +310,7 @@ def call(rng: Random) -> None:
         lambda: voodoo.Tracker(body).step(a),
         lambda: voodoo.Frame(stamp=a),
         lambda: frame.add_points(array(rng), weight=a, world_from_sensor=array(rng)),
-        lambda: frame.add_depth(array(rng), camera=camera, metres_per_unit=a),
+        lambda: frame.add_depth(array(rng), camera=camera, meters_per_unit=a),
         lambda: frame.add_depth(array(rng), camera=a),
         lambda: frame.add_position("l_wrist", array(rng), weight=a, bias=b),
         lambda: frame.add_ray("l_wrist", origin=array(rng), direction=a),

@@ -186,8 +186,8 @@ def _listen(child: subprocess.Popen[str], case: int, step: int, report: Report, 
         lines.put(None)
 
     threading.Thread(target=pump, daemon=True).start()
-    said: list[str] = []
-    threading.Thread(target=lambda: said.extend(child.stderr or ()), daemon=True).start()
+    reported: list[str] = []
+    threading.Thread(target=lambda: reported.extend(child.stderr or ()), daemon=True).start()
     running, name, wait = None, "", 60.0
     while True:
         try:
@@ -199,25 +199,25 @@ def _listen(child: subprocess.Popen[str], case: int, step: int, report: Report, 
         if line is None:
             with lock:
                 if running is not None:
-                    how = "hangs in compiled code" if hung else f"died ({child.wait()}): {''.join(said)[-300:]}"
+                    how = "hangs in compiled code" if hung else f"died ({child.wait()}): {''.join(reported)[-300:]}"
                     report.failures.append(f"case {running} ({name}): the process {how}")
                 elif hung or child.wait() != 0:
-                    report.failures.append(f"before case {case}: the process ended: {''.join(said)[-600:]}")
+                    report.failures.append(f"before case {case}: the process ended: {''.join(reported)[-600:]}")
                     return sys.maxsize
             return case + step if running is not None else case
-        told = json.loads(line)
-        if "outcome" not in told:
-            running, name, case, wait = told["case"], told["name"], told["case"], 6 * LONGEST_S
+        message = json.loads(line)
+        if "outcome" not in message:
+            running, name, case, wait = message["case"], message["name"], message["case"], 6 * LONGEST_S
             continue
         with lock:
             report.counts[name] += 1
-            report.accepted[name] += told["outcome"] == "accepted"
-            report.slowest = max(report.slowest, told["s"])
-            report.largest = max(report.largest, told["memory"])
-            if told["outcome"] not in ("accepted", "refused"):
-                report.failures.append(f"case {running} ({name}): {told['outcome']}")
-            if told["memory"] > MOST_BYTES:
-                report.failures.append(f"case {running} ({name}): {told['memory'] / 1e9:.1f} GB")
+            report.accepted[name] += message["outcome"] == "accepted"
+            report.slowest = max(report.slowest, message["s"])
+            report.largest = max(report.largest, message["memory"])
+            if message["outcome"] not in ("accepted", "refused"):
+                report.failures.append(f"case {running} ({name}): {message['outcome']}")
+            if message["memory"] > MOST_BYTES:
+                report.failures.append(f"case {running} ({name}): {message['memory'] / 1e9:.1f} GB")
         running, case = None, case + step
 
 

@@ -48,8 +48,8 @@ class Rig:
     """
 
     def __init__(self, follower: Follower | None = None, *, source: Source | None = None, wait: float = 0.010) -> None:
-        self.clock, self.told = HandClock(), []
-        self.live = Live([source or ByHand()], clock=self.clock, tell=self.told.append, wait=wait)
+        self.clock, self.messages = HandClock(), []
+        self.live = Live([source or ByHand()], clock=self.clock, on_message=self.messages.append, wait=wait)
         self.follower = follower
         self.frames: list[LiveFrame] = []
         self.steps = []

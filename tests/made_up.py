@@ -37,6 +37,6 @@ def two_people() -> MadeUpRecording:
 def places_in(recording: MadeUpRecording, index: int) -> np.ndarray:
     """Points (N, 3) [m] of a depth image in the root frame."""
     depth = next(item for item in list(recording)[index].measurements if item.sensor == "/camera/depth")
-    z = depth.image.astype(float) * depth.metres_per_unit
+    z = depth.image.astype(float) * depth.meters_per_unit
     points = np.concatenate([depth.camera.rays()[..., :2] * z[..., None], z[..., None]], axis=2)[z > 0.0]
     return points @ depth.root_from_sensor[:3, :3].T + depth.root_from_sensor[:3, 3]

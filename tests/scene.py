@@ -24,8 +24,8 @@ def surface(
     rng = np.random.default_rng(seed)
     area = np.array([limb.shape.length * (limb.shape.a0 + limb.shape.b1) for limb in body.limbs])
     parts = []
-    for limb, share in zip(body.limbs, area / area.sum(), strict=True):
-        shape, number = limb.shape, int(np.ceil(share * count))
+    for limb, fraction in zip(body.limbs, area / area.sum(), strict=True):
+        shape, number = limb.shape, int(np.ceil(fraction * count))
         t, angle = rng.uniform(0.0, 1.0, number), rng.uniform(0.0, 2.0 * np.pi, number)
         a, b = shape.a0 + (shape.a1 - shape.a0) * t, shape.b0 + (shape.b1 - shape.b0) * t
         local = np.stack([a * np.cos(angle), b * np.sin(angle), shape.length * t], axis=1)

@@ -1,4 +1,4 @@
-"""A head and two hands of skin's colour in a picture, for the tests of skin and depth."""
+"""A head and two hands of skin's color in a picture, for the tests of skin and depth."""
 
 import cv2
 import numpy as np
@@ -29,7 +29,7 @@ def at(pixel, z=Z):
 
 
 def picture(head, left, right, *, forearm=None, door=None, light=(1.0, 1.0, 1.0), seed=0):
-    """A shirt, a face and two hands; a bare left forearm to the elbow `forearm`, and a door of skin's colour."""
+    """A shirt, a face and two hands; a bare left forearm to the elbow `forearm`, and a door of skin's color."""
     image = np.full((240, 320, 3), WALL, np.uint8)
     if door is not None:
         cv2.rectangle(image, door[:2], door[2:], SKIN, -1)
@@ -43,7 +43,7 @@ def picture(head, left, right, *, forearm=None, door=None, light=(1.0, 1.0, 1.0)
     return np.clip(image * np.array(light) + noise, 0, 255).astype(np.uint8)
 
 
-def learnt(skin, frames=8, **parts):
+def learned(skin, frames=8, **parts):
     head, left, right = (160, 60), (110, 120), (210, 120)
     pose = Pose(head, left, right)
     for seed in range(frames):

@@ -44,7 +44,7 @@ def test_a_new_sensor_in_one_file_tracks_a_body(uwb):
     assert uwb.main(frames=40) < 0.06, "no worse than the tags' own noise (mean length 8 cm)"
 
 
-def test_a_new_sensor_is_drawn_and_told_when_it_freezes(uwb):
+def test_a_new_sensor_is_drawn_and_reported_when_it_freezes(uwb):
     sequence = uwb.VirtualSequence(body=voodoo.Body.human(model="full"), frames=3)
     tracker = voodoo.Tracker(sequence.body)
     tracker.reset_pose(sequence.truth(0.0)[0])

@@ -110,7 +110,7 @@ def test_contiguous_arrays_are_not_copied(body):
     points[:] = np.nan
     tracker = voodoo.Tracker(body)
     tracker.reset_pose(rest_pose(body))
-    with pytest.raises(MeasurementError, match="finite metres"):
+    with pytest.raises(MeasurementError, match="finite meters"):
         tracker.step(frame)
 
 
@@ -186,7 +186,7 @@ def test_images_that_cannot_be_meant_are_refused_by_name():
     [
         (
             lambda frame: frame.add_points(np.full((4, 3), np.inf)),
-            ["points[0].points", "finite metres", "[inf, inf, inf] in row 0"],
+            ["points[0].points", "finite meters", "[inf, inf, inf] in row 0"],
         ),
         (lambda frame: frame.add_points(np.zeros((4, 3)), weight=0.0), ["points[0].weight", "above zero"]),
         (lambda frame: frame.add_points(np.zeros((4, 3)), limb="tail"), ["tail", "l_forearm"]),
@@ -204,17 +204,17 @@ def test_images_that_cannot_be_meant_are_refused_by_name():
     ],
 )
 def test_a_refused_frame_names_what_is_wrong_and_leaves_no_trace(body, cloud, change, words):
-    seen, spared = voodoo.Tracker(body), voodoo.Tracker(body)
-    for tracker in (seen, spared):
+    observed, spared = voodoo.Tracker(body), voodoo.Tracker(body)
+    for tracker in (observed, spared):
         tracker.reset_pose(rest_pose(body))
         tracker.step(frame_of(cloud))
     bad = voodoo.Frame(stamp=1.0)
     change(bad)
     with pytest.raises(VoodooError) as caught:
-        seen.step(bad)
+        observed.step(bad)
     assert all(word in str(caught.value) for word in words), caught.value
-    assert dict(seen.estimate.sources) == dict(spared.estimate.sources)
-    after = [tracker.step(frame_of(cloud + 0.01, stamp=1.0)).joint_positions for tracker in (seen, spared)]
+    assert dict(observed.estimate.sources) == dict(spared.estimate.sources)
+    after = [tracker.step(frame_of(cloud + 0.01, stamp=1.0)).joint_positions for tracker in (observed, spared)]
     np.testing.assert_array_equal(*after)
 
 
@@ -244,15 +244,15 @@ def test_a_reset_needs_positions_that_fix_the_pose(body):
             tracker.reset_pose(rest_pose(body) | {"l_calf": bad})
 
 
-def test_a_reset_in_millimetres_is_refused(body):
+def test_a_reset_in_millimeters_is_refused(body):
     """It made a body of 1750 m, status tracking."""
     tracker = voodoo.Tracker(body)
-    wanted = standing_joints(body)
+    expected = standing_joints(body)
     for factor in (1000.0, 100.0, 0.001):
-        with pytest.raises(MeasurementError, match=rf"joints: expected metres, .* found {factor:.4f} times"):
-            tracker.reset(joints={name: factor * position for name, position in wanted.items()})
-    child = tracker.reset(joints={name: 0.4 * position for name, position in wanted.items()})
-    assert child.joints["l_wrist"] == pytest.approx(0.4 * wanted["l_wrist"], abs=1e-6)
+        with pytest.raises(MeasurementError, match=rf"joints: expected meters, .* found {factor:.4f} times"):
+            tracker.reset(joints={name: factor * position for name, position in expected.items()})
+    child = tracker.reset(joints={name: 0.4 * position for name, position in expected.items()})
+    assert child.joints["l_wrist"] == pytest.approx(0.4 * expected["l_wrist"], abs=1e-6)
 
 
 def test_before_a_reset_nothing_is_known_and_a_step_searches(body):
@@ -336,10 +336,10 @@ def test_a_copy_of_an_estimate_has_the_same_bits(tracker, cloud, copied):
 
 def test_a_reset_reproduces_positions_and_sizes(body):
     tall = voodoo.Body.human(height=1.9, model="papers")
-    wanted = {name: position + np.array([3.0, -1.0, 0.5]) for name, position in standing_joints(tall).items()}
+    expected = {name: position + np.array([3.0, -1.0, 0.5]) for name, position in standing_joints(tall).items()}
     tracker = voodoo.Tracker(body)
-    estimate = tracker.reset(joints=wanted)
-    for name, position in wanted.items():
+    estimate = tracker.reset(joints=expected)
+    for name, position in expected.items():
         np.testing.assert_allclose(estimate.joints[name], position, atol=1e-6, err_msg=name)
     for limb, other in zip(tracker.body.limbs, tall.limbs, strict=True):
         assert limb.shape.length == pytest.approx(other.shape.length, abs=1e-6), limb.name
@@ -374,7 +374,7 @@ def test_the_body_changes_between_frames(tracker, cloud):
 
 def test_points_that_are_not_finite_are_named_by_their_row(tracker):
     points = np.array([[0.0, 0.0, 0.0], [1.0, np.nan, 2.0]])
-    words = r"points: expected finite metres, found \[1.0, NaN, 2.0\] in row 1$"
+    words = r"points: expected finite meters, found \[1.0, NaN, 2.0\] in row 1$"
     for call in (
         tracker.distance,
         tracker.limb_distances,
@@ -417,8 +417,8 @@ def test_a_configuration_is_frozen_checked_and_explained():
     for values in ({"max_steps": 0}, {"max_steps": 2.5}, {"max_distance": float("nan")}, {"overlap": "sometimes"}):
         with pytest.raises(ConfigError, match=next(iter(values))):
             voodoo.Config(**values)
-    with pytest.raises(ConfigError, match=r"colour.*known are .*max_steps"):
-        voodoo.Config(colour="red")
+    with pytest.raises(ConfigError, match=r"color.*known are .*max_steps"):
+        voodoo.Config(color="red")
     text = config.to_toml()
     assert voodoo.Config.from_toml(text) == config and "\n# " in text
     with pytest.raises(ConfigError, match="syntax"):

@@ -229,7 +229,7 @@ def test_an_interrupted_batch_goes_on_and_other_settings_do_not(tmp_path):
         Batch(sources, out, settings)
 
 
-def test_what_is_missing_is_said_before_the_work(tmp_path, monkeypatch):
+def test_what_is_missing_is_reported_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(VoodooError, match=r"pip install 'voodoo-tracker\[batch\]'"):
         next(engine.run([], workers=1))

@@ -8,7 +8,7 @@ from scene import rest_pose, standing_joints, surface
 
 
 @pytest.mark.parametrize("solver", ["limbwise", "chain"])
-def test_within_its_bias_a_cue_says_nothing(solver):
+def test_within_its_bias_a_cue_reports_nothing(solver):
     found = {}
     for away in (0.0, 0.04, 0.15):
         tracker = standing(solver)

@@ -99,7 +99,7 @@ def test_names_of_any_kind_survive():
     [
         ('name = "thing"', "", ["name", "required"]),
         ('name = "thing"', "name = 3", ["name", "string"]),
-        ('name = "thing"', 'name = "thing"\ncolour = "red"', ["colour", "not permitted"]),
+        ('name = "thing"', 'name = "thing"\ncolor = "red"', ["color", "not permitted"]),
         ("length = 0.2", "length = -0.2", ["limbs.base.shape.length", "greater than 0", "-0.2"]),
         ("length = 0.2", "length = inf", ["limbs.base.shape.length", "finite"]),
         ("length = 0.2, ", "", ["limbs.base.shape.length", "required"]),
@@ -174,7 +174,7 @@ VALUES = st.one_of(
 
 
 @FAST
-@given(st.sampled_from([*voodoo.Config.model_fields, "colour"]), VALUES)
+@given(st.sampled_from([*voodoo.Config.model_fields, "color"]), VALUES)
 def test_any_value_of_a_configuration_is_taken_or_named(key, value):
     if not usable(lambda: voodoo.Config(**{key: value})):
         with pytest.raises(voodoo.ConfigError, match=key):

@@ -29,7 +29,7 @@ def test_project_gives_nan_where_there_is_no_image():
     assert np.isnan(pixels[:3]).all() and np.isfinite(pixels[3]).all()
 
 
-def test_rays_have_pixel_centres_at_integers():
+def test_rays_have_pixel_centers_at_integers():
     rays = PINHOLE.rays()
     assert rays.shape == (6, 8, 2) and rays.dtype == np.float32
     np.testing.assert_allclose(rays[0, 0], [-0.35, -2.5 / 12.0], rtol=1e-6)

@@ -281,7 +281,7 @@ def test_strictly_a_refused_frame_is_named_and_leaves_no_result(run):
     assert run.left_out is None and not Path("pose.csv").exists()
 
 
-def test_ctrl_c_leaves_the_frames_up_to_there_and_says_so(run):
+def test_ctrl_c_leaves_the_frames_up_to_there_and_reports_so(run):
     run.tracker.interrupt_at = 4
     result = run("track", "x", "--out", "pose.csv", "--out", "pose.npz", "--overlay", "look.mp4")
     assert_one_line(result, 130, "interrupted", "4 frames", "12 frames", "pose.csv and pose.npz and look.mp4")
@@ -346,7 +346,7 @@ def test_measurements_reach_the_frame_with_pose_and_weight(run):
     recording = FakeRecording(frames=1)
     frame = FrontEnd(start_tracker(recording)).frame(next(iter(recording)))
     ((kind, shape, options),) = frame.calls
-    assert (kind, shape, options["metres_per_unit"], options["weight"]) == ("depth", (60, 80), 0.001, 1.0)
+    assert (kind, shape, options["meters_per_unit"], options["weight"]) == ("depth", (60, 80), 0.001, 1.0)
     assert frame.stamp == 1700200000.0
 
 
@@ -361,10 +361,10 @@ def test_track_yields_one_estimate_a_frame_with_its_time(run):
 def test_numbers_for_the_loader(run):
     assert run("track", "x", "--option", "rate=30", "--option", "tf_max_age=2").exit_code == 0
     assert run.options == {"rate": 30.0, "tf_max_age": 2.0}
-    assert run("info", "x", "--option", "metres_per_unit=0.00025").exit_code == 0
-    assert run.options == {"metres_per_unit": 0.00025}
+    assert run("info", "x", "--option", "meters_per_unit=0.00025").exit_code == 0
+    assert run.options == {"meters_per_unit": 0.00025}
     for words in ("rate", "rate=fast", "depth=1"):
-        assert_one_line(run("track", "x", "--option", words), 1, "NAME=NUMBER with one of rate, metres_per_unit", words)
+        assert_one_line(run("track", "x", "--option", words), 1, "NAME=NUMBER with one of rate, meters_per_unit", words)
 
 
 def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path):

@@ -1,4 +1,4 @@
-"""Colour alone on recordings with truth: rendered people, and real cameras against what others triangulated."""
+"""Color alone on recordings with truth: rendered people, and real cameras against what others triangulated."""
 
 import numpy as np
 import pytest

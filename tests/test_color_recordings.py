@@ -1,4 +1,4 @@
-"""Recordings of pictures alone: bags with several colour topics, folders of videos, pictures of the empty scene."""
+"""Recordings of pictures alone: bags with several color topics, folders of videos, pictures of the empty scene."""
 
 import shutil
 from dataclasses import replace
@@ -52,15 +52,15 @@ def test_a_picture_belongs_to_the_frame_it_is_nearest_to():
     items.sort(key=lambda item: item.stamp)
     frames = list(together(items, "first"))
     assert [frame.stamp for frame in frames] == [item.stamp for item in items if item.sensor == "first"]
-    seen = set()
+    shot = set()
     for frame in frames:
         *others, last = frame.measurements
         assert last.sensor == "first" and len({item.sensor for item in others}) == len(others)
         for item in others:
             near = [abs(other.stamp - frame.stamp) for other in items if other.sensor == item.sensor]
             assert abs(item.stamp - frame.stamp) == min(near) <= 0.05 + 1e-9
-            assert id(item) not in seen
-            seen.add(id(item))
+            assert id(item) not in shot
+            shot.add(id(item))
         for other in ("a", "b"):
             near = min(abs(item.stamp - frame.stamp) for item in items if item.sensor == other)
             assert (near < 0.05) == any(item.sensor == other for item in frame.measurements)
@@ -73,7 +73,7 @@ def test_one_picture_and_rare_ones():
     assert [len(frame.measurements) for frame in frames] == [1, 1]
 
 
-def test_all_colour_topics_are_used_where_there_is_nothing_else(folder):
+def test_all_color_topics_are_used_where_there_is_nothing_else(folder):
     recording = open_recording(folder)
     assert cameras_of(recording) == TOPICS and recording.root_frame == "world" and len(recording) == FRAMES
     frames = list(paired(recording))
@@ -107,21 +107,21 @@ def test_natural_order_and_what_is_no_camera_of_its_own(tmp_path):
         entries.append(("/lone/image_raw", stamp, scene.M.image(stamp, scene.wall(0), "bgr8", frame="lone")))
     recording = open_recording(write_bag(tmp_path / "b", entries))
     assert cameras_of(recording) == ["/c9/image_raw", "/c10/image_raw"]
-    told = dict(recording.info().unused)
-    assert "camera of /c9/image_raw" in told["/c9/image_rect"] and "camera_info" in told["/lone/image_raw"]
+    message = dict(recording.info().unused)
+    assert "camera of /c9/image_raw" in message["/c9/image_rect"] and "camera_info" in message["/lone/image_raw"]
     assert any("/lone/image_raw" in words for words in recording.assumed)
 
 
-def test_grey_cameras_count_where_none_sees_colours(tmp_path):
+def test_gray_cameras_count_where_none_sees_colors(tmp_path):
     entries = [scene.transforms(range(2))]
     for n in range(2):
-        grey = scene.wall(n)[:, :, 0]
+        gray = scene.wall(n)[:, :, 0]
         entries.append((f"/g_{n}/camera_info", scene.START, scene.info_of(scene.START, n)))
         entries.append(
             (
                 f"/g_{n}/image_raw",
                 scene.START,
-                scene.M.image(scene.START, grey, "mono8", frame=f"cam_{n}_optical_frame"),
+                scene.M.image(scene.START, gray, "mono8", frame=f"cam_{n}_optical_frame"),
             )
         )
     frame = next(iter(open_recording(write_bag(tmp_path / "b", entries))))
@@ -140,7 +140,7 @@ def test_cameras_without_transforms_between_them_are_no_cameras_of_one_scene(tmp
     assert cameras_of(recording) == TOPICS[:2] and TOPICS[2] in recording.assumed[0]
 
 
-def test_beside_depth_an_ambiguous_colour_stays_left_out(tmp_path):
+def test_beside_depth_an_ambiguous_color_stays_left_out(tmp_path):
     depth = np.full((scene.CAMERA.height, scene.CAMERA.width), 2000, np.uint16)
     entries = scene.bag_entries(2, 2)
     for k in range(2):
@@ -215,13 +215,13 @@ def copy(films, tmp_path):
     return shutil.copytree(films, tmp_path / "copy")
 
 
-def test_videos_without_a_calibration_say_what_is_needed(copy):
+def test_videos_without_a_calibration_report_what_is_needed(copy):
     (copy / "Calib_scene.toml").unlink()
     with pytest.raises(
         RecordingError, match=r"expected one Calib\*\.toml, the calibration of the cameras, found none"
-    ) as told:
+    ) as message:
         open_recording(copy)
-    assert "[cam0]" in told.value.hint and "translation" in told.value.hint
+    assert "[cam0]" in message.value.hint and "translation" in message.value.hint
     with pytest.raises(RecordingError, match=r"films of several cameras and their calibration"):
         open_recording(copy / "videos" / "cam0.avi")
     (copy / "calibration").mkdir()
@@ -294,8 +294,8 @@ def test_a_pinhole_sees_points_where_the_picture_shows_them(distortion):
             picture = np.zeros((240, 320, 3), np.uint8)
             u, v = camera.project(point[None])[0]
             cv2.circle(picture, (round(16 * u), round(16 * v)), 6 << 4, (255, 255, 255), -1, cv2.LINE_AA, 4)
-            seen = lens.apply(picture)[..., 0].astype(float)
-            found = np.array([(seen.sum(axis=axis) @ np.arange(seen.shape[1 - axis])) for axis in (0, 1)]) / seen.sum()
+            shot = lens.apply(picture)[..., 0].astype(float)
+            found = np.array([(shot.sum(axis=axis) @ np.arange(shot.shape[1 - axis])) for axis in (0, 1)]) / shot.sum()
             np.testing.assert_allclose(found, lens.camera.project(point[None])[0], atol=0.25)
 
 

@@ -1,4 +1,4 @@
-"""Which pixels are the body, by its colours: what of them is right, for whom, and that asking changes nothing."""
+"""Which pixels are the body, by its colors: what of them is right, for whom, and that asking changes nothing."""
 
 import numpy as np
 import pytest
@@ -28,10 +28,10 @@ def truth_of(number):
 
 
 def overlap(mask, camera, number):
-    seen = (
+    observed = (
         render_depth(sequence(FRAMES).body, truth_of(number), camera=CAMERA, world_from_sensor=pose(camera)).limb >= 0
     )
-    return (mask & seen).sum() / (mask | seen).sum()
+    return (mask & observed).sum() / (mask | observed).sum()
 
 
 def started():
@@ -55,7 +55,7 @@ def test_the_body_is_cut_out_and_asking_changes_no_pose():
         assert overlap(likely > 0.5, camera, 4) > 0.88
 
 
-def test_a_prior_that_is_off_is_corrected_by_the_colours():
+def test_a_prior_that_is_off_is_corrected_by_the_colors():
     silhouettes = RegionSilhouettes(sequence(FRAMES).body)
     items = [
         [

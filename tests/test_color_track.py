@@ -41,7 +41,7 @@ def films(tmp_path_factory):
     return scene.write_videos(tmp_path_factory.mktemp("films") / "walk", FRAMES)
 
 
-def test_a_bag_of_colour_topics_and_a_folder_of_videos_give_rows(bag, films, tmp_path, monkeypatch):
+def test_a_bag_of_color_topics_and_a_folder_of_videos_give_rows(bag, films, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder, first in ((bag, scene.START), (films, 0.0)):
         done = run("track", folder, "--out", "pose.csv", "--overlay", "look")
@@ -65,7 +65,7 @@ def test_a_bag_of_colour_topics_and_a_folder_of_videos_give_rows(bag, films, tmp
         shutil.rmtree("look")
 
 
-def test_info_says_what_is_there(bag, films):
+def test_info_reports_what_is_there(bag, films):
     for folder, loader in ((bag, "ros2"), (films, "videos")):
         done = run("info", folder)
         assert done.exit_code == 0, done.stderr
@@ -89,7 +89,7 @@ def test_eval_measures_joints_and_angles(films, tmp_path):
     assert float(row["angle_error_deg"]) < 4.0 and float(row["lost_share"]) == 0.0
 
 
-def test_errors_say_what_is_needed(films, tmp_path, monkeypatch):
+def test_errors_report_what_is_needed(films, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plain = shutil.copytree(films, tmp_path / "plain")
     (plain / "init.json").unlink()
@@ -167,23 +167,25 @@ def test_the_front_end_hands_over_pinhole_pictures_with_their_own_stamps(bag, mo
 
     recording = open_recording(bag)
     tracker = start_tracker(recording)
-    shown = []
-    monkeypatch.setattr(type(tracker), "set_background", lambda _, source, images: shown.append((source, len(images))))
+    displayed = []
+    monkeypatch.setattr(
+        type(tracker), "set_background", lambda _, source, images: displayed.append((source, len(images)))
+    )
     monkeypatch.setattr(module, "Frame", Recorder)
     front_end = FrontEnd(tracker, settings=FrontEndSettings.of(recording))
     frames = [front_end.frame(recorded) for recorded in list(recording)[:2]]
-    assert sorted(shown) == [(f"/cam_{n}/image_raw/compressed", 2) for n in range(4)], "once a camera"
+    assert sorted(displayed) == [(f"/cam_{n}/image_raw/compressed", 2) for n in range(4)], "once a camera"
     for frame in frames:
-        told = {about["source"]: about for _, about in frame.colors}
+        reported = {about["source"]: about for _, about in frame.colors}
         for n in range(4):
-            about = told[f"/cam_{n}/image_raw/compressed"]
+            about = reported[f"/cam_{n}/image_raw/compressed"]
             assert about["stamp"] == pytest.approx(frame.stamp + 0.002 * n, abs=1e-6)
             assert not about["camera"].distorted
             np.testing.assert_allclose(about["world_from_sensor"], scene.pose(n), atol=1e-9)
     assert json.loads((bag / "init.json").read_text())["height_m"] == 1.75
 
 
-def test_the_example_tells_how_many_cameras_it_takes(films, capsys):
+def test_the_example_reports_how_many_cameras_it_takes(films, capsys):
     means = load_example("color_cameras").main(films)
     assert list(means)[:2] == ["all", "without videos/cam0.avi"] and max(means.values()) < 0.04
     assert capsys.readouterr().out.count(" cm ") == 5

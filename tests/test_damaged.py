@@ -41,8 +41,8 @@ def tracked(bag: Path, *options: str) -> tuple[Track, str]:
 
 @pytest.fixture(scope="module")
 def undamaged(entries, start):
-    result, said = tracked(damage.write(start / "sound", entries))
-    assert len(result) == 90 and said == "" and result.left_out == {}
+    result, reported = tracked(damage.write(start / "sound", entries))
+    assert len(result) == 90 and reported == "" and result.left_out == {}
     return result
 
 
@@ -65,17 +65,17 @@ def undamaged(entries, start):
     ids=["cut", "several"],
 )
 def test_every_good_frame_has_a_pose(entries, start, undamaged, request, change, missing, words):
-    result, said = tracked(damage.write(start / request.node.callspec.id, change(entries)))
+    result, reported = tracked(damage.write(start / request.node.callspec.id, change(entries)))
     kept = np.setdiff1d(np.arange(90), missing)
     np.testing.assert_array_equal(result.stamps, undamaged.stamps[kept])
     assert result.found.all() and set(result.status) <= {"tracking", "degraded"}
     assert result.left_out == words
-    assert (f"left out {LeftOut.words(words)}" in said) if words else said == ""
+    assert (f"left out {LeftOut.words(words)}" in reported) if words else reported == ""
     gone = undamaged.stamps[list(missing)]
     settled = [not ((stamp > gone) & (stamp < gone + SETTLED_S)).any() for stamp in result.stamps]
     off = np.linalg.norm(result.joints - undamaged.joints[kept], axis=2)[settled]
     # Where the tracker decides (between two arms, what lies on which limb) one frame less may turn the balance, and so may a
-    # pixel that is a millimetre off: lab/experiments/missing_frames.py.
+    # pixel that is a millimeter off: lab/experiments/missing_frames.py.
     assert off.mean() < WITHIN_M, f"{1000 * off.mean():.1f} mm"
 
 

@@ -87,18 +87,18 @@ def test_the_shipped_network_may_be_wrapped_and_named(someone):
     shipped = voodoo.Detector()
 
     def detect(image):
-        shown = voodoo.Frame(0.0)
-        shown.add_depth(
-            image.depth, camera=image.camera, metres_per_unit=1.0, world_from_sensor=image.world_from_sensor
+        displayed = voodoo.Frame(0.0)
+        displayed.add_depth(
+            image.depth, camera=image.camera, meters_per_unit=1.0, world_from_sensor=image.world_from_sensor
         )
-        return shipped.detect(shown)
+        return shipped.detect(displayed)
 
     tracker, found = run(CallableDetector(detect, joints=JOINTS, lengths=LENGTHS), someone)
     assert tracker.detector_failures == 0 and found[-1].status in ("tracking", "degraded")
     assert [bits(each) for each in run("shipped", someone)[1]] == [bits(each) for each in run(shipped, someone)[1]]
 
 
-def test_without_a_detector_nobody_is_looked_for(someone):
+def test_without_a_detector_nobody_is_searched_for(someone):
     tracker = voodoo.Tracker(BODY, detector=None)
     assert not tracker.can_search
     with pytest.raises(MeasurementError):
@@ -153,10 +153,10 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
         (3, "not iterable"),
         ([DetectedPerson({"tail": (0, 0, 1)}, 0.9)], 'expected some of .*, found "tail"'),
         ([DetectedPerson({"l_shoulder": (0, 1)}, 0.9)], r"joints\[l_shoulder\]"),
-        ([DetectedPerson({"l_shoulder": (0, 1, np.nan)}, 0.9)], r"joints\[1\]: expected finite metres"),
+        ([DetectedPerson({"l_shoulder": (0, 1, np.nan)}, 0.9)], r"joints\[1\]: expected finite meters"),
         ([DetectedPerson({}, 2.0)], "confidence: expected a probability"),
         ([DetectedPerson({}, 0.9, facing="yes")], "facing: expected a probability"),
-        ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, joint_sigma=-1.0)], "sigma: expected finite metres > 0"),
+        ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, joint_sigma=-1.0)], "sigma: expected finite meters > 0"),
         (
             [DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, mask=np.ones((3, 3), bool))],
             "mask: expected an array of shape",
@@ -241,7 +241,7 @@ def test_the_writer_of_networks_writes_floats():
 
 
 @needs_onnxruntime
-def test_an_onnx_file_of_other_joints_says_where_they_are(tmp_path, someone):
+def test_an_onnx_file_of_other_joints_reports_where_they_are(tmp_path, someone):
     root = np.array(STANDING["humanoid_root"])
     places = np.array([[0.0, 0.1, 0.1], [-0.18, -0.35, 0.1], [0.18, -0.35, 0.1], [-0.1, 0.9, 0.1], [0.1, 0.9, 0.1]])
     path = constant_network(tmp_path / "five.onnx", p=places[None], vis=[[4.0] * 5 + [5.0, 6.0]])

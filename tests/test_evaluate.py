@@ -202,7 +202,7 @@ def test_silhouette_overlap_falls_when_the_model_moves(opened):
     assert overlaps[2] == 0.0
 
 
-def test_silhouette_has_the_area_of_a_cylinder_seen_from_the_side():
+def test_silhouette_has_the_area_of_a_cylinder_visible_from_the_side():
     body, estimate = pose(T_POSE)
     only_torso = type(body)([limb for limb in body.limbs if limb.name == "torso"])
     camera = replace(CAMERA, width=800, height=600, fx=600.0, fy=600.0, cx=399.5, cy=299.5)

@@ -45,7 +45,7 @@ def test_different_joints_do_not_make_one_run():
     assert metrics.tracking_class(errors, STAMPS, limit=0.1)[0] == 2
 
 
-def test_class_says_which_joint_was_lost_when():
+def test_class_reports_which_joint_was_lost_when():
     _, lost = metrics.tracking_class(errors_with(3, 10, 12), STAMPS, limit=0.1)
     assert lost[10:22, 3].all()
     assert lost.sum() == 12
@@ -146,9 +146,9 @@ def test_standing_jitter_counts_only_what_stands_still():
     assert not metrics.standing_still(reference[:5], stamps[:5]).any()
 
 
-def test_share_within_includes_the_limit_and_skips_the_unknown():
-    assert metrics.share_within(np.array([0.05, 0.051, np.nan, 0.01, 0.2]), 0.05) == 0.5
-    assert np.isnan(metrics.share_within(np.array([np.nan]), 0.05))
+def test_fraction_within_includes_the_limit_and_skips_the_unknown():
+    assert metrics.fraction_within(np.array([0.05, 0.051, np.nan, 0.01, 0.2]), 0.05) == 0.5
+    assert np.isnan(metrics.fraction_within(np.array([np.nan]), 0.05))
 
 
 def test_match_takes_the_nearest_stamp_within_tolerance():
@@ -208,7 +208,7 @@ def rest_order():
     return ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 
 
-def test_a_reference_whose_bone_shrinks_by_a_quarter_says_nothing_of_its_end():
+def test_a_reference_whose_bone_shrinks_by_a_quarter_reports_nothing_of_its_end():
     rng = np.random.default_rng(1)
     reference = np.repeat(rng.normal(0.0, 0.3, (1, len(metrics.JOINTS), 3)), 20, axis=0)
     knee, ankle = metrics.JOINTS.index("l_knee"), metrics.JOINTS.index("l_ankle")

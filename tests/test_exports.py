@@ -273,7 +273,7 @@ def test_a_track_without_limb_poses_is_refused(tmp_path, tracked):
 @pytest.mark.parametrize(
     ("name", "folder"), [("bag", True), ("run.2026-05-01", True), ("run.v2", True), ("pose.cvs", False)]
 )
-def test_a_folder_may_have_a_dot_and_a_slip_is_told(tmp_path, name, folder):
+def test_a_folder_may_have_a_dot_and_a_slip_is_reported(tmp_path, name, folder):
     if folder:
         check_target(tmp_path / name)
         (tmp_path / name).mkdir()
@@ -281,7 +281,7 @@ def test_a_folder_may_have_a_dot_and_a_slip_is_told(tmp_path, name, folder):
         check_target(tmp_path / name)
 
 
-def test_a_place_where_nothing_can_be_written_is_told_before_the_work(tmp_path):
+def test_a_place_where_nothing_can_be_written_is_reported_before_the_work(tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "pose.csv").mkdir()
     check_target(tmp_path / "new" / "folders" / "pose.csv")
@@ -301,7 +301,7 @@ def recorded():
     return Track.of(estimates, body=tracker.body), tracker.body
 
 
-def test_all_formats_tell_the_same_joints(tmp_path, recorded):
+def test_all_formats_report_the_same_joints(tmp_path, recorded):
     track, body = recorded
     for suffix in ("csv", "npz", "bvh", "trc"):
         save(track, tmp_path / f"pose.{suffix}", body=body, root_frame="base_link")
@@ -315,13 +315,13 @@ def test_all_formats_tell_the_same_joints(tmp_path, recorded):
     assert len(bones) >= 12 and bones["l_foot"] == "l_ankle"
     for bone, joint in bones.items():
         here = track.joints[:, track.joint_names.index(joint)]
-        told = {
+        reported = {
             "csv": csv.joints[:, csv.joint_names.index(joint)],
             "npz": npz.joints[:, npz.joint_names.index(joint)],
             "trc": trc.positions[:, trc.names.index(joint)] @ Z_UP_FROM_Y_UP.T,
             "bvh": places[bone][:, [2, 0, 1]] / 100.0,
         }
-        for name, found in told.items():
+        for name, found in reported.items():
             assert np.abs(found - here).max() < 2e-6, (name, joint)
     write_bag(tmp_path / "bag", track, body, root_frame="base_link")
     names = {

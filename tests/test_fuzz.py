@@ -25,7 +25,7 @@ def test_sound_samples_are_read(tmp_path):
         sample.open(folder, False)
 
 
-def test_the_harness_tells_what_fails(tmp_path, monkeypatch):
+def test_the_harness_reports_what_fails(tmp_path, monkeypatch):
     """In a child with samples of its own: one that raises, one that dies, one that never ends."""
     (tmp_path / "fuzz_samples.py").write_text(
         "import os, re\nfrom pathlib import Path\n"
@@ -43,7 +43,7 @@ def test_the_harness_tells_what_fails(tmp_path, monkeypatch):
     source.write_text(text, encoding="utf-8")
     monkeypatch.setattr(fuzzing, "__file__", str(source))
     report = fuzzing.fuzz(7)
-    told = "\n".join(report.failures)
-    assert len(report.failures) == 3, told
-    assert "(raises): ValueError: invalid literal" in told
-    assert "(dies): the process died" in told and "(spins): more than 0.3 s" in told
+    message = "\n".join(report.failures)
+    assert len(report.failures) == 3, message
+    assert "(raises): ValueError: invalid literal" in message
+    assert "(dies): the process died" in message and "(spins): more than 0.3 s" in message

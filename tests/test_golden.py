@@ -16,7 +16,7 @@ from voodoo.sensors.settings import FrontEndSettings
 
 GOLDEN = Path(__file__).with_name("golden_limbwise.csv")
 FRAMES = (0, 10, 30, 60, 89)
-# Metres. Another processor rounds otherwise, and the nearest limb of a point between two may change with it.
+# Meters. Another processor rounds otherwise, and the nearest limb of a point between two may change with it.
 TOLERANCE = 0.005
 
 

@@ -25,9 +25,9 @@ FAR = standing_joints(BODY) | {"l_wrist": (1e300, 0.0, 0.0)}
         (lambda: voodoo.Body.load(None), BodyError, "path: expected a file or folder, found NoneType"),
         (lambda: voodoo.Config.load(None), ConfigError, "path: expected a file or folder, found NoneType"),
         (lambda: Track.load(None), VoodooError, "path: expected a file or folder, found NoneType"),
-        (lambda: voodoo.Body.human(height="x"), BodyError, "height: expected a stature in metres, found 'x'"),
-        (lambda: voodoo.Body.human(height=None), BodyError, "height: expected a stature in metres, found None"),
-        (lambda: voodoo.Body.human(height=10**400), BodyError, "height: expected a stature in metres, found 1000"),
+        (lambda: voodoo.Body.human(height="x"), BodyError, "height: expected a stature in meters, found 'x'"),
+        (lambda: voodoo.Body.human(height=None), BodyError, "height: expected a stature in meters, found None"),
+        (lambda: voodoo.Body.human(height=10**400), BodyError, "height: expected a stature in meters, found 1000"),
         (lambda: voodoo.Body.human(model=3), BodyError, "'3'|3"),
         (lambda: BODY.scaled("x"), BodyError, "factor: expected a number, found 'x'"),
         (lambda: ik.Options(bones=0), MeasurementError, "bones: expected a list of .site, site, radius., found 0"),
@@ -39,7 +39,7 @@ FAR = standing_joints(BODY) | {"l_wrist": (1e300, 0.0, 0.0)}
         (lambda: frame().add_position(3, (0, 0, 1)), MeasurementError, "site: expected a name, found 3"),
         (lambda: frame().set_ground(normal=(0, 0, 1), offset=None), MeasurementError, "offset: expected a number"),
         (lambda: frame().add_points(np.zeros((1, 3)), weight=[]), MeasurementError, "weight: expected a number"),
-        (lambda: voodoo.TaperedEllipticCylinder("x", 1, 1, 1, 1), BodyError, "length: expected metres, found 'x'"),
+        (lambda: voodoo.TaperedEllipticCylinder("x", 1, 1, 1, 1), BodyError, "length: expected meters, found 'x'"),
         (lambda: voodoo.Tracker(BODY).step(None), MeasurementError, "frame: expected a voodoo.Frame, found NoneType"),
         (lambda: voodoo.Tracker(BODY).scale("x"), BodyError, "factor: expected a number, found 'x'"),
         (lambda: voodoo.Tracker(BODY).set_shape("head", 2), BodyError, "shape: expected a voodoo.TaperedElliptic"),
@@ -52,7 +52,7 @@ FAR = standing_joints(BODY) | {"l_wrist": (1e300, 0.0, 0.0)}
         (
             lambda: voodoo.Tracker(BODY).reset(joints=FAR),
             MeasurementError,
-            r"joints\[l_wrist\]: expected finite metres, 1e9 at most",
+            r"joints\[l_wrist\]: expected finite meters, 1e9 at most",
         ),
         (lambda: open_recording("a\0b"), RecordingError, "path: expected a file or folder, found a name with a NUL"),
         (lambda: open_recording("~nobody-of-that-name/x"), RecordingError, "found the home of an unknown user"),
@@ -99,5 +99,5 @@ def test_cameras_have_a_greatest_size(size):
 def test_rays_of_a_lens_are_those_of_its_pixels():
     bent = voodoo.Camera(150, 101, 90.0, 90.0, 74.5, 49.5, (0.1, -0.05, 0.0, 0.0))
     u, v = np.meshgrid(np.arange(150.0), np.arange(101.0))
-    wanted = bent.undistorted(np.stack([u, v], axis=-1).reshape(-1, 2)).reshape(101, 150, 2)
-    np.testing.assert_array_equal(bent.rays(), wanted.astype(np.float32))
+    expected = bent.undistorted(np.stack([u, v], axis=-1).reshape(-1, 2)).reshape(101, 150, 2)
+    np.testing.assert_array_equal(bent.rays(), expected.astype(np.float32))

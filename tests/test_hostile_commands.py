@@ -77,7 +77,7 @@ def test_names_of_other_bytes_do_not_reach_opencv(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no such names here")
-def test_names_of_other_bytes_are_read_and_told(tmp_path):
+def test_names_of_other_bytes_are_read_and_reported(tmp_path):
     folder = tmp_path / LATIN
     (folder / "depth").mkdir(parents=True)
     (folder / "calibration.toml").write_text("width=4\nheight=3\nfx=5\nfy=5\ncx=1\ncy=1\n")

@@ -23,16 +23,16 @@ def test_reachable_targets_near_the_start_are_reached(arm, seed):
 
 
 def test_unreachable_target_gives_the_nearest_posture(arm):
-    centre = shoulder(arm)
-    straight = np.linalg.norm(arm.forward([0, 0, 0, 0])[1]["l_hand"] - centre)
-    found = ik.solve(arm, {"l_hand": centre + np.array([2.0, 0.3, -0.2])}, steps=300)
+    center = shoulder(arm)
+    straight = np.linalg.norm(arm.forward([0, 0, 0, 0])[1]["l_hand"] - center)
+    found = ik.solve(arm, {"l_hand": center + np.array([2.0, 0.3, -0.2])}, steps=300)
     assert found.residuals[0] == pytest.approx(np.linalg.norm([2.0, 0.3, -0.2]) - straight, abs=1e-4)
     assert found.converged and within(arm, found.angles)
 
 
 def test_stretched_arm_leaves_the_singular_pose(arm):
-    centre = shoulder(arm)
-    found = ik.solve(arm, {"l_hand": centre - np.array([0.0, 0.0, 0.35])}, start=np.zeros(4), steps=60)
+    center = shoulder(arm)
+    found = ik.solve(arm, {"l_hand": center - np.array([0.0, 0.0, 0.35])}, start=np.zeros(4), steps=60)
     assert found.residuals[0] < 1e-6
 
 
@@ -56,7 +56,7 @@ def test_contradictory_targets_meet_in_the_weighted_middle():
     assert found.residuals == pytest.approx((0.1, 0.3), abs=1e-5)
 
 
-def test_limits_hold_and_the_residual_is_told(arm):
+def test_limits_hold_and_the_residual_is_reported(arm):
     # Behind the back, through the body: no shoulder gets there.
     found = ik.solve(arm, {"l_hand": shoulder(arm) + np.array([-0.4, -0.3, 0.3])}, steps=100)
     assert within(arm, found.angles) and found.residuals[0] > 0.01
@@ -200,5 +200,5 @@ def test_whatever_is_asked_the_answer_is_finite_and_within_the_limits(arm, far, 
     assert within(arm, found.angles)
     assert np.isfinite([*found.angles, *found.residuals, found.h]).all()
     reached = found.joints["l_hand"]
-    wanted = [np.linalg.norm(reached - np.array(target.values[:3])) for target in targets[:2]]
-    assert found.residuals[:2] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+    expected = [np.linalg.norm(reached - np.array(target.values[:3])) for target in targets[:2]]
+    assert found.residuals[:2] == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -8,7 +8,7 @@ from ik_cases import BAR
 from voodoo import ik
 
 CAMERA = voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
-SEEN_M = 2.5
+VISIBLE_M = 2.5
 RADIUS_M = 0.08
 
 
@@ -36,49 +36,49 @@ def silhouette(half_width, depth):
     return ik.Silhouette(mask, camera=CAMERA, world_from_camera=np.eye(4), depth=depth)
 
 
-def test_a_bone_lies_behind_what_is_seen():
-    plane = np.full((120, 160), SEEN_M)
+def test_a_bone_lies_behind_what_is_visible():
+    plane = np.full((120, 160), VISIBLE_M)
     wide = silhouette(60, plane)
-    assert bar(SEEN_M + RADIUS_M, wide) == 0.0
+    assert bar(VISIBLE_M + RADIUS_M, wide) == 0.0
     # In a wide silhouette something else may be seen before it; nothing can be seen through it.
-    assert bar(SEEN_M + 6.0 * RADIUS_M, wide) == 0.0
-    before = bar(SEEN_M - 2.0 * RADIUS_M, wide)
+    assert bar(VISIBLE_M + 6.0 * RADIUS_M, wide) == 0.0
+    before = bar(VISIBLE_M - 2.0 * RADIUS_M, wide)
     assert before == pytest.approx(150.0 / 2.35 * 2.5 * RADIUS_M - 1.0, rel=0.15)
-    assert bar(SEEN_M - 2.0 * RADIUS_M, silhouette(60, None)) == 0.0
+    assert bar(VISIBLE_M - 2.0 * RADIUS_M, silhouette(60, None)) == 0.0
 
 
-def test_a_limb_that_is_seen_alone_is_no_farther_than_it_is_thick():
-    plane = np.full((120, 160), SEEN_M)
+def test_a_limb_that_is_visible_alone_is_no_farther_than_it_is_thick():
+    plane = np.full((120, 160), VISIBLE_M)
     alone, without = silhouette(6, plane), silhouette(6, None)
-    for distance, more in ((SEEN_M + 1.5 * RADIUS_M, False), (SEEN_M + 6.0 * RADIUS_M, True)):
+    for distance, more in ((VISIBLE_M + 1.5 * RADIUS_M, False), (VISIBLE_M + 6.0 * RADIUS_M, True)):
         deep, flat = bar(distance, alone), bar(distance, without)
         assert (deep > flat + 1.0) == more and deep >= flat
 
 
-def test_depths_beside_the_person_and_edges_say_nothing():
+def test_depths_beside_the_person_and_edges_report_nothing():
     v, u = np.mgrid[:120, :160]
     for depth in (np.zeros((120, 160)), np.full((120, 160), np.nan), np.full((120, 160), np.inf), 2.0 + 0.5 * (u % 2)):
-        assert bar(SEEN_M - 0.4, silhouette(60, depth)) == 0.0
+        assert bar(VISIBLE_M - 0.4, silhouette(60, depth)) == 0.0
     # A wall behind a bone that lies outside of the silhouette: only the silhouette speaks.
     mask = (u < 40) & (np.abs(v - 60) < 55)
     wall = np.where(mask, 2.0, 5.0)
     deep, flat = (
         ik.Silhouette(mask, camera=CAMERA, world_from_camera=np.eye(4), depth=depth) for depth in (wall, None)
     )
-    assert bar(SEEN_M, deep) == bar(SEEN_M, flat) > 10.0
+    assert bar(VISIBLE_M, deep) == bar(VISIBLE_M, flat) > 10.0
 
 
 def test_a_lens_is_taken_out_of_depths_as_it_is_out_of_silhouettes():
     bent = voodoo.Camera(160, 120, 150.0, 150.0, 79.5, 59.5, distortion=(-0.25, 0.05, 0.0, 0.0))
     # A board on the left is nearer; its border, at x = -0.12 z, runs beside the bone in the middle.
     x, y = np.moveaxis(bent.rays(), -1, 0)
-    depth, mask = np.where(x < -0.12, SEEN_M - 0.5, SEEN_M), (np.abs(x) < 0.4) & (np.abs(y) < 0.36)
+    depth, mask = np.where(x < -0.12, VISIBLE_M - 0.5, VISIBLE_M), (np.abs(x) < 0.4) & (np.abs(y) < 0.36)
     through = ik.Silhouette(mask, camera=bent, world_from_camera=np.eye(4), depth=depth)
     v, u = np.mgrid[:120, :160]
     x, y = (u - 79.5) / 150.0, (v - 59.5) / 150.0
-    depth, mask = np.where(x < -0.12, SEEN_M - 0.5, SEEN_M), (np.abs(x) < 0.4) & (np.abs(y) < 0.36)
+    depth, mask = np.where(x < -0.12, VISIBLE_M - 0.5, VISIBLE_M), (np.abs(x) < 0.4) & (np.abs(y) < 0.36)
     straight = ik.Silhouette(mask, camera=CAMERA, world_from_camera=np.eye(4), depth=depth)
-    for distance in (SEEN_M - 2.0 * RADIUS_M, SEEN_M + RADIUS_M):
+    for distance in (VISIBLE_M - 2.0 * RADIUS_M, VISIBLE_M + RADIUS_M):
         assert bar(distance, through) == pytest.approx(bar(distance, straight), abs=0.2)
 
 
@@ -88,7 +88,7 @@ def test_a_lens_is_taken_out_of_depths_as_it_is_out_of_silhouettes():
         (np.ones((160, 120)), CAMERA, "shape"),
         (np.full((120, 160), -1.0), CAMERA, "negative"),
         ("far", CAMERA, "expected numbers"),
-        (np.full((120, 160), 2500, np.uint16), CAMERA, "expected metres, as floats, found uint16"),
+        (np.full((120, 160), 2500, np.uint16), CAMERA, "expected meters, as floats, found uint16"),
     ],
 )
 def test_depths_that_cannot_be_used(depth, camera, words):

@@ -9,7 +9,7 @@ from voodoo import ik
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((120, 160)), np.ones((120, 160))])
-def test_silhouettes_that_say_nothing_change_nothing(arm, pixels):
+def test_silhouettes_that_report_nothing_change_nothing(arm, pixels):
     camera, pose = front_camera()
     image = ik.Silhouette(pixels, camera=camera, world_from_camera=pose)
     goal = {"l_hand": shoulder(arm) + np.array([0.3, 0.1, -0.2])}
@@ -157,13 +157,13 @@ def test_lens_distortion_is_taken_out_of_a_silhouette():
     bar = (np.abs(u - 20) < 5) & (np.abs(v - 60) < 45)
     inside = np.argwhere(bar)[:, ::-1]
     rays = np.column_stack([(inside - (79.5, 59.5)) / 150.0, np.ones(len(inside))])
-    seen = np.zeros((120, 160))
+    observed = np.zeros((120, 160))
     pixels = np.rint(bent.project(rays)).astype(int)
-    seen[pixels[:, 1], pixels[:, 0]] = 1
-    assert (seen.astype(bool) & bar).sum() < 0.8 * bar.sum()  # the lens moves it
-    found = ik.Silhouette(seen, camera=bent, world_from_camera=np.eye(4)).distance < 0
-    wanted = ik.Silhouette(bar, camera=straight, world_from_camera=np.eye(4)).distance < 0
-    assert (found & wanted).sum() > 0.95 * (found | wanted).sum()
+    observed[pixels[:, 1], pixels[:, 0]] = 1
+    assert (observed.astype(bool) & bar).sum() < 0.8 * bar.sum()  # the lens moves it
+    found = ik.Silhouette(observed, camera=bent, world_from_camera=np.eye(4)).distance < 0
+    expected = ik.Silhouette(bar, camera=straight, world_from_camera=np.eye(4)).distance < 0
+    assert (found & expected).sum() > 0.95 * (found | expected).sum()
 
 
 def test_images_alone_are_an_answer_too(arm):

@@ -21,15 +21,15 @@ def test_joint_angles_of_an_estimate(tmp_path):
     body = voodoo.Body.human(1.75, model="papers")
     chain = ik.Chain(body)
     rng = np.random.default_rng(1)
-    wanted = chain.rest()
-    wanted[6:] = np.clip(rng.uniform(-0.6, 0.6, len(wanted) - 6), chain.limits[6:, 0], chain.limits[6:, 1])
-    poses, _ = chain.forward(wanted)
+    expected = chain.rest()
+    expected[6:] = np.clip(rng.uniform(-0.6, 0.6, len(expected) - 6), chain.limits[6:, 0], chain.limits[6:, 1])
+    poses, _ = chain.forward(expected)
     tracker = voodoo.Tracker(body)
     estimate = tracker.reset_pose(dict(poses))
     found = joint_angles(body, estimate)
     assert tuple(found) == angle_names(body) == chain.angle_names[6:]
-    assert list(found.values()) == pytest.approx(wanted[6:], abs=1e-6)
-    assert found["l_elbow_flexion"] == pytest.approx(wanted[chain.angle_names.index("l_elbow_flexion")], abs=1e-6)
+    assert list(found.values()) == pytest.approx(expected[6:], abs=1e-6)
+    assert found["l_elbow_flexion"] == pytest.approx(expected[chain.angle_names.index("l_elbow_flexion")], abs=1e-6)
 
 
 def test_apart_joints_are_projected_onto_the_chain():

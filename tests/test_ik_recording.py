@@ -60,7 +60,7 @@ def refused(result, *words):
         assert word in result.stderr
 
 
-def test_follow_reaches_what_is_known_and_tells_the_rest(some):
+def test_follow_reaches_what_is_known_and_reports_the_rest(some):
     tracker = start_tracker(some)
     track, errors = follow(some, tracker, Positions.of(some), pictures="depth")
     assert len(track) == 12 and set(track.status) <= {"tracking", "degraded"}
@@ -92,7 +92,7 @@ def test_wrists_stand_in_for_hands_that_nobody_measured(some):
     assert {"l_wrist", "r_wrist", "skullbase"} <= set(errors)
 
 
-def test_what_nothing_tells_goes_back_to_the_mean_unless_told_otherwise(some):
+def test_what_nothing_reports_goes_back_to_the_mean_unless_reported_otherwise(some):
     drawn, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
     left, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", rest=False)
     # Targets come first: to be drawn costs them nothing.
@@ -179,7 +179,7 @@ def test_command_line_writes_what_animation_and_opensim_read(tmp_path, recording
     result = run(sample_path(), "--pictures", "none", *(word for file in out.values() for word in ("--out", file)))
     assert result.exit_code == 0, result.output
     track = Track.load(out["npz"])
-    # The reader shares no code with the writer; centimetres, X left, Y up, Z forward.
+    # The reader shares no code with the writer; centimeters, X left, Y up, Z forward.
     places, _ = read_bvh(out["bvh"])
     for bone, site in (("l_forearm", "l_elbow"), ("r_calf", "r_knee"), ("l_hand", "l_wrist"), ("head", "skullbase")):
         error = places[bone][:, [2, 0, 1]] / 100.0 - track.joints[:, track.joint_names.index(site)]
@@ -246,8 +246,8 @@ def test_ctrl_c_keeps_the_frames_up_to_there(tmp_path, monkeypatch):
     assert len(Track.load(tmp_path / "pose.csv")) == 5
 
 
-def test_progress_is_shown_for_every_frame(some):
-    seen = []
-    watched = lambda frames: (seen.append(frame.stamp) or frame for frame in frames)  # noqa: E731
-    follow(some, start_tracker(some), Positions.of(some), pictures="none", watched=watched)
-    assert len(seen) == len(some)
+def test_progress_is_displayed_for_every_frame(some):
+    observed = []
+    wrap = lambda frames: (observed.append(frame.stamp) or frame for frame in frames)  # noqa: E731
+    follow(some, start_tracker(some), Positions.of(some), pictures="none", wrap=wrap)
+    assert len(observed) == len(some)

@@ -50,7 +50,7 @@ def test_what_is_left_free_goes_to_rest(arm):
     assert max(plain.residuals + comfortable.residuals) < 1e-6 and comfortable.converged
     assert (comfortable.angles**2).sum() < 0.9 * (plain.angles**2).sum()
     # The elbow's turn about the line between shoulder and hand, all of it: none is nearer to rest.
-    centre, hand = shoulder(arm), np.array(goal["l_hand"])
+    center, hand = shoulder(arm), np.array(goal["l_hand"])
     best = min(
         (
             ik.solve(arm, goal, start=[0.4, -0.3, turn, 0.8], rest=arm.rest(), steps=60)
@@ -59,7 +59,7 @@ def test_what_is_left_free_goes_to_rest(arm):
         key=lambda found: (found.angles**2).sum(),
     )
     assert (comfortable.angles**2).sum() == pytest.approx((best.angles**2).sum(), abs=1e-6)
-    assert np.linalg.norm(hand - centre) < 0.5
+    assert np.linalg.norm(hand - center) < 0.5
     # It stays there, and whence does not matter.
     again = ik.solve(arm, goal, start=comfortable, rest=arm.rest(), steps=60)
     assert np.allclose(again.angles, comfortable.angles, atol=1e-6)

@@ -24,7 +24,7 @@ def tracked_files():
     return [ROOT / name for name in found.stdout.splitlines() if not name.startswith("tests/")]
 
 
-def test_nobody_is_told_to_install_the_strangers_package():
+def test_nobody_is_asked_to_install_the_new_persons_package():
     for path in tracked_files():
         if (
             path.is_file()
@@ -43,12 +43,12 @@ def test_the_distribution_has_its_own_name():
 
 
 def test_the_metadata_is_complete():
-    told = metadata(DISTRIBUTION)
-    assert told["Requires-Python"] == ">=3.10" and told["License-Expression"] == "MIT OR Apache-2.0"
-    assert len(told.get_all("Classifier")) > 10 and told["Keywords"] and told["Maintainer"]
+    message = metadata(DISTRIBUTION)
+    assert message["Requires-Python"] == ">=3.10" and message["License-Expression"] == "MIT OR Apache-2.0"
+    assert len(message.get_all("Classifier")) > 10 and message["Keywords"] and message["Maintainer"]
     for minor in range(10, 15):
-        assert f"Programming Language :: Python :: 3.{minor}" in told.get_all("Classifier")
-    extras = set(told.get_all("Provides-Extra"))
+        assert f"Programming Language :: Python :: 3.{minor}" in message.get_all("Classifier")
+    extras = set(message.get_all("Provides-Extra"))
     assert {"view", "docs", "test", "training"} <= extras
 
 

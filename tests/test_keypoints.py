@@ -33,9 +33,9 @@ def keypoints_of(joints, layout):
     table = LAYOUTS[layout]
     rows = np.zeros((table.count, 3))
     for part in table.parts:
-        if part.site in joints and len(part.shares) == 1:
+        if part.site in joints and len(part.weights) == 1:
             camera_point = (joints[part.site] - POSE[:3, 3]) @ POSE[:3, :3]
-            rows[next(iter(part.shares))] = [*CAMERA.project(camera_point[None])[0], 0.9]
+            rows[next(iter(part.weights))] = [*CAMERA.project(camera_point[None])[0], 0.9]
     return rows
 
 
@@ -49,8 +49,8 @@ def test_every_layout_is_consistent(layout):
     for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"):
         assert {f"l_{joint}", f"r_{joint}"} <= set(sites)
     for part in table.parts:
-        assert sum(part.shares.values()) == pytest.approx(1.0)
-        assert all(0 <= index < table.count for index in part.shares)
+        assert sum(part.weights.values()) == pytest.approx(1.0)
+        assert all(0 <= index < table.count for index in part.weights)
         mirrored = {"l": "r_", "r": "l_"}.get(part.site[0] if part.site[1] == "_" else "", "")
         assert not mirrored or mirrored + part.site[2:] in sites
 
@@ -71,11 +71,11 @@ def test_indices(layout, left_wrist, right_ankle):
     rows = np.zeros((LAYOUTS[layout].count, 3))
     rows[left_wrist] = (10, 20, 0.8)
     rows[right_ankle] = (30, 40, 0.7)
-    seen, unseen = site_pixels(rows, layout=layout)
-    assert {(item.site, item.pixel, item.confidence) for item in seen} == {
+    observed, unseen = site_pixels(rows, layout=layout)
+    assert {(item.site, item.pixel, item.confidence) for item in observed} == {
         ("l_wrist", (10.0, 20.0), 0.8), ("r_ankle", (30.0, 40.0), 0.7)
     }  # fmt: skip
-    assert len(seen) + len(unseen) == len(LAYOUTS[layout].parts)
+    assert len(observed) + len(unseen) == len(LAYOUTS[layout].parts)
 
 
 def test_a_site_between_keypoints_has_the_least_confidence():

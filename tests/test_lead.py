@@ -37,13 +37,13 @@ def surface_points(tracker: voodoo.Tracker, limbs: tuple[str, ...]) -> np.ndarra
 
 def test_a_hand_moves_its_arm_and_leaves_trunk_and_legs_on_their_points():
     tracker, before = start()
-    seen = before["l_hand"] + (-0.3, 0.0, 0.3)
+    observed = before["l_hand"] + (-0.3, 0.0, 0.3)
     frame = voodoo.Frame(stamp=0.0)
     legs = ("l_thigh", "r_thigh", "l_calf", "r_calf")
     frame.add_points(surface_points(tracker, ("torso", *legs)), on_body=True, source="depth")
-    frame.add_position("l_hand", seen, weight=20.0)
+    frame.add_position("l_hand", observed, weight=20.0)
     after = tracker.step(frame).joints
-    assert np.linalg.norm(after["l_hand"] - seen) < 0.08
+    assert np.linalg.norm(after["l_hand"] - observed) < 0.08
     for name in (*TRUNK, *LEGS):
         assert np.linalg.norm(after[name] - before[name]) < 0.02, name
 

@@ -129,7 +129,7 @@ def test_a_person_is_followed_through_a_lens_as_through_a_pinhole(rectified, nam
     assert rectified[0] < 0.02
 
 
-def test_an_image_seen_through_a_lens_shows_every_ray_what_lay_there():
+def test_an_image_visible_through_a_lens_shows_every_ray_what_lay_there():
     straight, bent = through("none"), through("fisheye")
     index = _sources(straight, bent)
     known = index >= 0

@@ -70,8 +70,10 @@ def test_percentiles_are_right_to_a_percent_whatever_the_count():
     latencies = Latencies()
     for value in values:
         latencies.add(value)
-    for share in (1, 50, 99, 100):
-        assert latencies.percentile(share) == pytest.approx(np.percentile(values, share, method="higher"), rel=0.011)
+    for fraction in (1, 50, 99, 100):
+        assert latencies.percentile(fraction) == pytest.approx(
+            np.percentile(values, fraction, method="higher"), rel=0.011
+        )
     assert latencies.count == 20_000
     assert latencies.largest == values.max()
     assert math.isnan(Latencies().percentile(50))
@@ -228,8 +230,8 @@ def test_status_is_lost_after_a_third_of_a_second_and_nothing_is_made_up():
     rig.deliver(arrival_of(wall(7.0)))
     assert rig.live.status == "running"
     assert rig.frames[-1].breaks
-    assert any("stalled" in line for line in rig.told)
-    assert any("data again after 5.4 s" in line for line in rig.told)
+    assert any("stalled" in line for line in rig.messages)
+    assert any("data again after 5.4 s" in line for line in rig.messages)
 
 
 def test_a_slow_source_is_not_called_lost_between_its_images():
@@ -271,14 +273,14 @@ class Script(ByHand):
 
 
 def test_an_unplugged_source_is_named_and_opened_again():
-    told = []
+    messages = []
     source = Script(arrival_of(wall(1.0)), SourceGone("unplugged"), arrival_of(wall(1.5)))
-    with voodoo.live.open(source, tell=told.append) as live:
+    with voodoo.live.open(source, on_message=messages.append) as live:
         stamps = [frame.stamp for frame in live]
     assert stamps[-1] == 1.5
     assert source.opened == 2
     assert live.faults.counts["gone"] == 1
-    assert [line for line in told if "stalled" not in line and "again after" not in line] == [
+    assert [line for line in messages if "stalled" not in line and "again after" not in line] == [
         "gone: unplugged",
         "by hand: it is there again",
     ]
@@ -308,14 +310,14 @@ def test_overload_drops_and_never_queues():
     assert (rig.live.received, rig.live.dropped) == (40, 30)
 
 
-def test_faults_are_told_once_a_second_and_all_counted():
-    told = []
-    faults = Faults(told.append)
+def test_faults_are_reported_once_a_second_and_all_counted():
+    messages = []
+    faults = Faults(messages.append)
     for number in range(300):
         faults.add("late", f"number {number}", number / 100)
     assert faults.counts == {"late": 300}
-    assert len(told) == 3
-    assert told[1] == "late (100 times): number 100"
+    assert len(messages) == 3
+    assert messages[1] == "late (100 times): number 100"
     assert faults.first == {"late": "number 0"}
 
 
@@ -361,7 +363,7 @@ def test_the_first_of_several_sources_makes_the_frames():
 
 
 @pytest.mark.parametrize(
-    ("second", "told"),
+    ("second", "messages"),
     [
         (Cameras("one", "back"), "expected different ones"),
         (Cameras("two", "back", placed=False), "two: expected a calibration"),
@@ -369,8 +371,8 @@ def test_the_first_of_several_sources_makes_the_frames():
     ],
     ids=["same", "unplaced", "elsewhere"],
 )
-def test_sources_that_do_not_go_together_are_refused(second, told):
-    with pytest.raises(VoodooError, match=told), voodoo.live.open(Cameras("one", "front"), second) as live:
+def test_sources_that_do_not_go_together_are_refused(second, messages):
+    with pytest.raises(VoodooError, match=messages), voodoo.live.open(Cameras("one", "front"), second) as live:
         list(live)
 
 

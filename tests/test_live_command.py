@@ -59,7 +59,7 @@ def test_the_report_counts_every_frame(run):
     assert "Hz; latency" in run[1].output
 
 
-def test_all_files_tell_the_same(run):
+def test_all_files_report_the_same(run):
     track = Track.load(run[0] / "pose.npz")
     assert len(track) == json.loads((run[0] / "r.json").read_text())["tracked"]
     assert (np.diff(track.stamps) > 0).all()
@@ -85,7 +85,7 @@ def test_what_was_recorded_is_tracked_again(run):
     assert {"/tf", "/humans/bodies/body_1/joint_states", "/humans/bodies/body_1/markers"} <= names
 
 
-def test_it_says_that_it_stores_pictures_of_people(run):
+def test_it_reports_that_it_stores_pictures_of_people(run):
     assert "stores pictures of people" in run[1].output
 
 
@@ -154,16 +154,16 @@ def test_signals_finish_files(tmp_path, number):
             if "Hz" in line:
                 break
         process.send_signal(number)
-        told = process.communicate(timeout=20)[1]
-    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number], told
+        messages = process.communicate(timeout=20)[1]
+    assert process.returncode == {signal.SIGINT: 130, signal.SIGTERM: 143}[number], messages
     report = json.loads((tmp_path / "r.json").read_text())
     assert len(Track.load(tmp_path / "p.csv")) == report["tracked"] > 0
     assert len(open_recording(tmp_path / "t.mcap")) == report["tracked"]
-    assert "wrote p.csv" in told
+    assert "wrote p.csv" in messages
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "messages"),
     [
         (["nowhere"], "found no such file"),
         (["ros2:"], "ros2:TOPIC"),
@@ -175,10 +175,10 @@ def test_signals_finish_files(tmp_path, number):
     ],
     ids=str,
 )
-def test_what_cannot_be_is_refused_in_a_line(words, told):
+def test_what_cannot_be_is_refused_in_a_line(words, messages):
     result = live(*words, "--duration", "0.1")
     assert result.exit_code in (1, 2), result.output
-    assert told in " ".join(result.output.split())
+    assert messages in " ".join(result.output.split())
     assert "Traceback" not in result.output
 
 
@@ -322,15 +322,15 @@ def test_new_images_of_a_folder_are_tracked(tmp_path):
 
 
 def test_a_folder_may_come_later_and_go(tmp_path):
-    told, frames = [], list(open_recording(sample_path(), use=("depth",)))[:4]
+    messages, frames = [], list(open_recording(sample_path(), use=("depth",)))[:4]
     folder = tmp_path / "later"
-    with voodoo.live.open(f"grow:{folder}", tell=told.append) as source:
+    with voodoo.live.open(f"grow:{folder}", on_message=messages.append) as source:
         assert source.next(0.05) is None
         assert source.status == "waiting"
         (folder / "depth").mkdir(parents=True)
         (folder / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
         until = time.monotonic() + 5.0
-        while not any("there again" in line for line in told) and time.monotonic() < until:
+        while not any("there again" in line for line in messages) and time.monotonic() < until:
             time.sleep(0.01)
         for path, data, _ in grown(folder, frames[:1]):
             path.write_bytes(data)
@@ -340,7 +340,7 @@ def test_a_folder_may_come_later_and_go(tmp_path):
         while "gone" not in source.faults.counts and time.monotonic() < until:
             time.sleep(0.01)
     assert source.faults.counts["gone"] == 1
-    assert any("waiting for it" in line for line in told)
+    assert any("waiting for it" in line for line in messages)
 
 
 def test_the_guide_names_every_fault():

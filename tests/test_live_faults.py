@@ -146,9 +146,9 @@ def all_nan(bus):
     bus.bad(image=np.full(bus.images[0].image.shape, np.nan, dtype=np.float32))
 
 
-def millimetres(bus):
+def millimeters(bus):
     for _ in range(3):
-        bus.bad(1, image=bus.images[bus.at].image.astype(np.float32), metres_per_unit=1.0)
+        bus.bad(1, image=bus.images[bus.at].image.astype(np.float32), meters_per_unit=1.0)
 
 
 def another_size(bus):
@@ -248,7 +248,7 @@ FAULTY = {
     "frozen picture": frozen,
     "blank picture": blank,
     "blank picture (NaN)": all_nan,
-    "wrong unit": millimetres,
+    "wrong unit": millimeters,
     "another size": another_size,
     "calibration missing": no_calibration,
     "calibration unusable": bad_calibration,
@@ -273,7 +273,7 @@ def test_a_fault_is_named_counted_and_over_within_a_second(name):
     begun, steps = bus.at, len(bus.rig.steps)
     bus.good(min(WITHIN_FRAMES, 89 - bus.at))
     assert bus.rig.counts.get(kind, 0) >= 1, bus.rig.counts
-    assert any(line.startswith(kind) for line in bus.rig.told)
+    assert any(line.startswith(kind) for line in bus.rig.messages)
     last = bus.rig.steps[-1]
     assert len(bus.rig.steps) > steps
     assert last.stamp == pytest.approx(bus.images[bus.at - 1].stamp + bus.shift), "stamps are those of the data"
@@ -294,7 +294,7 @@ def test_every_bad_image_is_counted_as_received_and_refused():
     assert live.refused == sum(count for kind, count in bus.rig.counts.items() if kind != "stalled")
 
 
-def test_after_a_long_gap_somebody_is_looked_for_anew():
+def test_after_a_long_gap_somebody_is_searched_for_anew():
     bus = Bus()
     bus.good(5)
     first = bus.rig.follower._one

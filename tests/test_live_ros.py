@@ -24,9 +24,9 @@ from voodoo.recordings.transforms import TransformTree
 DEPTH, INFO = "/camera/depth/image_raw", "/camera/depth/camera_info"
 
 
-def feed_of(*topics, told=None, **options):
+def feed_of(*topics, messages=None, **options):
     clock = HandClock(1000.0)
-    faults = Faults(told.append if told is not None else None)
+    faults = Faults(messages.append if messages is not None else None)
     return RosFeed(topics or (DEPTH,), faults, clock, **options), clock, faults
 
 
@@ -137,7 +137,7 @@ def test_every_type_becomes_its_measurement():
         send(feed, info, CAMERA_INFO, camera_info(_header(1.0, "camera"), camera))
     header = _header(1.0, "camera")
     depth = wall(1.0)
-    metres = np.where(depth.image > 2050, np.nan, depth.image / 1000.0).astype(np.float32)
+    meters = np.where(depth.image > 2050, np.nan, depth.image / 1000.0).astype(np.float32)
     picture = np.random.default_rng(1).integers(0, 255, (24, 32, 3)).astype(np.uint8)
     raw = {"header": header, "height": 24, "width": 32, "is_bigendian": 0}
     packed = np.concatenate([np.zeros(12, np.uint8), cv2.imencode(".png", depth.image)[1].ravel()])
@@ -145,7 +145,7 @@ def test_every_type_becomes_its_measurement():
     scan = LaserScan("", 1.0, np.full(5, 2.0, np.float32), -0.2, 0.1, 0.1, 10.0, np.eye(4))
     messages = [
         (DEPTH, IMAGE, _depth(header, depth)),
-        (DEPTH, IMAGE, _new(IMAGE, **raw, encoding="32FC1", step=128, data=metres.view(np.uint8).ravel())),
+        (DEPTH, IMAGE, _new(IMAGE, **raw, encoding="32FC1", step=128, data=meters.view(np.uint8).ravel())),
         (topics[1], COMPRESSED, _new(COMPRESSED, header=header, format="16UC1; compressedDepth png", data=packed)),
         (topics[2], IMAGE, _new(IMAGE, **raw, encoding="rgb8", step=96, data=picture[:, :, ::-1].ravel())),
         (
@@ -159,9 +159,9 @@ def test_every_type_becomes_its_measurement():
     found = [arrival.measure() for message in messages for arrival in send(feed, *message)]
     assert faults.counts == {}
     assert [type(item) for item in found] == [DepthImage] * 3 + [ColorImage] * 2 + [PointCloud, LaserScan]
-    for item, unit, image in zip(found, (0.001, 1.0, 0.001), (depth.image, metres, depth.image), strict=False):
+    for item, unit, image in zip(found, (0.001, 1.0, 0.001), (depth.image, meters, depth.image), strict=False):
         assert np.array_equal(item.image, image, equal_nan=image.dtype.kind == "f")
-        assert item.metres_per_unit == unit
+        assert item.meters_per_unit == unit
     assert all(np.array_equal(item.image, picture) for item in found[3:5])
     assert np.array_equal(found[5].points, points.points)
     assert np.array_equal(found[6].ranges, scan.ranges)

@@ -48,14 +48,14 @@ def on_limb(tracker, limb):
     return (pose[limb] @ [0.5 * (shape.a0 + shape.a1) + 0.02, 0.0, 0.5 * shape.length, 1.0])[:3]
 
 
-def test_sites_are_expected_where_a_share_of_the_last_motion_takes_them():
+def test_sites_are_expected_where_a_fraction_of_the_last_motion_takes_them():
     tracker, _ = moving((0.05, 0.0, 0.0))
     now, rest = tracker.estimate.joints, voodoo.Tracker(voodoo.Body.human())
-    for elapsed, share in ((0.0, 0.0), (0.5, 0.3), (-0.5, -0.3)):
+    for elapsed, fraction in ((0.0, 0.0), (0.5, 0.3), (-0.5, -0.3)):
         expected = tracker.predict(STEP + elapsed * STEP)
         assert list(expected) == list(now)
         moved = np.array([expected[site] - now[site] for site in now])
-        assert np.allclose(moved, share * np.array([0.05, 0.0, 0.0]), atol=0.002)
+        assert np.allclose(moved, fraction * np.array([0.05, 0.0, 0.0]), atol=0.002)
     jumped, _ = moving((0.5, 0.0, 0.0))
     for site, place in jumped.predict(2 * STEP).items():
         assert np.array_equal(place, jumped.estimate.joints[site])
@@ -70,12 +70,12 @@ def test_points_go_on_with_their_limb_and_the_scene_stays():
     points = np.array([limb, [5.0, 5.0, 5.0], limb + (0.0, 0.0, 3.0)])
     for elapsed in (STEP / 2, -STEP / 2):
         found = _core.carried(points, tracker._core, elapsed=elapsed)
-        share = 0.6 * elapsed / STEP
-        assert np.allclose(found[0], limb + share * went_on(before["l_calf"], now["l_calf"], limb), atol=1e-12)
+        fraction = 0.6 * elapsed / STEP
+        assert np.allclose(found[0], limb + fraction * went_on(before["l_calf"], now["l_calf"], limb), atol=1e-12)
         assert np.array_equal(found[1:], points[1:])
     pose = turned(0.3, (0.2, 0.1, 0.35))
-    seen = (points - pose[:3, 3]) @ pose[:3, :3]
-    found = _core.carried(seen, tracker._core, elapsed=-STEP / 2, world_from_sensor=pose)
+    observed = (points - pose[:3, 3]) @ pose[:3, :3]
+    found = _core.carried(observed, tracker._core, elapsed=-STEP / 2, world_from_sensor=pose)
     assert np.allclose(found @ pose[:3, :3].T + pose[:3, 3], _core.carried(points, tracker._core, elapsed=-STEP / 2))
 
 
@@ -113,18 +113,18 @@ def test_an_older_scan_is_moved_along_with_the_leg(monkeypatch):
         root_from_sensor=pose,
     )
     monkeypatch.setattr(LaserScan, "points", lambda self: places)
-    seen = []
+    observed = []
 
     class Noted:
         def __init__(self, stamp):
             self.stamp = stamp
 
         def add_points(self, points, *, world_from_sensor, weight, source):
-            seen.append((points, world_from_sensor))
+            observed.append((points, world_from_sensor))
 
     monkeypatch.setattr(front_end_module, "Frame", Noted)
     front_end.frame(RecordedFrame(2 * STEP, (replace(scan, stamp=1.5 * STEP),)))
-    (points, used) = seen[0]
+    (points, used) = observed[0]
     assert np.array_equal(used, pose), "still in the frame of the sensor: what faces it may be seen"
     moved = (points - places) @ pose[:3, :3].T
     now = tracker.estimate.world_from_limb

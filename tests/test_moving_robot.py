@@ -23,11 +23,11 @@ def walk(moving):
     """Somebody crosses the view; from 0.6 s on the camera moves 1.2 m and turns by 24 degrees."""
 
     def root_from_sensor(time):
-        share = np.clip((time - 0.6) / 2.6, 0.0, 1.0) if moving else 0.0
-        turn = math.radians(24.0) * share
+        fraction = np.clip((time - 0.6) / 2.6, 0.0, 1.0) if moving else 0.0
+        turn = math.radians(24.0) * fraction
         pose = np.eye(4)
         pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
-        pose[:2, 3] = np.array([0.6, -1.04]) * share
+        pose[:2, 3] = np.array([0.6, -1.04]) * fraction
         return pose @ base_from_camera()
 
     person = Walker(body=voodoo.Body.human(1.78), stops=path([(0.0, 3.1, 0.8), (1.7, 3.2, 0.0), (SECONDS, 3.1, 0.4)]))

@@ -4,7 +4,7 @@ import pytest
 
 from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of, pose, scan_at, searching
 from voodoo.errors import VoodooError
-from voodoo.model.projection import CameraView, TopView, limb_outline
+from voodoo.model.projection import CameraView, TopView, limb_silhouette
 from voodoo.recordings import ColorImage, RecordedFrame
 from voodoo.visualization.body_drawing import side_color
 from voodoo.visualization.image_writer import PictureWriter
@@ -15,11 +15,11 @@ STILL = RecordedFrame(0.0, (depth_of(T_POSE),))
 
 
 def draw(recorded=STILL, joints=T_POSE):
-    class Shown(FakeRecording):
+    class Pictured(FakeRecording):
         def __iter__(self):
             yield recorded
 
-    return Overlay(Shown()).draw(recorded, *pose(joints), index=0)
+    return Overlay(Pictured()).draw(recorded, *pose(joints), index=0)
 
 
 def scale_of(picture):
@@ -30,7 +30,7 @@ def distance_to(color, pixel):
     return float(np.abs(pixel.astype(float) - color).sum())
 
 
-def test_limbs_are_drawn_where_they_project_in_their_colours():
+def test_limbs_are_drawn_where_they_project_in_their_colors():
     picture = draw()
     scale = scale_of(picture)
     for side in "lr":
@@ -54,20 +54,20 @@ def test_nothing_is_drawn_far_from_body_and_caption():
     assert not np.array_equal(picture, bare)
 
 
-def test_a_body_behind_the_camera_has_no_outline():
+def test_a_body_behind_the_camera_has_no_contour():
     body, estimate = pose({name: np.add(position, (-3.0, 0.0, 0.0)) for name, position in T_POSE.items()})
     torso = next(limb for limb in body.limbs if limb.name == "torso")
-    assert limb_outline(torso.shape, estimate.world_from_limb["torso"], CameraView(CAMERA, BASE_FROM_CAMERA)) is None
+    assert limb_silhouette(torso.shape, estimate.world_from_limb["torso"], CameraView(CAMERA, BASE_FROM_CAMERA)) is None
 
 
-def test_enlarging_keeps_pixel_centres():
+def test_enlarging_keeps_pixel_centers():
     point = np.array([[3.0, 0.2, 1.3]])
     small, _ = CameraView(CAMERA, BASE_FROM_CAMERA, 1).project(point)
     large, _ = CameraView(CAMERA, BASE_FROM_CAMERA, 4).project(point)
     assert large == pytest.approx(4.0 * small + 1.5)
 
 
-def test_without_images_the_body_is_seen_from_above():
+def test_without_images_the_body_is_visible_from_above():
     picture = draw(RecordedFrame(0.0, (scan_at(0.0),)))
     assert picture.shape == (720, 720, 3)
     view = TopView((3.0, 0.0, 1.0), 6.0 / 720, 720)
@@ -89,7 +89,7 @@ def test_while_nobody_is_found_no_body_is_drawn(depth):
     assert near[1] < 20 < near[0]
 
 
-def test_colour_is_the_background_when_there_is_no_depth():
+def test_color_is_the_background_when_there_is_no_depth():
     image = np.full((60, 80, 3), (10, 200, 30), np.uint8)
     picture = draw(RecordedFrame(0.0, (ColorImage("color", 0.0, lambda: image, CAMERA, BASE_FROM_CAMERA),)))
     assert picture[-1, -1].tolist() == [10, 200, 30]

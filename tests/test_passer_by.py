@@ -28,8 +28,8 @@ def test_the_passer_by_covers_what_is_behind(both):
         changed = depth.image != covered.image
         assert changed.sum() > 500
         assert (covered.image[changed & (depth.image > 0)] < depth.image[changed & (depth.image > 0)]).all()
-    colours = [item for each in pairs[0] for item in each.measurements if isinstance(item, ColorImage)]
-    assert (colours[0].image != colours[-1].image).any(axis=2).sum() > 500
+    colors = [item for each in pairs[0] for item in each.measurements if isinstance(item, ColorImage)]
+    assert (colors[0].image != colors[-1].image).any(axis=2).sum() > 500
     kinds = {type(item) for _, after in pairs for item in after.measurements}
     assert kinds == {DepthImage, ColorImage}, "a laser would not see the passer-by"
 

@@ -28,11 +28,15 @@ def frame(stamp, *people):
     """What the camera sees of posed bodies before a wall."""
     depth = np.full((120, 160), 4.5)
     for body, estimate in people:
-        seen = render_depth(body, estimate.world_from_limb, camera=CAMERA, world_from_sensor=WORLD_FROM_SENSOR).depth
-        depth = np.where(seen > 0.0, np.minimum(seen, depth), depth)
-    shown = voodoo.Frame(stamp)
-    shown.add_depth(depth.astype(np.float32), camera=CAMERA, metres_per_unit=1.0, world_from_sensor=WORLD_FROM_SENSOR)
-    return shown
+        observed = render_depth(
+            body, estimate.world_from_limb, camera=CAMERA, world_from_sensor=WORLD_FROM_SENSOR
+        ).depth
+        depth = np.where(observed > 0.0, np.minimum(observed, depth), depth)
+    displayed = voodoo.Frame(stamp)
+    displayed.add_depth(
+        depth.astype(np.float32), camera=CAMERA, meters_per_unit=1.0, world_from_sensor=WORLD_FROM_SENSOR
+    )
+    return displayed
 
 
 @pytest.fixture(scope="module")
@@ -103,14 +107,14 @@ def test_free_points_belong_to_whose_surface_explains_them(someone):
     beside = shifted(STANDING, 0.0, 0.62, 0.0)
     people = voodoo.People()
     assert [people.add(joints, fit_sizes=False) for joints in (STANDING, beside)] == [1, 2]
-    shown = voodoo.Tracker(body)
-    poses = (estimate.world_from_limb, shown.reset(joints=beside, fit_sizes=False).world_from_limb)
+    displayed = voodoo.Tracker(body)
+    poses = (estimate.world_from_limb, displayed.reset(joints=beside, fit_sizes=False).world_from_limb)
     clouds = [render_depth(body, pose, camera=CAMERA, world_from_sensor=WORLD_FROM_SENSOR).depth for pose in poses]
     own = [(depth > 0.0) & ((other <= 0.0) | (depth < other)) for depth, other in (clouds, clouds[::-1])]
     points = [_points(np.where(mask, depth, 0.0)) for mask, depth in zip(own, clouds, strict=True)]
-    seen = voodoo.Frame(0.0)
-    seen.add_points(np.concatenate(points), world_from_sensor=WORLD_FROM_SENSOR, source="lidar")
-    given = [person.estimate.sources["lidar"][0] for person in people.step(seen)]
+    observed = voodoo.Frame(0.0)
+    observed.add_points(np.concatenate(points), world_from_sensor=WORLD_FROM_SENSOR, source="lidar")
+    given = [person.estimate.sources["lidar"][0] for person in people.step(observed)]
     # Each of the two has the points of the other's near arm within its own box.
     assert given == [pytest.approx(len(each), rel=0.02) for each in points]
 

@@ -28,8 +28,8 @@ def truth(places, in_view=None, persons=(1, 2)):
     positions = np.zeros((*places.shape, len(NAMES), 3))
     positions[..., 1] = places[..., None]
     positions[np.isnan(places)] = np.nan
-    seen = np.where(np.isnan(places), 0.0, 1.0) if in_view is None else np.asarray(in_view, dtype=float)
-    return PeopleTruth(np.arange(len(places)) / 10.0, np.array(persons), seen, NAMES, positions)
+    observed = np.where(np.isnan(places), 0.0, 1.0) if in_view is None else np.asarray(in_view, dtype=float)
+    return PeopleTruth(np.arange(len(places)) / 10.0, np.array(persons), observed, NAMES, positions)
 
 
 def result(bodies):
@@ -70,7 +70,7 @@ def test_a_worked_example_of_clear_mot_and_identities():
     assert one.joint_error_m == pytest.approx((10 * 0.1 + 8 * 0.2) / 18)
 
 
-def test_exchanged_ids_are_two_switches_and_halve_the_identities():
+def test_swapped_ids_are_two_switches_and_halve_the_identities():
     known = truth([[0.0, 3.0]] * 10)
     one = judged(known, result({1: [0.0] * 5 + [3.0] * 5, 2: [3.0] * 5 + [0.0] * 5}))
     assert (one.switches, one.missed, one.extra) == (2, 0, 0)
@@ -86,7 +86,7 @@ def test_who_is_hardly_in_view_may_be_followed_or_not():
     assert judged(known, result({1: [0.0] * 4, 2: [0.3] * 4})).extra == 4
 
 
-def test_a_match_ends_at_half_a_metre():
+def test_a_match_ends_at_half_a_meter():
     known = truth([[0.0, 3.0]] * 2, in_view=[[1.0, 0.0]] * 2)
     assert judged(known, result({1: [0.49] * 2})).missed == 0
     assert judged(known, result({1: [0.51] * 2})).missed == 2
@@ -102,7 +102,7 @@ def test_who_comes_back_should_have_the_same_id(second, expected):
     }
     one = judged(known, result(bodies))
     assert (one.returns, one.returned, one.switches) == expected
-    assert (one.visits, one.seen) == (2, 2)
+    assert (one.visits, one.visits_matched) == (2, 2)
 
 
 def test_the_time_to_the_first_pose_counts_from_when_most_is_in_view():
@@ -110,11 +110,11 @@ def test_the_time_to_the_first_pose_counts_from_when_most_is_in_view():
     assert judged(known, result({1: [N] * 9 + [0.0] * 11})).first_pose_s == pytest.approx(0.4)
     assert judged(known, result({1: [0.0] * 20})).first_pose_s == 0.0
     nobody = judged(known, result({1: [9.0] * 20}))
-    assert (nobody.visits, nobody.seen) == (1, 0)
+    assert (nobody.visits, nobody.visits_matched) == (1, 0)
     assert np.isnan(nobody.first_pose_s)
 
 
-def test_a_body_left_behind_is_told_from_a_false_one():
+def test_a_body_left_behind_is_reported_from_a_false_one():
     known = truth([[0.0]] * 3 + [[2.0]] * 3, persons=(1,))
     one = judged(known, result({1: [0.0] * 6, 2: [N] * 4 + [5.0] * 2}))
     assert (one.false_bodies, one.left_behind) == (1, 1)
@@ -237,11 +237,11 @@ def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
     )
     write_rows(tmp_path / "theirs.csv", rows)
     command = ["eval", str(path), "--result", str(tmp_path / "theirs.csv"), "--out", str(tmp_path / "out")]
-    told = CliRunner().invoke(app, command)
-    assert told.exit_code == 0, told.output
+    message = CliRunner().invoke(app, command)
+    assert message.exit_code == 0, message.output
     assert (
         "| pp_p2_two_cross_twice_cmu | 2 | 2 | 1.000 | 1.000 | 0 | - | 0.00 (0.00) | 0 of 2 | 0.0 | 0 | 3.0 | - |"
-        in told.output
+        in message.output
     )
     with (tmp_path / "out" / "people.csv").open() as file:
         (row,) = csv.DictReader(file)

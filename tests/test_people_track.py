@@ -54,7 +54,7 @@ def run(monkeypatch, tmp_path):
     return call
 
 
-def test_the_made_up_people_are_where_the_truth_says(followed):
+def test_the_made_up_people_are_where_the_truth_reports(followed):
     recording = two_people()
     truth = recording.people
     assert truth.persons.tolist() == [1, 2]
@@ -81,9 +81,9 @@ def test_recordings_are_the_same_for_the_same_seed():
 
 def test_a_row_exists_only_for_who_is_there(followed, run):
     result, _ = followed
-    told = run("--people", "any", "--out", "all.csv")
-    assert told.exit_code == 0, told.output
-    assert "32 frames, 2 persons in" in told.stdout
+    message = run("--people", "any", "--out", "all.csv")
+    assert message.exit_code == 0, message.output
+    assert "32 frames, 2 persons in" in message.stdout
     with Path("all.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
     assert header[:5] == ["stamp_s", "person", "status", "residual_m", "humanoid_root_x"]
@@ -92,7 +92,7 @@ def test_a_row_exists_only_for_who_is_there(followed, run):
     stamps = [float(row[0]) for row in rows]
     assert stamps == sorted(stamps)
     assert set(stamps) <= {recorded.stamp for recorded in two_people()}
-    assert told.opened["bare"] is True
+    assert message.opened["bare"] is True
     assert PeopleTrack.load("all.csv").tracks.keys() == {1, 2}
 
 
@@ -111,9 +111,9 @@ def test_at_most_so_many_are_followed(run):
     ],
 )
 def test_what_does_not_go_together_is_refused(run, words, expected):
-    told = run(*words, "--out", "no.csv")
-    assert told.exit_code == 1
-    assert expected in told.stderr
+    message = run(*words, "--out", "no.csv")
+    assert message.exit_code == 1
+    assert expected in message.stderr
 
 
 def test_the_npz_holds_everybody_exactly(followed, tmp_path):
@@ -188,7 +188,7 @@ def test_readers_of_one_person_take_the_only_one_and_refuse_several(followed, tm
         Track.load(tmp_path / f"two{suffix}")
 
 
-def test_the_overlay_shows_everybody_in_a_colour_of_their_own():
+def test_the_overlay_shows_everybody_in_a_color_of_their_own():
     people = voodoo.People()
     *_, last = track_people(two_people(), people)
     bodies = {person.id: people.body(person.id) for person in last.estimate}
@@ -201,10 +201,10 @@ def test_the_overlay_shows_everybody_in_a_colour_of_their_own():
 def test_the_command_line_draws_every_frame(run, monkeypatch):
     monkeypatch.setattr(MadeUpRecording, "__len__", lambda _: 2)
     monkeypatch.setattr(MadeUpRecording, "__iter__", lambda own, every=MadeUpRecording.__iter__: islice(every(own), 2))
-    told = run("--people", "any", "--out", "a.csv", "--overlay", "look")
-    assert told.exit_code == 0, told.output
+    message = run("--people", "any", "--out", "a.csv", "--overlay", "look")
+    assert message.exit_code == 0, message.output
     assert len(list(Path("look").iterdir())) == 2
-    assert "nobody was found in 2 frames" in told.stderr
+    assert "nobody was found in 2 frames" in message.stderr
 
 
 def test_a_frame_that_is_refused_costs_no_other_one(run, monkeypatch):
@@ -215,9 +215,9 @@ def test_a_frame_that_is_refused_costs_no_other_one(run, monkeypatch):
     monkeypatch.setattr(MadeUpRecording, "__iter__", with_one_twice)
     refused = run("--people", "any", "--out", "a.csv", "--strict")
     assert refused.exit_code == 1 and "frame 2" in refused.stderr
-    told = run("--people", "any", "--out", "a.csv")
-    assert told.exit_code == 0 and told.stdout.startswith("3 frames"), told.output
-    assert "left out 1 that the tracker refuses" in told.stderr
+    message = run("--people", "any", "--out", "a.csv")
+    assert message.exit_code == 0 and message.stdout.startswith("3 frames"), message.output
+    assert "left out 1 that the tracker refuses" in message.stderr
 
 
 def test_boxes_and_the_floor_reach_the_frame():
@@ -227,7 +227,7 @@ def test_boxes_and_the_floor_reach_the_frame():
     assert all(len(step.estimate) == 0 for step in steps)
 
 
-def test_skin_is_looked_for_on_everybody_where_it_is_asked_for():
+def test_skin_is_searched_for_on_everybody_where_it_is_asked_for():
     recording = two_people()
     used = {}
     for use in (None, ("depth", "skin")):

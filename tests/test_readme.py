@@ -30,7 +30,7 @@ def test_python_examples_run(code, tmp_path):
     assert output.startswith(("tracking", "degraded"))
 
 
-def test_the_two_commands_are_there_and_call_what_they_say():
+def test_the_two_commands_are_there_and_call_what_they_report():
     first, second = (line.split()[0] for line in blocks(README, "sh")[0].splitlines())
     assert (first, second) == ("scripts/demo", "scripts/test")
     for name in (first, second, "scripts/setup", ".ci/run"):

@@ -32,7 +32,7 @@ def test_rendered_recordings_are_as_described(voodoo_data, name):
 
     depth = frames[0].measurements[-1]
     assert isinstance(depth, DepthImage) and (depth.camera.width, depth.camera.height) == size
-    z = depth.image * depth.metres_per_unit
+    z = depth.image * depth.meters_per_unit
     points = np.dstack([depth.camera.rays() * z[..., None], z]).reshape(-1, 3)[depth.image.ravel() > 0]
     points = points @ depth.root_from_sensor[:3, :3].T + depth.root_from_sensor[:3, 3]
     floor = points[(np.abs(points[:, 2]) < 0.06) & (points[:, 0] < 3.9)]

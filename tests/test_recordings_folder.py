@@ -47,7 +47,7 @@ def test_depth_images_in_the_order_of_their_names(folder):
     assert [frame.stamp for frame in frames] == [float(stamp) for stamp in STAMPS]
     assert [frame.measurements[0].image[0, 0] for frame in frames] == [0, 1, 2]
     depth = frames[0].measurements[0]
-    assert isinstance(depth, DepthImage) and depth.metres_per_unit == 1 / 5000 and depth.camera.fy == 5.5
+    assert isinstance(depth, DepthImage) and depth.meters_per_unit == 1 / 5000 and depth.camera.fy == 5.5
     np.testing.assert_array_equal(depth.root_from_sensor, np.eye(4))
     assert recording.root_frame == "camera_depth_optical_frame"
     assert recording.start is None and recording.reference is None
@@ -61,7 +61,7 @@ def test_the_list_file_counts_before_the_names(folder):
     assert [(frame.stamp, frame.measurements[0].image[0, 0]) for frame in frames] == [(1.0, 2), (2.0, 0)]
 
 
-def test_colour_joins_the_next_depth_image(folder):
+def test_color_joins_the_next_depth_image(folder):
     add_color(folder)
     recording = open_recording(folder)
     kinds = [[m.stamp for m in frame.measurements if isinstance(m, ColorImage)] for frame in recording]
@@ -71,7 +71,7 @@ def test_colour_joins_the_next_depth_image(folder):
     assert [sensor.kind for sensor in recording.info().sensors] == ["depth", "color"]
 
 
-def test_colour_without_calibration_is_left_out_and_said_so(folder):
+def test_color_without_calibration_is_left_out_and_reported_so(folder):
     add_color(folder)
     (folder / "calibration.toml").write_text(CALIBRATION)
     assert "no [color] table" in str(open_recording(folder).info())
@@ -89,12 +89,12 @@ def test_a_rotation_typed_with_few_digits_is_made_one(folder, digits):
     np.testing.assert_allclose(depth.root_from_sensor, pose, atol=10.0**-digits)
 
 
-def test_the_calibration_file_says_where_the_camera_is(folder):
+def test_the_calibration_file_reports_where_the_camera_is(folder):
     (folder / "calibration.toml").write_text(CALIBRATION + MOUNT + 'root_frame = "base_link"\ndepth_factor = 1000\n')
     recording = open_recording(folder)
     depth = next(iter(recording)).measurements[0]
     np.testing.assert_array_equal(depth.root_from_sensor @ [0, 0, 2, 1], [2.1, 0, 1.2, 1])
-    assert recording.root_frame == "base_link" and depth.metres_per_unit == 0.001
+    assert recording.root_frame == "base_link" and depth.meters_per_unit == 0.001
 
 
 def test_the_calibration_file_may_lie_elsewhere(folder):
@@ -157,7 +157,7 @@ def test_a_damaged_depth_image_is_refused_after_those_before_it(folder, damage, 
     assert path.name in str(caught.value)
 
 
-def test_a_damaged_colour_image_is_refused_when_looked_at(folder):
+def test_a_damaged_color_image_is_refused_when_checked(folder):
     add_color(folder)
     path = folder / "rgb" / "1305031102.1.png"
     path.write_bytes(path.read_bytes()[:50])

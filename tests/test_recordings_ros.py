@@ -24,7 +24,7 @@ def test_both_storages_open_as_directory_and_as_file(tmp_path, storage, bare):
     first, second = only(recording)
     np.testing.assert_array_equal(first.image, DEPTH)
     np.testing.assert_allclose(first.root_from_sensor[:3, 3], (1, 2, 3))
-    assert (first.stamp, second.stamp, first.metres_per_unit) == (10.0, 10.5, 0.001)
+    assert (first.stamp, second.stamp, first.meters_per_unit) == (10.0, 10.5, 0.001)
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -1,4 +1,4 @@
-"""Depth and colour images of ROS bags, in every encoding and layout the readers claim."""
+"""Depth and color images of ROS bags, in every encoding and layout the readers claim."""
 
 import struct
 
@@ -22,12 +22,12 @@ def test_raw_depth_in_any_layout(tmp_path, encoding, padding, big):
     (image,) = only(recording)
     np.testing.assert_array_equal(image.image, data)
     assert image.image.dtype == data.dtype and image.image.dtype.isnative
-    assert image.metres_per_unit == (1.0 if encoding == "32FC1" else 0.001)
+    assert image.meters_per_unit == (1.0 if encoding == "32FC1" else 0.001)
 
 
-def test_metres_per_unit_can_be_told(tmp_path):
-    (image,) = only(open_recording(bag(tmp_path, TF, INFO, depth_entry()), metres_per_unit=0.00025))
-    assert image.metres_per_unit == 0.00025
+def test_meters_per_unit_can_be_reported(tmp_path):
+    (image,) = only(open_recording(bag(tmp_path, TF, INFO, depth_entry()), meters_per_unit=0.00025))
+    assert image.meters_per_unit == 0.00025
 
 
 @pytest.mark.parametrize("header", [b"\0" * 12, b""])
@@ -45,7 +45,7 @@ def test_compressed_float_depth_is_quantized_inverse_depth(tmp_path):
     header = struct.pack("<iff", 0, a, b)
     entry = compressed_depth(quantized, "32FC1; compressedDepth png", header)
     (image,) = only(open_recording(bag(tmp_path, TF, INFO, entry)))
-    assert np.isnan(image.image[0, 0]) and image.metres_per_unit == 1.0 and image.image.dtype == np.float32
+    assert np.isnan(image.image[0, 0]) and image.meters_per_unit == 1.0 and image.image.dtype == np.float32
     np.testing.assert_allclose(image.image[1:], depth[1:], rtol=1e-3)
 
 
@@ -78,7 +78,7 @@ def test_a_changed_png_is_refused(tmp_path, position):
 
 
 @pytest.mark.parametrize("encoding", ["rgb8", "bgr8", "bgra8", "rgba8"])
-def test_raw_colour_becomes_bgr(tmp_path, encoding):
+def test_raw_color_becomes_bgr(tmp_path, encoding):
     blue, green, red = 10, 20, 30
     pixel = [red, green, blue, 255] if encoding.startswith("rgb") else [blue, green, red, 255]
     data = np.tile(np.array(pixel[: 4 if "a" in encoding else 3], np.uint8), (3, 4, 1))
@@ -91,7 +91,7 @@ def test_raw_colour_becomes_bgr(tmp_path, encoding):
     np.testing.assert_array_equal(image.image, np.tile(np.array([10, 20, 30], np.uint8), (3, 4, 1)))
 
 
-def test_colour_without_calibration_is_left_out_and_said_so(tmp_path):
+def test_color_without_calibration_is_left_out_and_reported_so(tmp_path):
     jpeg = cv2.imencode(".jpg", np.zeros((3, 4, 3), np.uint8))[1].tobytes()
     path = bag(tmp_path, TF, INFO, ("/c/image/compressed", 10.0, M.compressed(10.0, jpeg, "jpeg")), depth_entry())
     assert "calibration of /c/image/compressed" in str(open_recording(path).info())

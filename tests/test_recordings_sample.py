@@ -34,7 +34,7 @@ def depth_of(frame) -> DepthImage:
 
 def depth_points(depth: DepthImage) -> np.ndarray:
     """(H, W, 3) in the root frame, NaN where nothing came back."""
-    z = depth.image * depth.metres_per_unit
+    z = depth.image * depth.meters_per_unit
     points = np.dstack([depth.camera.rays() * z[..., None], z])
     points[depth.image == 0] = np.nan
     return points @ depth.root_from_sensor[:3, :3].T + depth.root_from_sensor[:3, 3]
@@ -116,7 +116,7 @@ def test_joints_lie_in_the_body_that_the_camera_sees(sample, frames):
         joints = sample.reference.positions[index] @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
         for (u, v), z in zip(np.round(depth.camera.project(joints)), joints[:, 2], strict=True):
             if 0 <= u < 176 and 0 <= v < 144 and depth.image[int(v), int(u)]:
-                behind.append(z - depth.image[int(v), int(u)] * depth.metres_per_unit)
+                behind.append(z - depth.image[int(v), int(u)] * depth.meters_per_unit)
     assert len(behind) > 80
     assert 0.0 < np.median(behind) < 0.15 and np.mean(np.abs(behind) < 0.25) > 0.95
 
@@ -137,7 +137,7 @@ def test_iterating_again_and_at_the_same_time_gives_the_same(sample, frames):
         np.testing.assert_array_equal(depth_of(a).image, depth_of(first).image)
 
 
-def test_colour_is_decoded_once_and_only_when_asked_for(frames):
+def test_color_is_decoded_once_and_only_when_asked_for(frames):
     image = next(m for m in frames[1].measurements if isinstance(m, ColorImage))
     assert "image" not in vars(image)
     assert image.image.shape == (240, 320, 3) and image.image.dtype == np.uint8
@@ -304,7 +304,7 @@ def test_a_damaged_start_file_is_refused(copy, content, words):
     assert "init.json" in str(caught.value)
 
 
-def test_a_cut_colour_image_is_refused_when_looked_at(frames):
+def test_a_cut_color_image_is_refused_when_checked(frames):
     image = next(m for m in frames[1].measurements if isinstance(m, ColorImage))
     data = cv2.imencode(".jpg", image.image)[1].tobytes()
     assert decode_color(data, "x", (320, 240)).shape == (240, 320, 3)
@@ -330,11 +330,11 @@ def test_loaders_options_and_paths_that_do_not_exist_are_named(tmp_path):
         open_recording(tmp_path / "film.mp4")
     with pytest.raises(RecordingError, match="use: expected"):
         open_recording(sample_path(), use=("smell",))
-    with pytest.raises(RecordingError, match="metres_per_unit"):
-        open_recording(sample_path(), metres_per_unit=0.0)
+    with pytest.raises(RecordingError, match="meters_per_unit"):
+        open_recording(sample_path(), meters_per_unit=0.0)
 
 
 @pytest.mark.parametrize("loader", ["ros1", "utd-mhad", "folder"])
-def test_another_loader_says_what_it_expected(loader):
+def test_another_loader_reports_what_it_expected(loader):
     with pytest.raises(RecordingError, match="expected"):
         open_recording(MCAP, loader=loader)

@@ -32,7 +32,7 @@ def test_the_mirror_is_undone_in_image_and_skeleton(sequence):
     frames = list(recording)
     image = frames[1].measurements[0]
     assert image.image[100, 319 - 250] == 2001 and np.count_nonzero(image.image) == 1
-    assert image.image.flags.c_contiguous and image.metres_per_unit == 0.001
+    assert image.image.flags.c_contiguous and image.meters_per_unit == 0.001
     hand = recording.reference.positions[1, recording.reference.names.index("r_hand")]
     np.testing.assert_allclose(hand, [-0.6, -0.13, 2.0])
     u, v = image.camera.project([hand])[0]
@@ -103,8 +103,8 @@ def test_depth_of_another_form_is_refused(sequence, content, words):
     [
         (np.ones((20, 3, 2)), r"\(20, 3, 3\)"),
         (np.ones((25, 3, 3)), r"\(20, 3, 3\)"),
-        (np.full((20, 3, 3), np.nan), "metres"),
-        (np.full((20, 3, 3), 2000.0), "metres"),
+        (np.full((20, 3, 3), np.nan), "meters"),
+        (np.full((20, 3, 3), 2000.0), "meters"),
     ],
 )
 def test_a_skeleton_of_another_form_is_refused(sequence, skeleton, words):
@@ -114,7 +114,7 @@ def test_a_skeleton_of_another_form_is_refused(sequence, skeleton, words):
 
 
 @pytest.mark.parametrize("name", ["a1_s1_t1", "a2_s1_t1", "a9_s3_t2", "a13_s4_t1", "a22_s2_t3", "a27_s4_t4"])
-def test_real_sequences_have_people_where_the_skeleton_says(voodoo_data, name):
+def test_real_sequences_have_people_where_the_skeleton_reports(voodoo_data, name):
     """At the lag the data set has (skeleton two frames ahead), joints lie on the silhouette and just behind it."""
     recording = open_recording(voodoo_data / "utd-mhad" / "Depth" / f"{name}_depth.mat")
     frames = list(recording)
@@ -125,7 +125,7 @@ def test_real_sequences_have_people_where_the_skeleton_says(voodoo_data, name):
         depth = frames[k].measurements[0]
         joints = recording.reference.positions[k - 2, inner]
         for (u, v), z in zip(np.round(depth.camera.project(joints)).astype(int), joints[:, 2], strict=True):
-            value = depth.image[v, u] * depth.metres_per_unit
+            value = depth.image[v, u] * depth.meters_per_unit
             hits += value > 0
             if value > 0:
                 behind.append(z - value)

@@ -24,7 +24,7 @@ NAN = float("nan")
 
 
 def depth(image, camera=CAMERA):
-    voodoo.Frame(stamp=0.0).add_depth(image, camera=camera, metres_per_unit=0.001, world_from_sensor=HERE)
+    voodoo.Frame(stamp=0.0).add_depth(image, camera=camera, meters_per_unit=0.001, world_from_sensor=HERE)
 
 
 def sensor(**changes):
@@ -108,9 +108,9 @@ def skin(image, camera=CAMERA):
         (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a Camera"),
         (lambda: DepthFilter().apply([[1, 2]]), MeasurementError, "depth: expected an array (H, W), found list"),
         (
-            lambda: DepthFilter().apply(np.zeros((2, 2), np.uint16), metres_per_unit=NAN),
+            lambda: DepthFilter().apply(np.zeros((2, 2), np.uint16), meters_per_unit=NAN),
             MeasurementError,
-            "metres_per_unit: expected a finite length > 0, found nan",
+            "meters_per_unit: expected a finite length > 0, found nan",
         ),
         (
             lambda: voodoo.Tracker(voodoo.Body.human()).reset(joints=[(0.0, 0.0, 0.0)]),
@@ -126,8 +126,8 @@ def skin(image, camera=CAMERA):
             for option, words in (
                 ({"tf_max_age": "1"}, "seconds >= 0"),
                 ({"tf_max_age": None}, "seconds >= 0"),
-                ({"metres_per_unit": "0.001"}, "a length > 0"),
-                ({"metres_per_unit": NAN}, "a length > 0"),
+                ({"meters_per_unit": "0.001"}, "a length > 0"),
+                ({"meters_per_unit": NAN}, "a length > 0"),
             )
         ),
         *(

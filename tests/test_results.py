@@ -32,7 +32,7 @@ def test_npz_round_trip_is_exact(tmp_path):
     assert again.status == ("tracking", "tracking", "tracking", "lost", "tracking")
 
 
-def test_csv_round_trip_keeps_stamps_exactly_and_positions_to_a_micrometre(tmp_path):
+def test_csv_round_trip_keeps_stamps_exactly_and_positions_to_a_micrometer(tmp_path):
     track = Track.of(list(estimates()))
     track.save(tmp_path / "pose.csv")
     again = Track.load(tmp_path / "pose.csv")

@@ -33,11 +33,11 @@ def test_turns(size):
         np.testing.assert_allclose(matrix_of_turn(turn), Rotation.from_rotvec(turn).as_matrix(), atol=1e-15)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_half_way_between_two_rotations(share):
+@pytest.mark.parametrize("fraction", [0.0, 0.3, 1.0])
+def test_half_way_between_two_rotations(fraction):
     for first, second in pairwise(MATRICES):
-        theirs = Slerp([0.0, 1.0], Rotation.from_matrix([first, second]))(share).as_matrix()
-        np.testing.assert_allclose(turned_between(first, second, share), theirs, atol=1e-14)
+        theirs = Slerp([0.0, 1.0], Rotation.from_matrix([first, second]))(fraction).as_matrix()
+        np.testing.assert_allclose(turned_between(first, second, fraction), theirs, atol=1e-14)
 
 
 @pytest.mark.filterwarnings("ignore:Gimbal lock")

@@ -76,13 +76,13 @@ def tree(tmp_path):
     )
     files = {
         "crates/voodoo-core/src/hypotheses/mod.rs": RUST,
-        "crates/voodoo-core/src/sizes.rs": "/// Metres.\nconst IDLE: f64 = 0.3;\n",
+        "crates/voodoo-core/src/sizes.rs": "/// Meters.\nconst IDLE: f64 = 0.3;\n",
         "crates/voodoo-core/src/config.rs": config,
         "crates/voodoo-core/src/math/lanes.rs": "const LANES: usize = 8;\n",
         "crates/voodoo-core/src/lib.rs": "mod config;\n#[cfg(test)]\nmod testing;\n",
         "crates/voodoo-core/src/testing.rs": "const WALL: f64 = 4.5;\n",
         "crates/voodoo-core/tests/all.rs": "const MANY: usize = 99;\n",
-        "crates/voodoo-ik/src/lib.rs": "/// Metres.\nconst IDLE: f64 = 0.4;\n",
+        "crates/voodoo-ik/src/lib.rs": "/// Meters.\nconst IDLE: f64 = 0.4;\n",
         "python/voodoo/sensors/gate.py": PYTHON,
     }
     for name, text in files.items():
@@ -92,8 +92,8 @@ def tree(tmp_path):
 
 
 def test_constants_counts_names_literals_and_keys_of_every_crate_and_of_python(tree):
-    seen = {(one.room, one.kind, one.name): one.count for one in constants.read(tree)}
-    assert seen == {
+    observed = {(one.room, one.kind, one.name): one.count for one in constants.read(tree)}
+    assert observed == {
         ("voodoo-core/hypotheses", "named", "IDLE"): 1,
         ("voodoo-core/hypotheses", "named", "LEANS"): 4,
         ("voodoo-core/hypotheses", "named", "BARE"): 1,
@@ -120,7 +120,7 @@ def test_constants_counts_names_literals_and_keys_of_every_crate_and_of_python(t
     assert re.search(r"^all +9 +15 +6 +4 +25$", lines, re.MULTILINE)
 
 
-def test_constants_says_what_has_no_comment_or_two_homes_in_a_crate(tree):
+def test_constants_reports_what_has_no_comment_or_two_homes_in_a_crate(tree):
     assert constants.problems(tree) == [
         "voodoo-core/hypotheses/mod.rs:7: BARE has no doc comment with its unit and reason",
         "IDLE is defined in voodoo-core/hypotheses/mod.rs, voodoo-core/sizes.rs",

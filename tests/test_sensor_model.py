@@ -32,7 +32,7 @@ def test_weight_is_capped():
     assert SensorModel().weight(1e-6) == SensorModel().max_weight
 
 
-def test_the_papers_weights_are_centimetres():
+def test_the_papers_weights_are_centimeters():
     model = SensorModel()
     assert model.sigma(PAPER_WEIGHTS["hand"]) == pytest.approx(0.0224, abs=1e-4)
     assert model.weight(model.sigma(PAPER_WEIGHTS["face"])) == pytest.approx(30.0)
@@ -47,7 +47,7 @@ def test_stereo_noise_grows_with_the_square_of_the_range():
     assert noise.sigma(3.0) == pytest.approx(0.09)
 
 
-def test_pixels_become_metres_at_the_depth_of_the_site():
+def test_pixels_become_meters_at_the_depth_of_the_site():
     noise = PixelNoise(pixels=5.0, spread=0.0)
     assert noise.sigma(2.0, 500.0) == pytest.approx(0.02)
     assert noise.sigma(2.0, 500.0, confidence=0.5) == pytest.approx(0.04)

@@ -1,4 +1,4 @@
-"""Masks of a person in depth and colour pictures of a scene made of boxes."""
+"""Masks of a person in depth and color pictures of a scene made of boxes."""
 
 import cv2
 import numpy as np
@@ -34,7 +34,7 @@ def place(u, v, depth):
 KNOWN = {"vc7": place(77, 50, 2.55), "r_ankle": place(77, 95, 2.55)}
 
 
-def test_a_leg_behind_is_seen_only_with_the_scene_or_a_seed():
+def test_a_leg_behind_is_visible_only_with_the_scene_or_a_seed():
     front = np.zeros((120, 160), dtype=bool)
     front[FRONT] = True
     both = front.copy()
@@ -65,12 +65,12 @@ def test_depths_that_cannot_be_used():
         from_depth(picture(), {"vc7": (np.nan, 0.0, 0.0)})
     with pytest.raises(MeasurementError, match="expected some of one size, found 0"):
         StillScene([])
-    with pytest.raises(MeasurementError, match="as learnt"):
+    with pytest.raises(MeasurementError, match="as learned"):
         StillScene([picture()]).before(np.ones((60, 80)))
 
 
 def standing(x):
-    """Known sites of a person 3 m away, in the optical axes' plane, `x` metres to the right."""
+    """Known sites of a person 3 m away, in the optical axes' plane, `x` meters to the right."""
     sites = {"head_center": (0.0, 0.65), "vc7": (0.0, 0.45)}
     for side, sign in (("l", 1.0), ("r", -1.0)):
         sites |= {
@@ -93,7 +93,7 @@ def test_surroundings_hold_the_bent_limbs_and_not_everything():
     assert 0.02 < few.mean() < 0.5
 
 
-def colour(x, seed):
+def color(x, seed):
     chance = np.random.default_rng(seed)
     image = np.tile(np.linspace(60, 180, 160)[None, :, None], (120, 1, 3)) + chance.normal(0, 3, (120, 160, 3))
     truth = np.zeros((120, 160), dtype=np.uint8)
@@ -111,9 +111,9 @@ def colour(x, seed):
 
 def test_a_person_who_never_leaves_the_place_is_cut_out():
     places = 0.25 * np.sin(np.linspace(0.0, 6.0, 30))
-    pictures = [colour(x, seed)[0] for seed, x in enumerate(places)]
+    pictures = [color(x, seed)[0] for seed, x in enumerate(places)]
     there = [surroundings(standing(x), CAMERA, POSE) for x in places]
-    image, truth = colour(0.1, 99)
+    image, truth = color(0.1, 99)
 
     def overlap(background):
         found = background.mask(image)
@@ -136,8 +136,8 @@ def test_skin_as_dark_as_the_floor_is_cut_out_and_a_shadow_is_not():
     assert not StillBackground([floor], chroma=40.0).mask(picture).any()
 
 
-def test_backgrounds_that_cannot_be_learnt():
-    image, truth = colour(0.0, 1)
+def test_backgrounds_that_cannot_be_learned():
+    image, truth = color(0.0, 1)
     with pytest.raises(MeasurementError, match="found none"):
         StillBackground([])
     with pytest.raises(MeasurementError, match="as before"):

@@ -1,4 +1,4 @@
-"""Skin colour that stays with its owner."""
+"""Skin color that stays with its owner."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 
 import voodoo
 from scene import rest_pose, turn
-from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learnt, picture, pixel_error
+from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learned, picture, pixel_error
 from voodoo import MeasurementError
 from voodoo.sensors.body_view import BodyView
 from voodoo.sensors.pixels import in_sensor, ray_distance
@@ -18,7 +18,7 @@ from voodoo.sensors.skin.tracker import SkinTracker
 
 def test_hands_and_face_are_found_and_named():
     skin = SkinTracker()
-    head, left, right = learnt(skin)
+    head, left, right = learned(skin)
     moved = ((162, 61), (104, 113), (214, 128))
     rays = skin.observe(picture(*moved, seed=99), CAMERA, POSE, Pose(head, left, right).joints)
     assert {ray.site for ray in rays} == {"head_center", "l_hand", "r_hand"}
@@ -32,11 +32,11 @@ def test_a_lens_that_distorts_is_looked_through():
     pose = Pose(head, left, right)
     names = ("head_center", "l_hand", "r_hand")
     points = np.array([pose.joints[name] for name in names])
-    seen = [tuple(pixel) for pixel in bent.project(in_sensor(POSE, points)).round().astype(int).tolist()]
+    observed = [tuple(pixel) for pixel in bent.project(in_sensor(POSE, points)).round().astype(int).tolist()]
     grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
     skin, body = SkinTracker(), BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
     for seed in range(8):
-        image = picture(*seen, seed=seed)
+        image = picture(*observed, seed=seed)
         rays = skin.observe(image, bent, POSE, pose.joints, body=body)
         skin.learn(image, bent, POSE, pose)
     assert [ray.site for ray in rays] == list(names)
@@ -47,7 +47,7 @@ def test_a_lens_that_distorts_is_looked_through():
 
 def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
     skin = SkinTracker()
-    head, left, right = learnt(skin)
+    head, left, right = learned(skin)
     image = picture(head, left, left, seed=5)  # the right hand is not there
     rays = skin.observe(image, CAMERA, POSE, Pose(head, left, right).joints)
     assert {ray.site for ray in rays} == {"head_center", "l_hand"}
@@ -55,7 +55,7 @@ def test_a_hidden_hand_gets_no_ray_and_the_other_keeps_its_own():
 
 def test_a_hand_behind_the_body_does_not_jump_to_what_is_in_front():
     skin = SkinTracker()
-    head, left, right = learnt(skin)
+    head, left, right = learned(skin)
     joints = Pose(head, left, right).joints
     grid = np.stack(np.meshgrid(np.arange(320.0), np.arange(240.0)), axis=-1).reshape(-1, 2)
     body = BodyView(np.ones((240, 320), bool), grid, np.full(len(grid), Z))
@@ -71,7 +71,7 @@ def test_a_hand_behind_the_body_does_not_jump_to_what_is_in_front():
 
 def test_a_hand_keeps_its_name_while_the_model_falls_behind():
     skin = SkinTracker()
-    head, left, right = learnt(skin)
+    head, left, right = learned(skin)
     joints = Pose(head, left, right).joints  # the model stands still, 20 cm and more from where the hand goes
     for step in range(1, 8):
         moved = (left[0] - 5 * step, left[1] - 6 * step)
@@ -92,7 +92,7 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
         root[:3, :3], root[:3, 3] = upright, (Z, aside, 1.0)
         tracker.reset_pose({limb: root @ pose for limb, pose in rest_pose(tracker.body).items()})
         skin = SkinTracker()
-        learnt(skin)
+        learned(skin)
         joints = Pose(head, left, right).joints
         for seed in range(12):  # long enough to have lost it
             skin.observe(picture(head, right, right, seed=seed), CAMERA, POSE, joints, body=body)
@@ -112,9 +112,9 @@ def test_a_lost_hand_is_taken_up_where_the_body_explains_nothing():
     assert np.linalg.norm(place - at(far, Z)) == pytest.approx(0.04, abs=0.02)
 
 
-def test_a_shirt_behind_one_hand_is_not_learnt():
+def test_a_shirt_behind_one_hand_is_not_learned():
     skin = SkinTracker()
-    head, left, right = learnt(skin)
+    head, left, right = learned(skin)
     shirt = (120, 110, 200)  # pink
     pose = Pose(head, left, right)
     for seed in range(20):
@@ -128,31 +128,31 @@ def test_a_shirt_behind_one_hand_is_not_learnt():
 
 def test_a_face_pulls_less_at_a_head_that_depth_shows():
     skin = SkinTracker()
-    head, left, right = learnt(skin)
+    head, left, right = learned(skin)
     image, joints = picture(head, left, right, seed=9), Pose(head, left, right).joints
     found = {}
-    for shown in ((), ("head_center", "l_hand")):
-        rays = skin.observe(image, CAMERA, POSE, joints, head_visible=shown)
-        found[shown] = {ray.site: ray.bias for ray in rays}
+    for displayed in ((), ("head_center", "l_hand")):
+        rays = skin.observe(image, CAMERA, POSE, joints, head_visible=displayed)
+        found[displayed] = {ray.site: ray.bias for ray in rays}
     settings = SkinSettings()
     assert found[()] == dict(settings.sites)
-    assert found["head_center", "l_hand"] == dict(settings.sites) | dict(settings.shown_bias)
-    with pytest.raises(MeasurementError, match="shown_bias head_center"):
-        SkinSettings(shown_bias={"head_center": -0.1})
+    assert found["head_center", "l_hand"] == dict(settings.sites) | dict(settings.visible_bias)
+    with pytest.raises(MeasurementError, match="visible_bias head_center"):
+        SkinSettings(visible_bias={"head_center": -0.1})
 
 
 def test_a_bare_forearm_does_not_take_the_hand_away():
     skin = SkinTracker()
-    head, left, right = learnt(skin, forearm=(135, 160))
+    head, left, right = learned(skin, forearm=(135, 160))
     moved = (105, 115)
     skin.observe(picture(head, moved, right, forearm=(133, 157), seed=7), CAMERA, POSE, Pose(head, left, right).joints)
     assert pixel_error(skin, "l_hand", moved) < 9.0  # 7 cm; the forearm's middle is 25 pixels away
 
 
-def test_a_door_of_the_same_colour_takes_nothing_away():
+def test_a_door_of_the_same_color_takes_nothing_away():
     skin = SkinTracker()
     door = (20, 60, 90, 235)
-    head, left, right = learnt(skin, frames=60, door=door)
+    head, left, right = learned(skin, frames=60, door=door)
     behind = (100, 125)  # the hand goes to the door, then in front of it
     joints = Pose(head, left, right).joints
     skin.observe(picture(head, behind, right, door=door, seed=3), CAMERA, POSE, joints)
@@ -165,10 +165,10 @@ def test_a_door_of_the_same_colour_takes_nothing_away():
             assert pixel_error(skin, "l_hand", (60, 150)) < 10.0
 
 
-def test_the_colour_follows_the_light():
+def test_the_color_follows_the_light():
     skin, blind = SkinTracker(), SkinTracker()
-    head, left, right = learnt(skin)
-    learnt(blind)
+    head, left, right = learned(skin)
+    learned(blind)
     pose = Pose(head, left, right)
     for step in range(120):
         light = (1.0 + 0.004 * step, 1.0, 1.0 - 0.0025 * step)
@@ -184,9 +184,9 @@ def test_lost_tracking_teaches_nothing():
     skin = SkinTracker()
     pose = Pose((160, 60), (110, 120), (210, 120))
     pose.status = "lost"
-    before = skin.colours
+    before = skin.colors
     skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
-    np.testing.assert_array_equal(before, skin.colours)
+    np.testing.assert_array_equal(before, skin.colors)
     assert not skin.settled
 
 

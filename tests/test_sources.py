@@ -113,7 +113,7 @@ def test_a_picture_that_is_100_ms_late(whole):
 
 def test_a_laser_with_wrong_extrinsics(whole):
     turn = np.eye(4)
-    turn[:2, :2] = [[0.94, -0.342], [0.342, 0.94]]  # 20 degrees: a metre off at the person
+    turn[:2, :2] = [[0.94, -0.342], [0.342, 0.94]]  # 20 degrees: a meter off at the person
     turn[:3, :3] /= np.cbrt(np.linalg.det(turn[:3, :3]))
     u, _, v = np.linalg.svd(turn[:3, :3])
     turn[:3, :3] = u @ v
@@ -131,7 +131,7 @@ def test_a_laser_with_wrong_extrinsics(whole):
     assert off < 0.5 * right
 
 
-def test_a_colour_camera_with_wrong_extrinsics(whole):
+def test_a_color_camera_with_wrong_extrinsics(whole):
     shift = np.eye(4)
     shift[0, 3] = 0.25  # 25 cm to the side
 
@@ -185,7 +185,7 @@ def test_of_two_depth_cameras_one_comes_100_ms_late_and_at_random(whole):
 
 def test_of_two_depth_cameras_one_stands_elsewhere(whole):
     away = np.eye(4)
-    away[0, 3] = 1.0  # a metre to the side
+    away[0, 3] = 1.0  # a meter to the side
 
     error, estimates = run(
         second_camera(lambda index, depth: replace(depth, root_from_sensor=depth.root_from_sensor @ away)),
@@ -213,23 +213,23 @@ def test_time_that_runs_backwards_is_refused_and_the_next_frame_accepted():
 
 
 def with_keypoints(recorded, joints):
-    """The frame with keypoints of these joints, as a network would find them in its colour picture."""
+    """The frame with keypoints of these joints, as a network would find them in its color picture."""
     layout = layout_of("body25b")
     added = []
     for item in (item for item in recorded.measurements if isinstance(item, ColorImage)):
         person = np.zeros((layout.count, 3))
-        for part in (part for part in layout.parts if len(part.shares) == 1):
+        for part in (part for part in layout.parts if len(part.weights) == 1):
             pixel = item.camera.project(in_sensor(item.root_from_sensor, [joints[part.site]]))[0]
-            person[next(iter(part.shares))] = *pixel, 0.9
+            person[next(iter(part.weights))] = *pixel, 0.9
         place = {"camera": item.camera, "root_from_sensor": item.root_from_sensor}
         added.append(KeypointImage("network", item.stamp, people=(person,), layout="body25b", **place))
     return RecordedFrame(recorded.stamp, (*added, *recorded.measurements))
 
 
 def aside(item):
-    """The same, but of a camera half a metre aside, with everything farther away."""
+    """The same, but of a camera half a meter aside, with everything farther away."""
     moved = replace(item, root_from_sensor=MOVED @ item.root_from_sensor)
-    return replace(moved, metres_per_unit=1.5 * item.metres_per_unit) if isinstance(item, DepthImage) else moved
+    return replace(moved, meters_per_unit=1.5 * item.meters_per_unit) if isinstance(item, DepthImage) else moved
 
 
 def test_a_refused_frame_leaves_no_trace_in_the_front_end():
@@ -244,20 +244,20 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
         front_end = FrontEnd(tracker)
         steps = []
         for index, plain in enumerate(frames):
-            seen = with_keypoints(plain, tracker.estimate.joints)
+            observed = with_keypoints(plain, tracker.estimate.joints)
             if index in refused:
                 if index % 4:
                     kept = KeypointImage if index % 8 == 2 else ()  # some pass the gates, some do not
-                    items = [item if isinstance(item, kept) else aside(item) for item in seen.measurements]
+                    items = [item if isinstance(item, kept) else aside(item) for item in observed.measurements]
                 else:  # the picture is that of the frame before, so its camera seems to be frozen
                     last = frames[max(index - 1, 0)].measurements
                     items = [item for item in last if isinstance(item, ColorImage)]
-                    items += [item for item in seen.measurements if isinstance(item, DepthImage)]
+                    items += [item for item in observed.measurements if isinstance(item, DepthImage)]
                 before = front_end.frozen, dict(front_end.reports), list(front_end.rays)
                 with pytest.raises(MeasurementError, match="finite"):
                     front_end.step(RecordedFrame(plain.stamp, (*items, spoiled)))
                 assert (front_end.frozen, front_end.reports, front_end.rays) == before
-            estimate = front_end.step(seen if index % 2 else plain)
+            estimate = front_end.step(observed if index % 2 else plain)
             blobs = [skin.followed for skin in front_end.skin.values()]
             gate = copy(front_end._gate.core)
             gates = {site: gate.limit(site, "network", estimate.stamp + 0.05) for site in ("l_wrist", "r_wrist")}
@@ -295,7 +295,7 @@ def test_a_weight_changes_no_run_time_and_a_sensor_costs_its_own_data_only():
         tracker.reset(joints=recording.start["joints"], fit_sizes=True)
         frame = voodoo.Frame(stamp=0.0)
         place = {"camera": depth.camera, "world_from_sensor": depth.root_from_sensor}
-        frame.add_depth(depth.image, metres_per_unit=depth.metres_per_unit, weight=weight, source="depth", **place)
+        frame.add_depth(depth.image, meters_per_unit=depth.meters_per_unit, weight=weight, source="depth", **place)
         if more:
             frame.add_ray("l_hand", origin=(3.0, 0.0, 1.0), direction=(-1.0, 0.0, 0.0), source="rays")
         done[weight, more] = work(tracker.step(frame))
@@ -306,7 +306,7 @@ def test_a_weight_changes_no_run_time_and_a_sensor_costs_its_own_data_only():
     assert done[1.0, True][1]["rays"] == (1, 1)
 
 
-def test_a_frozen_colour_camera_is_left_out(whole):
+def test_a_frozen_color_camera_is_left_out(whole):
     held = {}
 
     def freeze(index, items):
@@ -332,13 +332,13 @@ def test_a_face_pulls_less_while_depth_shows_the_head():
     front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
     biases = set()
     for recorded, _ in zip(paired(recording), range(12), strict=False):
-        shown = tracker.estimate.limb_status["head"] == "measured"
+        displayed = tracker.estimate.limb_status["head"] == "measured"
         front_end.step(recorded)
-        biases |= {(shown, ray.bias) for ray in front_end.rays if ray.site == "head_center"}
+        biases |= {(displayed, ray.bias) for ray in front_end.rays if ray.site == "head_center"}
         hands = {ray.bias for ray in front_end.rays if ray.site != "head_center"}
         assert hands <= {SkinSettings().sites["l_hand"]}
-    expected = {True: SkinSettings().shown_bias["head_center"], False: SkinSettings().sites["head_center"]}
-    assert (True, expected[True]) in biases and all(bias == expected[shown] for shown, bias in biases)
+    expected = {True: SkinSettings().visible_bias["head_center"], False: SkinSettings().sites["head_center"]}
+    assert (True, expected[True]) in biases and all(bias == expected[displayed] for displayed, bias in biases)
 
 
 def test_what_is_out_of_a_cameras_range_is_not_used():
@@ -363,6 +363,6 @@ def test_a_laser_alone_is_lost_although_it_matches():
     assert matched.sum() > 0.5 * given.sum(), (matched.sum(), given.sum())
 
 
-def test_a_colour_camera_alone_begins():
+def test_a_color_camera_alone_begins():
     _, estimates = run(use=("skin",))
     assert sum(of(estimate, "color") is not None for estimate in estimates) > FRAMES / 4

@@ -25,7 +25,7 @@ FRAMES, EMPTY = 6, 2
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A Pose2Sim folder of three cameras; its .trc is half a metre off."""
+    """A Pose2Sim folder of three cameras; its .trc is half a meter off."""
     path = tmp_path_factory.mktemp("starts") / "people"
     path.mkdir()
     text = []
@@ -96,8 +96,8 @@ def test_auto_is_the_same_without_what_lies_beside(run, folder, tmp_path):
 
 
 def test_init_gives_the_first_pose_and_track_takes_it(run, folder, tmp_path):
-    told = run("init", folder, "--out", "start.json")
-    assert "pose at 0.033 s; wrote start.json" in told.stdout
+    message = run("init", folder, "--out", "start.json")
+    assert "pose at 0.033 s; wrote start.json" in message.stdout
     start = json.loads((tmp_path / "start.json").read_text())
     truth = moved(EMPTY)
     assert start["stamp_s"] == pytest.approx(EMPTY / 60.0)

@@ -22,7 +22,7 @@ from voodoo.pipeline.starts import (
     KeypointsDepthStart,
     LegsStart,
     MarkersStart,
-    Seen,
+    StartFrame,
     Starts,
 )
 from voodoo.recordings import open_recording, sample_path
@@ -63,9 +63,9 @@ def keypoints(joints, pose, *, noise=0.0, seed=0, without=()):
     rng = np.random.default_rng(seed)
     rows = np.zeros((25, 3))
     for part in layout_of("body25b").parts:
-        if part.site in joints and part.site not in without and len(part.shares) == 1:
+        if part.site in joints and part.site not in without and len(part.weights) == 1:
             pixel = CAMERA.project(in_sensor(pose, [joints[part.site]]))[0]
-            rows[next(iter(part.shares))] = (*(pixel + rng.normal(0.0, noise, 2)), 0.9)
+            rows[next(iter(part.weights))] = (*(pixel + rng.normal(0.0, noise, 2)), 0.9)
     return rows
 
 
@@ -83,8 +83,8 @@ def images(people, poses, stamp=0.0, **how):
     )
 
 
-def seen(*measurements, body=BODY, stamp=0.0, **settings):
-    return Seen(stamp, measurements, body, FrontEndSettings(**settings))
+def observed(*measurements, body=BODY, stamp=0.0, **settings):
+    return StartFrame(stamp, measurements, body, FrontEndSettings(**settings))
 
 
 def worst(found, joints):
@@ -101,7 +101,7 @@ def test_rays_meet_where_most_of_them_agree():
     towards[2] = towards[2] + (0.0, 0.6, 0.0)
     rays = [SiteRay("l_wrist", o, w / np.linalg.norm(w), 0.02, "") for o, w in zip(origins, towards, strict=True)]
     met = place_of(rays)
-    assert np.linalg.norm(met.position - place) < 0.005 and met.seen_by.tolist() == [True, True, False]
+    assert np.linalg.norm(met.position - place) < 0.005 and met.visible_in.tolist() == [True, True, False]
     assert 0.01 < met.sigma < 0.05
     assert place_of(rays[:1]) is None
     assert place_of([rays[0], rays[0].moved((0.0, 0.01, 0.0))]) is None  # parallel
@@ -112,7 +112,7 @@ def test_rays_meet_where_most_of_them_agree():
 @pytest.mark.parametrize("cameras", [2, 3])
 def test_keypoints_of_several_cameras(cameras):
     joints = person()
-    found = CamerasStart().look(seen(*images([joints], AROUND[:cameras], noise=2.0)))
+    found = CamerasStart().find(observed(*images([joints], AROUND[:cameras], noise=2.0)))
     assert found is not None and len(found.joints) >= 14
     assert worst(found, joints) < 0.06
     assert all(0.0 < found.sigma[name] < 0.1 for name in found.joints)
@@ -120,23 +120,23 @@ def test_keypoints_of_several_cameras(cameras):
 
 def test_one_of_two_people_and_not_a_mixture_of_both():
     first, second = person((2.5, 0.7)), person((2.7, -0.7), facing=np.pi - 0.6)
-    found = CamerasStart().look(seen(*images([first, second], AROUND, noise=2.0)))
+    found = CamerasStart().find(observed(*images([first, second], AROUND, noise=2.0)))
     assert min(worst(found, first), worst(found, second)) < 0.08
 
 
 def test_cameras_that_disagree_or_stand_together_find_nobody():
     joints = person()
     pair = images([joints], AROUND[:2])
-    assert CamerasStart().look(seen(pair[0])) is None
+    assert CamerasStart().find(observed(pair[0])) is None
     beside = replace(pair[0], sensor="beside")
-    assert CamerasStart().look(seen(pair[0], beside)) is None
+    assert CamerasStart().find(observed(pair[0], beside)) is None
     higher = {name: place + (0.0, 0.0, 0.5) for name, place in joints.items()}
     elsewhere = images([higher], AROUND[1:2])[0]
-    assert CamerasStart().look(seen(pair[0], replace(elsewhere, sensor="cam1"))) is None
+    assert CamerasStart().find(observed(pair[0], replace(elsewhere, sensor="cam1"))) is None
     late = replace(pair[1], stamp=1.0)
-    assert CamerasStart().look(seen(pair[0], late)) is None
+    assert CamerasStart().find(observed(pair[0], late)) is None
     trunkless = images([joints], AROUND[:2], without=("l_hip", "r_hip", "l_shoulder"))
-    assert CamerasStart().look(seen(*trunkless)) is None
+    assert CamerasStart().find(observed(*trunkless)) is None
 
 
 def rendered(joints, pose):
@@ -157,14 +157,14 @@ def test_keypoints_with_depth_of_the_same_and_of_another_camera():
     other[:3, 3] += pose[:3, 0] * 0.06
     for at in (pose, other):
         (item,) = images([truth], [at], noise=1.0)
-        found = KeypointsDepthStart().look(seen(item, depth))
+        found = KeypointsDepthStart().find(observed(item, depth))
         assert found is not None and len(found.joints) >= 12
         assert np.mean([np.linalg.norm(place - truth[name]) for name, place in found.joints.items()]) < 0.05
     (item,) = images([truth], [pose])
-    assert KeypointsDepthStart().look(seen(item)) is None
-    assert KeypointsDepthStart().look(seen(item, replace(depth, stamp=0.5))) is None
+    assert KeypointsDepthStart().find(observed(item)) is None
+    assert KeypointsDepthStart().find(observed(item, replace(depth, stamp=0.5))) is None
     wall = replace(depth, image=np.full_like(depth.image, 4.5))  # at the wall the trunk is half as large again
-    assert KeypointsDepthStart().look(seen(item, wall)) is None
+    assert KeypointsDepthStart().find(observed(item, wall)) is None
 
 
 def test_a_hand_before_the_trunk_does_not_bend_the_start():
@@ -174,7 +174,7 @@ def test_a_hand_before_the_trunk_does_not_bend_the_start():
     u, v = np.rint(CAMERA.project(in_sensor(pose, [truth["r_wrist"]]))[0]).astype(int)
     depth.image[v - 12 : v + 12, u - 12 : u + 12] = 1.0
     (item,) = images([truth], [pose])
-    found = KeypointsDepthStart().look(seen(item, depth))
+    found = KeypointsDepthStart().find(observed(item, depth))
     assert "r_wrist" not in found.joints and "l_wrist" in found.joints
 
 
@@ -182,12 +182,12 @@ def test_markers_start_where_they_fix_the_pose():
     joints = person()
     names = ["l_shoulder", "r_shoulder", "l_hip", "l_wrist"]
     suit = MarkerSet("suit", 0.0, {name: joints[name] for name in names})
-    found = MarkersStart().look(seen(suit))
+    found = MarkersStart().find(observed(suit))
     assert sorted(found.joints) == sorted(names) and found.sigma["l_hip"] == 0.02
     few = replace(suit, positions={name: joints[name] for name in ("l_wrist", "r_wrist", "head_center", "l_elbow")})
-    assert MarkersStart().look(seen(few)) is None
+    assert MarkersStart().find(observed(few)) is None
     gap = replace(suit, positions={**suit.positions, "l_hip": np.full(3, np.nan)})
-    assert MarkersStart().look(seen(gap)) is None
+    assert MarkersStart().find(observed(gap)) is None
 
 
 ANGLES = np.arange(-1.2, 1.2, 0.006)
@@ -196,8 +196,8 @@ ANGLES = np.arange(-1.2, 1.2, 0.006)
 def sweep(stamp, circles, pose):
     """A laser's ranges [m] to circles ((x, y), radius) of the root frame, before a wall at 5 m."""
     ranges = np.full(len(ANGLES), 5.0)
-    for centre, radius in circles:
-        local = in_sensor(pose, [(*centre, pose[2, 3])])[0]
+    for center, radius in circles:
+        local = in_sensor(pose, [(*center, pose[2, 3])])[0]
         along = local[0] * np.cos(ANGLES) + local[1] * np.sin(ANGLES)
         off = np.linalg.norm(local[:2]) ** 2 - along**2
         hit = (off < radius**2) & (along > 0.0)
@@ -222,7 +222,9 @@ def walk(speed=1.0, turned=0.0, count=40):
 
 def test_legs_that_walk_are_found_and_furniture_is_not():
     finder, legs = LegsStart(), legs_body()
-    found = [(finder.look(seen(scan, body=legs, stamp=scan.stamp, ground_z=0.0)), middle) for scan, middle in walk()]
+    found = [
+        (finder.find(observed(scan, body=legs, stamp=scan.stamp, ground_z=0.0)), middle) for scan, middle in walk()
+    ]
     hits = [(each.joints, middle) for each, middle in found if each is not None]
     assert len(hits) >= 10
     for joints, middle in hits:
@@ -231,11 +233,11 @@ def test_legs_that_walk_are_found_and_furniture_is_not():
     left = [float(joints["l_hip"][0] - joints["r_hip"][0]) for joints, _ in hits[-5:]]
     assert max(left) < 0.0  # who walks along y has the left side at smaller x
     still = LegsStart()
-    assert not any(still.look(seen(scan, body=legs, stamp=scan.stamp)) for scan, _ in walk(speed=0.0))
+    assert not any(still.find(observed(scan, body=legs, stamp=scan.stamp)) for scan, _ in walk(speed=0.0))
     out = LegsStart()
     box = ((0.0, -5.0, 0.0), (5.0, 5.0, 1.0))
-    assert not any(out.look(seen(scan, body=legs, stamp=scan.stamp, exclude=(box,))) for scan, _ in walk())
-    assert not any(LegsStart().look(seen(scan, body=BODY, stamp=scan.stamp)) for scan, _ in walk())
+    assert not any(out.find(observed(scan, body=legs, stamp=scan.stamp, exclude=(box,))) for scan, _ in walk())
+    assert not any(LegsStart().find(observed(scan, body=BODY, stamp=scan.stamp)) for scan, _ in walk())
 
 
 def frames(*measurements, count, rate=30.0):
@@ -305,7 +307,7 @@ def test_the_found_pose_is_a_start(tmp_path):
     assert stature(voodoo.Body.human(1.6, model="papers")) == 1.6 and stature(legs_body()) is None
 
 
-def test_what_nothing_can_find_is_told_at_once(tmp_path):
+def test_what_nothing_can_find_is_reported_at_once(tmp_path):
     recording = open_recording(sample_path(), bare=True)
     lamp = voodoo.Body.load(Path(__file__).parent.parent / "examples" / "bodies" / "lamp.toml")
     with pytest.raises(VoodooError, match=r"by depth, scan, skin alone the body 'lamp' is not found.*--init FILE"):
@@ -316,7 +318,7 @@ def test_what_nothing_can_find_is_told_at_once(tmp_path):
     assert start_tracker(recording, use=("scan", "depth")).body.name == "human"
 
 
-def test_nothing_beside_a_recording_is_read_where_a_start_is_looked_for(tmp_path):
+def test_nothing_beside_a_recording_is_read_where_a_start_is_searched_for(tmp_path):
     folder = tmp_path / "rec"
     shutil.copytree(sample_path(), folder)
     whole = open_recording(folder)

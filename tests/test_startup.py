@@ -29,10 +29,10 @@ def test_help_imports_nothing_heavy(words):
         f"print('HEAVY', [name for name in {HEAVY!r} if name in sys.modules])\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    *shown, heavy = run.stdout.splitlines()
+    *displayed, heavy = run.stdout.splitlines()
     own = [TYPERS_OWN] if len(words) > 1 and TYPERS_OWN in heavy else []
     assert heavy == f"HEAVY {own}"
-    assert shown[0].startswith("voodoo " if words == ["--version"] else "Usage: ")
+    assert displayed[0].startswith("voodoo " if words == ["--version"] else "Usage: ")
 
 
 CLI = "from voodoo.cli import main; main()"

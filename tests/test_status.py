@@ -15,11 +15,11 @@ from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.keypoints import KeypointSensor
 from voodoo.synthetic.render import render_depth
-from voodoo.synthetic.sequence import CAMERA, METRES_PER_UNIT, VirtualSequence
+from voodoo.synthetic.sequence import CAMERA, METERS_PER_UNIT, VirtualSequence
 
 WALL_M, NOISE_M = 3.6, 0.004
-HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "outline": False, "relocalization": False}
-"""Matches within a millimetre only, and no other corrections: the body stays where it was put, and is judged there."""
+HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "depth_contour": False, "relocalization": False}
+"""Matches within a millimeter only, and no other corrections: the body stays where it was put, and is judged there."""
 LIMBS = ("upperarm", "forearm", "hand", "thigh", "calf", "foot")
 OUT = {"l_shoulder_ry": -0.9, "r_shoulder_ry": 0.9}
 DOWN = {"l_shoulder_ry": -0.15, "r_shoulder_ry": 0.15}
@@ -45,24 +45,24 @@ def estimates(tracker, depth, frames):
     world_from_sensor = VirtualSequence(body=tracker.body).world_from_sensor
     rng = np.random.default_rng(3)
     for index in range(frames):
-        image = np.rint((depth + rng.normal(0.0, NOISE_M, depth.shape)) / METRES_PER_UNIT).astype(np.uint16)
+        image = np.rint((depth + rng.normal(0.0, NOISE_M, depth.shape)) / METERS_PER_UNIT).astype(np.uint16)
         frame = voodoo.Frame(stamp=index / 30)
-        frame.add_depth(image, camera=CAMERA, metres_per_unit=METRES_PER_UNIT, world_from_sensor=world_from_sensor)
+        frame.add_depth(image, camera=CAMERA, meters_per_unit=METERS_PER_UNIT, world_from_sensor=world_from_sensor)
         yield tracker.step(frame)
 
 
-def judged(body, true, believed):
-    """The estimate of a tracker held at `believed` that is shown `true` once, and the errors of its joints [m]."""
+def judged(body, true, confirmed):
+    """The estimate of a tracker held at `confirmed` that is shown `true` once, and the errors of its joints [m]."""
     world_from_sensor = VirtualSequence(body=body).world_from_sensor
-    seen = render_depth(body, true[0], camera=CAMERA, world_from_sensor=world_from_sensor).depth
+    observed = render_depth(body, true[0], camera=CAMERA, world_from_sensor=world_from_sensor).depth
     tracker = voodoo.Tracker(body, config=voodoo.Config(**HELD))
-    tracker.reset_pose(believed[0])
-    (estimate,) = estimates(tracker, np.where(seen > 0.0, seen, WALL_M), 1)
+    tracker.reset_pose(confirmed[0])
+    (estimate,) = estimates(tracker, np.where(observed > 0.0, observed, WALL_M), 1)
     return estimate, {name: np.linalg.norm(estimate.joints[name] - true[1][name]) for name in metrics.JOINTS}
 
 
 @pytest.mark.parametrize("arms", [OUT, DOWN, {"l_shoulder_rx": 0.9, "l_elbow_flexion": 1.0, "r_shoulder_ry": 0.9}])
-def test_what_is_seen_where_it_is_is_measured(body, arms):
+def test_what_is_visible_where_it_is_is_measured(body, arms):
     true = posture(body, **arms)
     estimate, errors = judged(body, true, true)
     assert max(errors.values()) < 0.02
@@ -72,30 +72,30 @@ def test_what_is_seen_where_it_is_is_measured(body, arms):
 
 def test_an_arm_on_the_trunk_is_not_measured(body):
     true = posture(body, **DOWN)
-    believed = posture(body, l_shoulder_rx=0.3, l_shoulder_rz=0.8, l_elbow_flexion=2.0, r_shoulder_ry=0.15)
-    estimate, errors = judged(body, true, believed)
+    confirmed = posture(body, l_shoulder_rx=0.3, l_shoulder_rz=0.8, l_elbow_flexion=2.0, r_shoulder_ry=0.15)
+    estimate, errors = judged(body, true, confirmed)
     assert errors["l_elbow"] > 0.1 and errors["l_wrist"] > 0.3
     for limb in ("upperarm", "forearm", "hand"):
         assert estimate.limb_status[f"l_{limb}"] != "measured"
         assert estimate.limb_status[f"r_{limb}"] == "measured"
 
 
-def test_an_arm_that_is_lost_is_told_within_three_frames(body):
+def test_an_arm_that_is_lost_is_reported_within_three_frames(body):
     """It was seen for long; then it hangs down, and the body that is tracked stays as it was."""
     poses = posture(body, **OUT)[0], posture(body, **(OUT | {"l_shoulder_ry": -0.15}))[0]
     world_from_sensor = VirtualSequence(body=body).world_from_sensor
     out, down = (render_depth(body, pose, camera=CAMERA, world_from_sensor=world_from_sensor).depth for pose in poses)
     tracker = voodoo.Tracker(body, config=voodoo.Config(**HELD))
     tracker.reset_pose(poses[0])
-    told = []
-    for index, seen in enumerate([out] * 10 + [down] * 3):
+    message = []
+    for index, observed in enumerate([out] * 10 + [down] * 3):
         frame = voodoo.Frame(stamp=index / 30)
-        image = np.where(seen > 0.0, seen, WALL_M).astype(np.float32)
-        frame.add_depth(image, camera=CAMERA, metres_per_unit=1.0, world_from_sensor=world_from_sensor)
-        told.append(dict(tracker.step(frame).limb_status))
+        image = np.where(observed > 0.0, observed, WALL_M).astype(np.float32)
+        frame.add_depth(image, camera=CAMERA, meters_per_unit=1.0, world_from_sensor=world_from_sensor)
+        message.append(dict(tracker.step(frame).limb_status))
     for limb in ("upperarm", "forearm", "hand"):
-        assert {status[f"l_{limb}"] for status in told[:10]} == {"measured"}
-        assert told[12][f"l_{limb}"] != "measured" and told[12][f"r_{limb}"] == "measured"
+        assert {status[f"l_{limb}"] for status in message[:10]} == {"measured"}
+        assert message[12][f"l_{limb}"] != "measured" and message[12][f"r_{limb}"] == "measured"
 
 
 @pytest.mark.parametrize("angles, forearm", [((-0.6, 0.1, 1.3, 1.6), "measured"), ((-0.5, 0.2, 0.6, 0.6), "inferred")])
@@ -112,7 +112,7 @@ def test_what_is_behind_the_trunk_is_inferred(body, angles, forearm):
 @pytest.mark.parametrize(
     "turn", [{"l_shoulder_rx": -0.45}, {"l_shoulder_rx": 0.45}, {"l_shoulder_ry": -1.35}, {"l_shoulder_ry": -0.45}]
 )
-def test_an_elbow_off_by_twelve_centimetres_is_not_measured(body, turn):
+def test_an_elbow_off_by_twelve_centimeters_is_not_measured(body, turn):
     """Forwards, backwards, up and down: in depth the arm covers the pixels it should, and no camera sees past it."""
     estimate, errors = judged(body, posture(body, **OUT), posture(body, **(OUT | turn)))
     assert 0.12 < errors["l_elbow"] < 0.16
@@ -133,7 +133,7 @@ def test_a_cupboard_of_a_persons_size_is_no_body(body, width):
     assert set(tracker.estimate.limb_status.values()) == {"lost"}
 
 
-def test_keypoints_alone_track_a_person_who_is_seen():
+def test_keypoints_alone_track_a_person_who_is_visible():
     """Hips tell of the pelvis, shoulders of the clavicles: no depth image is needed to call that tracked."""
     body = voodoo.Body.human(1.75)
     tracker = voodoo.Tracker(body)
@@ -156,7 +156,7 @@ def test_keypoints_alone_track_a_person_who_is_seen():
     assert estimate.limb_status["r_calf"] != "measured" and estimate.status != "tracking"
 
 
-SEEN_FROM = (
+VIEW_FROM = (
     np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]]),
     np.array([[1.0, 0.0, 0.0, 3.0], [0.0, 0.0, 1.0, -3.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]]),
 )
@@ -179,13 +179,13 @@ def test_a_whole_recording_of_keypoints_alone_is_tracked():
     """As a network sees the true joints in two cameras, with errors of three pixels."""
     recording, layout = open_recording(sample_path()), LAYOUTS["coco17"]
     reference, rng = recording.reference, np.random.default_rng(5)
-    alone = {part.site: next(iter(part.shares)) for part in layout.parts if len(part.shares) == 1}
+    alone = {part.site: next(iter(part.weights)) for part in layout.parts if len(part.weights) == 1}
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
     tracker.reset(joints=recording.start["joints"])
     states = []
     for stamp, places in zip(reference.stamps, reference.positions, strict=True):
         frame, true = voodoo.Frame(stamp=float(stamp)), dict(zip(reference.names, places, strict=True))
-        for pose in SEEN_FROM:
+        for pose in VIEW_FROM:
             rows = np.zeros((layout.count, 3))
             for site in sorted(alone.keys() & true.keys()):
                 pixel = CAMERA.project((true[site] - pose[:3, 3])[None] @ pose[:3, :3])[0]

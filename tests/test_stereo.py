@@ -25,14 +25,14 @@ def picture(camera, world_from_camera, planes):
     for z, low, high in reversed(planes):
         scale = (z - world_from_camera[2, 3]) / rays[..., 2]
         x, y = (world_from_camera[axis, 3] + rays[..., axis] * scale for axis in (0, 1))
-        seen = cv2.remap(
+        observed = cv2.remap(
             texture,
             (2000 + 180 * x).astype(np.float32),
             (2000 + 180 * y + 300 * z).astype(np.float32),
             cv2.INTER_LINEAR,
         )
         inside = (x >= low) & (x <= high)
-        image[inside] = seen[inside]
+        image[inside] = observed[inside]
     return image
 
 

@@ -40,7 +40,7 @@ def test_what_librealsense_records_is_read(name):
     (depth,) = [item for item in frames[1].measurements if isinstance(item, DepthImage)]
     # Its writing ends half a picture later than the depth image's, so it belongs to the next frame.
     color = next(item for item in frames[1].measurements if isinstance(item, ColorImage))
-    assert depth.metres_per_unit == 0.001 and not depth.camera.distorted
+    assert depth.meters_per_unit == 0.001 and not depth.camera.distorted
     assert (depth.image[:, 8:] == 2001).all() and not depth.image[:, :8].any()
     assert (depth.camera.fx, depth.camera.cx, depth.camera.cy) == (60.0, 32.0, 23.25)
     assert color.camera.model == "inverse_plumb_bob" and color.camera.distortion == pytest.approx(
@@ -57,8 +57,8 @@ def test_what_librealsense_records_is_read(name):
 def test_the_stamps_of_a_bag_are_the_cameras_own():
     stamps = [frame.stamp for frame in open_recording(REALSENSE / "recorded_2_55.bag")]
     np.testing.assert_allclose(stamps, 100.0 + np.arange(6) / 30.0, atol=1e-6)
-    (image, *_) = next(iter(open_recording(REALSENSE / "recorded_2_55.bag", metres_per_unit=0.0001))).measurements
-    assert image.metres_per_unit == 0.0001
+    (image, *_) = next(iter(open_recording(REALSENSE / "recorded_2_55.bag", meters_per_unit=0.0001))).measurements
+    assert image.meters_per_unit == 0.0001
 
 
 def test_an_inverse_lens_undistorts_by_the_polynomial_and_projects_back():
@@ -68,11 +68,11 @@ def test_an_inverse_lens_undistorts_by_the_polynomial_and_projects_back():
     x, y = (u - 40.0) / 75.0, (v - 29.25) / 75.0  # as rs2_deproject_pixel_to_point has it
     r2 = x * x + y * y
     f = 1.0 + k1 * r2 + k2 * r2 * r2
-    wanted = np.stack(
+    expected = np.stack(
         [x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * f + 2 * p2 * x * y + p1 * (r2 + 2 * y * y)], axis=-1
     )
-    np.testing.assert_allclose(camera.rays(), wanted, atol=1e-6)
-    points = np.column_stack([wanted.reshape(-1, 2), np.ones(4800)]) * 2.0
+    np.testing.assert_allclose(camera.rays(), expected, atol=1e-6)
+    points = np.column_stack([expected.reshape(-1, 2), np.ones(4800)]) * 2.0
     np.testing.assert_allclose(camera.project(points), np.column_stack([u.ravel(), v.ravel()]), atol=1e-3)
     for name in ("Brown Conrady", "Modified Brown Conrady", "None"):
         assert voodoo.Camera.from_camera_info(width=4, height=3, k=np.eye(3), model=name).model == "plumb_bob"
@@ -100,11 +100,11 @@ def encode_rvl(image):
         while at < len(row) and row[at] == 0:
             at += 1
         number(at - zeros)
-        seen = at
+        observed = at
         while at < len(row) and row[at] != 0:
             at += 1
-        number(at - seen)
-        for value in row[seen:at]:
+        number(at - observed)
+        for value in row[observed:at]:
             delta, previous = value - previous, value
             number((delta << 1) ^ (delta >> 31))
     nibbles += [0] * (-len(nibbles) % 8)
@@ -164,19 +164,19 @@ def folder(path, names, *, calibration="width = 4\nheight = 3\nfx = 5.0\nfy = 5.
     return path
 
 
-def test_numbered_images_have_a_rate_and_it_is_said(tmp_path):
+def test_numbered_images_have_a_rate_and_it_is_reported(tmp_path):
     path = folder(tmp_path / "f", [f"{number:05d}" for number in range(4)])
     assert [frame.stamp for frame in open_recording(path)] == pytest.approx([0.0, 1 / 30, 2 / 30, 3 / 30])
     assert "numbered, and taken for 30 images/s; --option rate=N" in run("info", path).stdout
     assert [frame.stamp for frame in open_recording(path, rate=15.0)] == pytest.approx([0.0, 1 / 15, 2 / 15, 3 / 15])
-    said = run("info", path, "--option", "rate=15").stdout
-    assert "taken for 15 images/s" in said and "--option" not in said
+    reported = run("info", path, "--option", "rate=15").stdout
+    assert "taken for 15 images/s" in reported and "--option" not in reported
     with pytest.raises(RecordingError, match="rate: expected images per second"):
         open_recording(path, rate=0.0)
 
 
 @pytest.mark.parametrize(
-    ("names", "wanted"),
+    ("names", "expected"),
     [
         (("1700000000123", "1700000000223"), (1700000000.123, 1700000000.223)),
         (("1700000000123456789", "1700000001123456789"), (1700000000.123456789, 1700000001.123456789)),
@@ -184,9 +184,9 @@ def test_numbered_images_have_a_rate_and_it_is_said(tmp_path):
         (("0.0", "0.5"), (0.0, 0.5)),
     ],
 )
-def test_names_that_are_stamps_stay_stamps(tmp_path, names, wanted):
+def test_names_that_are_stamps_stay_stamps(tmp_path, names, expected):
     recording = open_recording(folder(tmp_path / "f", names))
-    assert [frame.stamp for frame in recording] == pytest.approx(wanted, abs=1e-6) and recording.assumed == ()
+    assert [frame.stamp for frame in recording] == pytest.approx(expected, abs=1e-6) and recording.assumed == ()
 
 
 def test_a_missing_calibration_answers_with_a_template(tmp_path):
@@ -200,11 +200,11 @@ def test_a_missing_calibration_answers_with_a_template(tmp_path):
     assert len(list(open_recording(path))) == 1
 
 
-def test_millimetres_under_the_default_factor_get_a_hint(tmp_path):
+def test_millimeters_under_the_default_factor_get_a_hint(tmp_path):
     image = np.linspace(1500, 4000, 12).reshape(3, 4).astype(np.uint16)
     path = folder(tmp_path / "f", ["0.0", "0.1"], image=image)
-    said = run("info", path).stdout
-    assert "leave no room for a person: is the unit right?" in said
+    reported = run("info", path).stdout
+    assert "leave no room for a person: is the unit right?" in reported
     joints = {"l_hip": [0, 0, 2], "r_hip": [0.2, 0, 2], "l_shoulder": [0, -0.5, 2], "r_shoulder": [0.2, -0.5, 2]}
     (tmp_path / "start.json").write_text(json.dumps({"joints": joints}))
     done = run("track", path, "--init", tmp_path / "start.json", "--out", tmp_path / "pose.csv")
@@ -242,7 +242,7 @@ def test_damaged_images_of_a_folder_are_left_out(tmp_path):
         open_recording(path)
 
 
-def test_what_is_not_read_says_what_to_do(tmp_path):
+def test_what_is_not_read_reports_what_to_do(tmp_path):
     for name, words in {
         "a.mkv": "an Azure Kinect",
         "a.oni": "OpenNI",
@@ -254,7 +254,7 @@ def test_what_is_not_read_says_what_to_do(tmp_path):
         assert done.exit_code == 1 and words in done.stderr and "docs/how-to/cameras.md" in done.stderr
     (tmp_path / "rgb").mkdir()
     done = run("info", tmp_path)
-    assert done.exit_code == 1 and "found colour alone" in done.stderr
+    assert done.exit_code == 1 and "found color alone" in done.stderr
     page = (Path(__file__).parents[1] / "docs" / "how-to" / "cameras.md").read_text(encoding="utf-8")
     titles = " ".join(line for line in page.splitlines() if line.startswith("#"))
     for name in ("RealSense", "Orbbec", "OAK", "Azure Kinect", "OpenNI", "MediaPipe", "OpenPose"):

@@ -78,7 +78,7 @@ def errors_of(result, name):
     return np.linalg.norm(result.joints[:, result.joint_names.index(name)] - truth, axis=1)
 
 
-def test_every_format_says_the_same_to_an_independent_reader(run):
+def test_every_format_reports_the_same_to_an_independent_reader(run):
     outputs = ["p.csv", "p.npz", "p.bvh", "p.trc", "p.mcap", "bag"]
     done = run(*(word for path in outputs for word in ("--out", path)))
     assert done.exit_code == 0, done.stderr
@@ -155,7 +155,7 @@ def test_a_marker_file_alone_and_a_marker_on_a_limb(tmp_path):
 
 
 def keypoint_files(folder, recording, skip=0):
-    """OpenPose files of the true joints in each colour image."""
+    """OpenPose files of the true joints in each color image."""
     folder.mkdir()
     layout = layout_of("body25b")
     reference = recording.reference
@@ -164,10 +164,10 @@ def keypoint_files(folder, recording, skip=0):
         row = int(np.argmin(np.abs(reference.stamps - item.stamp)))
         rows = np.zeros((layout.count, 3))
         for part in layout.parts:
-            if part.site in reference.names and len(part.shares) == 1:
+            if part.site in reference.names and len(part.weights) == 1:
                 place = reference.positions[row, reference.names.index(part.site)]
                 u, v = item.camera.project(in_sensor(item.root_from_sensor, [place]))[0]
-                rows[next(iter(part.shares))] = u, v, 0.9
+                rows[next(iter(part.weights))] = u, v, 0.9
         person = {"pose_keypoints_2d": rows.ravel().tolist()}
         (folder / f"{number:04d}.json").write_text(json.dumps({"people": [person]}))
 
@@ -181,8 +181,8 @@ def test_keypoints_of_the_recordings_own_camera(run, tmp_path):
         join(recording, keypoints={"/rear": tmp_path / "few"})
     keypoint_files(tmp_path / "all", recording)
     joined = join(recording, keypoints={COLOR: tmp_path / "all"})
-    seen = [item for frame in Short(joined) for item in frame.measurements if isinstance(item, KeypointImage)]
-    assert seen and all(len(item.people) == 1 for item in seen)
+    observed = [item for frame in Short(joined) for item in frame.measurements if isinstance(item, KeypointImage)]
+    assert observed and all(len(item.people) == 1 for item in observed)
     assert f"{COLOR}/keypoints" in str(joined.info())
     tracker = start_tracker(joined)
     steps = list(track(Short(joined), tracker, settings=FrontEndSettings.of(joined, use=("depth", "keypoints"))))
@@ -220,7 +220,7 @@ def test_depth_alone_is_the_same_frame_as_by_hand():
                 frame.add_depth(
                     item.image,
                     camera=item.camera,
-                    metres_per_unit=item.metres_per_unit,
+                    meters_per_unit=item.meters_per_unit,
                     world_from_sensor=item.root_from_sensor,
                     source=item.sensor,
                 )

@@ -61,14 +61,14 @@ def test_without_measurements_the_body_is_known_less_from_frame_to_frame(estimat
     recording = open_recording(sample_path(), use=("depth",))
     tracker = start_tracker(recording)
     steps = iter(track(recording, tracker))
-    seen = [next(steps).estimate for _ in range(10)][-1]
-    dark = [tracker.step(voodoo.Frame(stamp=seen.stamp + (1 + index) / 30.0)) for index in range(5)]
+    observed = [next(steps).estimate for _ in range(10)][-1]
+    dark = [tracker.step(voodoo.Frame(stamp=observed.stamp + (1 + index) / 30.0)) for index in range(5)]
     for joint in ("l_wrist", "r_ankle", "humanoid_root"):
-        sizes = [np.trace(estimate.covariance[joint]) for estimate in (seen, *dark)]
+        sizes = [np.trace(estimate.covariance[joint]) for estimate in (observed, *dark)]
         assert sizes == sorted(sizes) and sizes[-1] > 2.0 * sizes[0], joint
 
 
-def test_sizes_are_known_better_the_more_is_seen(estimates):
+def test_sizes_are_known_better_the_more_is_visible(estimates):
     first, last = estimates[0][0], estimates[0][-1]
     for limb in ("l_thigh", "r_upperarm", "thorax"):
         assert 0.0 < last.length_sigma[limb] < first.length_sigma[limb] < 0.05, limb
@@ -141,7 +141,7 @@ def test_a_bag_has_the_body_with_its_covariance_and_ellipsoids(tmp_path, estimat
         assert volume == pytest.approx(np.sqrt(np.linalg.det(found.covariance[index, 0])), rel=1e-6)
 
 
-def test_ellipses_are_drawn_as_large_as_joints_are_unsure(estimates):
+def test_ellipses_are_drawn_as_large_as_joints_are_uncertain(estimates):
     from voodoo.model.projection import TopView
 
     estimate, body = estimates[0][-1], estimates[1]
@@ -152,16 +152,16 @@ def test_ellipses_are_drawn_as_large_as_joints_are_unsure(estimates):
         draw_body(picture, body, found, view)
         return picture
 
-    class Unsure:
+    class Uncertain:
         def __getattr__(self, name):
             value = getattr(estimate, name)
             return 16.0 * value if name == "joint_covariances" else value
 
-    sure, unsure = drawn(estimate), drawn(Unsure())
-    assert (unsure.any(axis=2).sum()) > 1.02 * sure.any(axis=2).sum()
+    sure, uncertain = drawn(estimate), drawn(Uncertain())
+    assert (uncertain.any(axis=2).sum()) > 1.02 * sure.any(axis=2).sum()
 
 
-def test_calibration_of_errors_that_are_as_large_as_said():
+def test_calibration_of_errors_that_are_as_large_as_reported():
     chance = np.random.default_rng(3)
     frames = 4000
     sigma = np.exp(chance.uniform(np.log(0.005), np.log(0.1), (frames, 12, 3)))
@@ -170,15 +170,15 @@ def test_calibration_of_errors_that_are_as_large_as_said():
     measured = chance.random((frames, 12)) < 0.8
     found = calibrate([Deviations(errors[:1000], sigma[:1000], measured[:1000]),
                        Deviations(errors[1000:], sigma[1000:], measured[1000:])])  # fmt: skip
-    assert len(found.shares) == 4 and len(found.quartiles) == 8
-    for share in (*found.shares, *found.quartiles):
-        assert share.within_one == pytest.approx(norm.cdf(1) - norm.cdf(-1), abs=0.02), share.name
-        assert share.within_two == pytest.approx(norm.cdf(2) - norm.cdf(-2), abs=0.02), share.name
-        assert share.error_m == pytest.approx(share.sigma_m, rel=0.1)
-    assert found.shares[0].coordinates == 3 * (12 * frames - len(errors[::7]))
+    assert len(found.coverages) == 4 and len(found.quartiles) == 8
+    for fraction in (*found.coverages, *found.quartiles):
+        assert fraction.within_one == pytest.approx(norm.cdf(1) - norm.cdf(-1), abs=0.02), fraction.name
+        assert fraction.within_two == pytest.approx(norm.cdf(2) - norm.cdf(-2), abs=0.02), fraction.name
+        assert fraction.error_m == pytest.approx(fraction.sigma_m, rel=0.1)
+    assert found.coverages[0].coordinates == 3 * (12 * frames - len(errors[::7]))
     assert 1.0 < found.ratio < found.mean_m / found.oracle_m
     overconfident = calibrate([Deviations(errors, sigma / 2.0, measured)])
-    assert overconfident.shares[0].within_one == pytest.approx(norm.cdf(0.5) - norm.cdf(-0.5), abs=0.02)
+    assert overconfident.coverages[0].within_one == pytest.approx(norm.cdf(0.5) - norm.cdf(-0.5), abs=0.02)
     # Who knows the worst joints drops them.
     oracle = calibrate([Deviations(errors, np.abs(errors), measured)])
     assert oracle.ratio == pytest.approx(1.0)
@@ -203,9 +203,9 @@ def test_the_evaluation_prints_and_draws_it(tmp_path, estimates):
     assert files[-1] == tmp_path / "calibration.png" and files[-1].stat().st_size > 10_000
     found = calibrate([deviations])
     text = (tmp_path / "summary.md").read_text(encoding="utf-8")
-    assert "against exact truth" in text and f"| {100 * found.shares[2].within_one:.1f} %" in text
+    assert "against exact truth" in text and f"| {100 * found.coverages[2].within_one:.1f} %" in text
     # The sample is walked with exact truth: most errors are as large as said.
-    assert 0.5 < found.shares[0].within_one < 0.95 and found.shares[0].within_two > 0.8
+    assert 0.5 < found.coverages[0].within_one < 0.95 and found.coverages[0].within_two > 0.8
 
 
 def test_a_track_without_it_is_as_before(estimates):

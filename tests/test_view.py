@@ -22,7 +22,7 @@ from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
 from voodoo.visualization.body_geometry import bands, limb_mesh, nearest_limb
-from voodoo.visualization.rerun_log import rounded_millimetres
+from voodoo.visualization.rerun_log import rounded_millimeters
 from voodoo.visualization.rerun_viewer import Viewer
 
 
@@ -49,7 +49,7 @@ def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
     command = Path(sys.executable).with_name("rerun")
     verified = subprocess.run([command, "rrd", "verify", path], capture_output=True, text=True, check=False)
     assert verified.returncode == 0, verified.stderr
-    shown = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    displayed = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
     for entity in (
         "/world/body/limbs/l_forearm", "/world/body/joints", "/world/body/bands", "/world/rays", "/world/laser/scan",
         "/world/points/camera_depth_image_rect_raw", "/world/cameras/camera_color_image_raw_compressed/picture",
@@ -57,7 +57,7 @@ def test_file_holds_everything(tmp_path, steps, monkeypatch, most):
         "/world/cameras/camera_depth_image_rect_raw/picture/silhouette",
         "/plots/residual_mm", "/plots/steps", "/plots/step_ms", "/plots/sources/scan/matched",
     ):  # fmt: skip
-        assert entity in shown, entity
+        assert entity in displayed, entity
 
 
 def test_a_file_takes_less_than_fifty_kilobytes_a_frame(tmp_path):
@@ -75,12 +75,12 @@ def test_a_file_takes_less_than_fifty_kilobytes_a_frame(tmp_path):
 
 @pytest.mark.parametrize(("unit", "kind"), [(0.001, np.uint16), (0.00025, np.uint16), (1.0, np.float32)])
 def test_depth_is_rounded_by_a_quarter_of_a_percent_and_holes_stay(unit, kind):
-    metres = np.random.default_rng(3).uniform(0.1, 12.0, (40, 50))
-    metres[:4] = 0.0
-    image = (metres / unit).astype(kind)
+    meters = np.random.default_rng(3).uniform(0.1, 12.0, (40, 50))
+    meters[:4] = 0.0
+    image = (meters / unit).astype(kind)
     if kind == np.float32:
         image[1], image[2] = np.nan, -1.0
-    rounded = rounded_millimetres(image, unit)
+    rounded = rounded_millimeters(image, unit)
     assert (rounded[:4] == 0).all() and rounded.dtype == np.uint16
     measured = 1000.0 * unit * image[4:].astype(np.float64)
     assert (np.abs(rounded[4:] - measured) <= 0.0026 * measured + 0.5).all()
@@ -95,9 +95,10 @@ def test_ellipsoids_are_the_covariances_that_are_known(tmp_path, steps):
         log = viewer._stream.log
         viewer._stream.log = lambda path, item, **how: (drawn.setdefault(path, item), log(path, item, **how))
         viewer.log(estimate, tracker.body)
-    shown = drawn["world/body/uncertainty"]
+    displayed = drawn["world/body/uncertainty"]
     sizes, turns, centers = (
-        np.array(part.as_arrow_array().to_pylist()) for part in (shown.half_sizes, shown.quaternions, shown.centers)
+        np.array(part.as_arrow_array().to_pylist())
+        for part in (displayed.half_sizes, displayed.quaternions, displayed.centers)
     )
     axes = Rotation.from_quat(turns).as_matrix()
     found = np.einsum("nij,nj,nkj->nik", axes, sizes**2, axes)
@@ -117,8 +118,8 @@ def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
                 nobody(recorded.stamp) if gone else estimate, tracker.body, front_end=None if gone else front_end
             )
     command = Path(sys.executable).with_name("rerun")
-    shown = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
-    rows = re.findall(r"with (\d+) rows .* - (/world/body\S*) - .*\[(\S+?)[\] ]", shown)
+    displayed = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    rows = re.findall(r"with (\d+) rows .* - (/world/body\S*) - .*\[(\S+?)[\] ]", displayed)
     counts = {(entity, column): int(count) for count, entity, column in rows}
     assert counts["/world/body", "Clear:is_recursive"] == 1
     assert counts["/world/body/limbs/l_forearm", "Mesh3D:albedo_factor"] == 2
@@ -136,18 +137,18 @@ def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path)
             viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
         viewer.log_people(PeopleEstimate(9.0, ()), bodies)
     command = Path(sys.executable).with_name("rerun")
-    shown = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
-    rows = re.findall(r"with (\d+) rows .* - (/world/people\S*) - .*\[(\S+?)[\] ]", shown)
+    displayed = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    rows = re.findall(r"with (\d+) rows .* - (/world/people\S*) - .*\[(\S+?)[\] ]", displayed)
     counts = {(entity, column): int(count) for count, entity, column in rows}
     for one in (1, 2):
         assert counts[f"/world/people/{one}", "Clear:is_recursive"] == 1
-        assert f"/world/people/{one}/limbs/l_forearm" in shown
-        assert f"/world/people/{one}/number" in shown
+        assert f"/world/people/{one}/limbs/l_forearm" in displayed
+        assert f"/world/people/{one}/number" in displayed
     for entity in ("/world/cameras/camera_depth/picture", "/plots/people", "/plots/status/1"):
-        assert entity in shown, entity
+        assert entity in displayed, entity
 
 
-def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):
+def test_without_rerun_the_message_reports_what_to_install(monkeypatch, tmp_path):
     find = builtins.__import__
 
     def without(name, *args, **kwargs):
@@ -161,7 +162,7 @@ def test_without_rerun_the_message_says_what_to_install(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("display", ["", ":9"])
-def test_a_viewer_that_cannot_open_says_so(monkeypatch, display):
+def test_a_viewer_that_cannot_open_reports_so(monkeypatch, display):
     rerun = pytest.importorskip("rerun")
 
     def fail(self, *args, **kwargs):
@@ -196,7 +197,7 @@ def test_limb_mesh_is_closed_and_looks_outwards():
     assert np.abs(distances[: 4 * 24]).max() < 1e-4
 
 
-def test_points_are_coloured_by_their_limb(steps):
+def test_points_are_colored_by_their_limb(steps):
     tracker, _, _ = steps
     estimate, body = tracker.estimate, tracker.body
     middle = (estimate.joints["l_knee"] + estimate.joints["l_ankle"]) / 2

@@ -90,7 +90,7 @@ def test_surfaces_too_thick_and_too_long(body):
     assert 0.004 < errors.mean() < 0.014
 
 
-def test_disturbances_are_what_they_say(body):
+def test_disturbances_are_what_they_report(body):
     clean = list(sequence(body, frames=40))
     how = Disturbance(rectangles=0, corrupted=0.1, blank=0.1, repeated=0.1, late=0.1)
     found = list(disturbed(clean, how))

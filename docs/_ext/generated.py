@@ -61,9 +61,9 @@ def _spelling(option: Any) -> str:  # noqa: ANN401
 
 
 def _default(option: Any) -> str:  # noqa: ANN401
-    shown = option.default
-    plain = isinstance(shown, (str, int, float)) and not isinstance(shown, bool)
-    return f" Default: `{shown}`." if plain and shown != "" else ""
+    displayed = option.default
+    plain = isinstance(displayed, (str, int, float)) and not isinstance(displayed, bool)
+    return f" Default: `{displayed}`." if plain and displayed != "" else ""
 
 
 def _prose(text: str | None) -> list[str]:

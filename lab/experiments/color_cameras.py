@@ -1,4 +1,4 @@
-"""How many colour cameras it takes: a recording of pictures, tracked by all of its cameras, by all but one, by two and by one.
+"""How many color cameras it takes: a recording of pictures, tracked by all of its cameras, by all but one, by two and by one.
 
     python examples/color_cameras.py ../shared/data/pose2sim
     python examples/color_cameras.py ../shared/data/multiview/mv_d1_walk_turn_cmu --pairs

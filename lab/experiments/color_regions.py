@@ -1,8 +1,8 @@
-"""Pose from colour regions on recordings of several colour cameras with exact truth, and under disturbances.
+"""Pose from color regions on recordings of several color cameras with exact truth, and under disturbances.
 
-    python lab/experiments/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--grey] [--dim] [--cameras 0,1] ...
+    python lab/experiments/color_regions.py D/multiview/mv_* [--start 1] [--noise] [--gray] [--dim] [--cameras 0,1] ...
     python lab/experiments/color_regions.py D/multiview/mv_* --pairs
-    python lab/experiments/color_regions.py D/multiview/mv_d2* --grey --picture worst.jpg
+    python lab/experiments/color_regions.py D/multiview/mv_d2* --gray --picture worst.jpg
 
 Prints a line a recording: mean error of the twelve joints, share of it within 10 cm, mean and spread of the errors of joint
 angles, joints that are more than 10 cm off in the last third of a second, how many of the ends of limbs that are more than 10 cm
@@ -72,9 +72,9 @@ def disturbed(picture: Picture, rng: np.random.Generator, options: argparse.Name
     return picture
 
 
-def shown(picture: Picture, grey: bool) -> Picture:
+def displayed(picture: Picture, gray: bool) -> Picture:
     """The picture as the tracker gets it."""
-    return (picture @ np.array([0.114, 0.587, 0.299])).astype(np.uint8) if grey else picture
+    return (picture @ np.array([0.114, 0.587, 0.299])).astype(np.uint8) if gray else picture
 
 
 def number_of(sensor: str) -> int:
@@ -82,10 +82,10 @@ def number_of(sensor: str) -> int:
     return int(re.findall(r"\d+", sensor)[0])
 
 
-def empty_scene(folder: Path, camera: int, grey: bool) -> list[Picture]:
+def empty_scene(folder: Path, camera: int, gray: bool) -> list[Picture]:
     """Pictures of the scene without anybody."""
     files = sorted((folder / "background").glob(f"cam_{camera}_*.*"))
-    return [shown(cv2.imread(str(file)), grey) for file in files]
+    return [displayed(cv2.imread(str(file)), gray) for file in files]
 
 
 def called_measured(estimate: voodoo.Estimate) -> list[bool]:
@@ -109,21 +109,21 @@ def failure(
     """What the cameras see of one frame about the person: what was found in blue (left) and orange, the truth in magenta."""
     tiles = []
     for item, picture in zip(shots, pictures, strict=True):
-        shown = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
+        displayed = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture.copy()
         view = CameraView(item.camera, item.root_from_sensor, 1.0)
-        seen = [dict(zip(JOINTS, view.project(places)[0], strict=True)) for places in (truth, found)]
-        for places, own in zip(seen, (False, True), strict=True):
+        observed = [dict(zip(JOINTS, view.project(places)[0], strict=True)) for places in (truth, found)]
+        for places, own in zip(observed, (False, True), strict=True):
             for bone in BONES:
                 if not all(np.isfinite(places[name]).all() for name in bone):
                     continue
                 ends = [tuple(np.rint(places[name]).astype(int).tolist()) for name in bone]
                 color = MAGENTA if not own else BLUE if bone[0][0] == "l" else ORANGE
-                cv2.line(shown, *ends, color, 2, cv2.LINE_AA)
-        corners = np.array([place for places in seen for place in places.values() if np.isfinite(place).all()])
+                cv2.line(displayed, *ends, color, 2, cv2.LINE_AA)
+        corners = np.array([place for places in observed for place in places.values() if np.isfinite(place).all()])
         middle, half = np.mean([corners.min(axis=0), corners.max(axis=0)], axis=0), 0.65 * np.ptp(corners, axis=0).max()
-        half = min(half, 0.5 * min(shown.shape[:2]))
-        row, column = (int(np.clip(middle[axis] - half, 0, shown.shape[1 - axis] - 2 * half)) for axis in (1, 0))
-        part = shown[row : row + int(2 * half), column : column + int(2 * half)]
+        half = min(half, 0.5 * min(displayed.shape[:2]))
+        row, column = (int(np.clip(middle[axis] - half, 0, displayed.shape[1 - axis] - 2 * half)) for axis in (1, 0))
+        part = displayed[row : row + int(2 * half), column : column + int(2 * half)]
         tiles.append(cv2.resize(part, (TILE, TILE), interpolation=cv2.INTER_AREA))
     return np.asarray(cv2.hconcat(tiles), dtype=np.uint8)
 
@@ -131,7 +131,7 @@ def failure(
 def run(
     folder: Path, options: argparse.Namespace
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_], tuple[float, float], list[float]]:
-    """Errors (frames, 12) in metres, which of them are said to be measured, mean and spread of the errors of eight joint angles
+    """Errors (frames, 12) in meters, which of them are said to be measured, mean and spread of the errors of eight joint angles
     in degrees, and seconds of user time of every step."""
     recording = open_recording(folder, **{"loader": None} | pictures_alone(folder, None, ("color",)))
     frames = [[item for item in frame.measurements if isinstance(item, ColorImage)] for frame in recording]
@@ -143,7 +143,7 @@ def run(
         tracker.reset(joints=dict(estimate.joints))
     chosen = [int(camera) for camera in options.cameras.split(",")]
     for item in frames[0] if options.background else []:
-        tracker.set_background(item.sensor, empty_scene(folder, number_of(item.sensor), options.grey))
+        tracker.set_background(item.sensor, empty_scene(folder, number_of(item.sensor), options.gray))
     rng = np.random.default_rng(7)
     order = list(range(len(frames)))
     if options.rounds:
@@ -154,7 +154,7 @@ def run(
         frame = voodoo.Frame(step / 30.0)
         first = frames[index][-1].stamp
         shots = [item for item in frames[index] if number_of(item.sensor) in chosen]
-        pictures = [shown(disturbed(item.image, rng, options, step), options.grey) for item in shots]
+        pictures = [displayed(disturbed(item.image, rng, options, step), options.gray) for item in shots]
         for item, picture in zip(shots, pictures, strict=True):
             frame.add_color(
                 np.ascontiguousarray(picture),
@@ -179,11 +179,13 @@ def run(
     return np.array(errors), np.array(measured), angle_error(np.array(found), truth[order]), seconds
 
 
-def told_and_doubted(errors: npt.NDArray[np.float64], measured: npt.NDArray[np.bool_]) -> tuple[float, float, int]:
+def recall_and_false_alarms(
+    errors: npt.NDArray[np.float64], measured: npt.NDArray[np.bool_]
+) -> tuple[float, float, int]:
     """Share of what is more than 10 cm off that is not called measured, and of the rest, in percent; how many are off."""
     far = errors > 0.1
-    told, doubted = (100 * float((~measured[which]).mean()) if which.any() else np.nan for which in (far, ~far))
-    return told, doubted, int(far.sum())
+    message, false_alarms = (100 * float((~measured[which]).mean()) if which.any() else np.nan for which in (far, ~far))
+    return message, false_alarms, int(far.sum())
 
 
 def main() -> None:
@@ -196,7 +198,7 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="a .jpg of the worst frame, until the given one")
     parser.add_argument("--until", type=int, default=10**9, help="last frame that --picture shows")
     parser.add_argument("--config", default="{}", help="JSON of configuration keys")
-    for switch in ("noise", "rectangles", "corrupt", "dim", "grey", "background", "default-lengths"):
+    for switch in ("noise", "rectangles", "corrupt", "dim", "gray", "background", "default-lengths"):
         parser.add_argument(f"--{switch}", action="store_true")
     parser.add_argument("--pairs", action="store_true", help="every two of four cameras")
     options = parser.parse_args()
@@ -208,20 +210,22 @@ def main() -> None:
         options.cameras = cameras
         errors, measured, angles, seconds = run(folder, options)
         together.append((errors[:, ends].ravel(), measured[:, ends].ravel()))
-        told, doubted, count = told_and_doubted(*together[-1])
+        message, false_alarms, count = recall_and_false_alarms(*together[-1])
         lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
         tenth = len(errors) // 10
         print(
             f"{folder.name} {cameras}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
             f" angles {angles[0]:.1f} deg, spread {angles[1]:.1f}, lost {lost},"
-            f" told {told:.0f} % of {count}, doubted {doubted:.1f} %, first and last tenth"
+            f" told {message:.0f} % of {count}, doubted {false_alarms:.1f} %, first and last tenth"
             f" {100 * errors[:tenth].mean():.2f} {100 * errors[-tenth:].mean():.2f} cm,"
             f" {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
         )
     if options.pairs:
-        told, doubted, count = told_and_doubted(*(np.concatenate(part) for part in zip(*together, strict=True)))
-        print(f"all: told {told:.1f} % of {count}, doubted {doubted:.1f} %")
+        message, false_alarms, count = recall_and_false_alarms(
+            *(np.concatenate(part) for part in zip(*together, strict=True))
+        )
+        print(f"all: told {message:.1f} % of {count}, doubted {false_alarms:.1f} %")
 
 
 if __name__ == "__main__":

@@ -27,11 +27,11 @@ WINDOW_PX, ROUNDS, EVOLUTIONS, REACH_PX, BETWEEN_PX = 9.0, 3, 12, 14, 5
 CARRIED, TURN_SIGMA, EDGE_PX = 0.7, 0.12, 2.0
 
 
-def log_likelihood(picture, share):
-    """Of each pixel under the Gaussian of those about it that `share` (H, W) counts, up to a constant."""
+def log_likelihood(picture, fraction):
+    """Of each pixel under the Gaussian of those about it that `fraction` (H, W) counts, up to a constant."""
     blurred = [
         cv2.GaussianBlur(x, (0, 0), WINDOW_PX)
-        for x in (share, share[..., None] * picture, share[..., None] * picture**2)
+        for x in (fraction, fraction[..., None] * picture, fraction[..., None] * picture**2)
     ]
     count = blurred[0][..., None] + 1e-3
     mean = blurred[1] / count
@@ -55,8 +55,8 @@ def level_set(picture, prior):
 
 def rows_of(item, body, poses):
     """Contour points of the posed body in one picture: limb, point, direction, how far the border lies [m], certainty [1/m]."""
-    seen = render_depth(body, poses, camera=item.camera, world_from_sensor=item.root_from_sensor)
-    mask = (seen.limb >= 0).astype(np.uint8)
+    observed = render_depth(body, poses, camera=item.camera, world_from_sensor=item.root_from_sensor)
+    mask = (observed.limb >= 0).astype(np.uint8)
     if not mask.any():
         return []
     (v0, u0), (v1, u1) = ((f(np.argwhere(mask), axis=0) + d).astype(int) for f, d in ((np.min, -30), (np.max, 30)))
@@ -79,13 +79,13 @@ def rows_of(item, body, poses):
             if not cuts.size:
                 continue
             offset = at[there][cuts[np.argmin(np.abs(at[there][cuts]))]] + 0.5
-            z = float(seen.depth[v + v0, u + u0])
+            z = float(observed.depth[v + v0, u + u0])
             x = np.array([(u + u0 - camera.cx) / camera.fx * z, (v + v0 - camera.cy) / camera.fy * z, z])
             m = np.array([n[0] * camera.fx / z, n[1] * camera.fy / z, 0.0])
             m[2] = -(m @ x) / z
             slope = np.linalg.norm(m)
             pose = item.root_from_sensor
-            limb = seen.limb_names[seen.limb[v + v0, u + u0]]
+            limb = observed.limb_names[observed.limb[v + v0, u + u0]]
             rows.append(
                 (limb, pose[:3, :3] @ x + pose[:3, 3], pose[:3, :3] @ m / slope, offset / slope, slope / EDGE_PX)
             )

@@ -44,7 +44,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Watched:
+class Observed:
     """What was seen of empty rooms: for how long [s] they were empty, and the false bodies."""
 
     name: str
@@ -77,15 +77,15 @@ def found(estimates: Sequence[voodoo.Estimate], rate: float, where) -> list[Body
     return [Body((part.stop - part.start) / rate, float(lost[part].mean()), where(part.start)) for part in runs]
 
 
-def in_synthetic(seconds: float) -> Watched:
+def in_synthetic(seconds: float) -> Observed:
     """The synthetic room whose person is away."""
     stops = (Stop(0.0, 2.4, 0.0, np.pi), Stop(seconds, 2.4, 0.0, np.pi))
     walk = Walk(body=voodoo.Body.human(), stops=stops, away=((0.0, np.inf),))
     bodies = found(stepped(map(walk.measurement, walk)), rooms.RATE_HZ, lambda _: "synthetic room")
-    return Watched("synthetic room", seconds, tuple(bodies))
+    return Observed("synthetic room", seconds, tuple(bodies))
 
 
-def in_recording(path: Path) -> Watched:
+def in_recording(path: Path) -> Observed:
     """A recording of people who come and go, tracked as one person by depth alone."""
     result = follow(path)
     stamps = result.truth.stamps
@@ -99,18 +99,18 @@ def in_recording(path: Path) -> Watched:
         kind = "left" if left else "empty" if empty[part.start] else "others"
         where = f"{path.name}, {stamps[part.start] - stamps[0]:.1f} s ({kind})"
         bodies.append(Body((part.stop - part.start) * period, float(result.lost[part].mean()), where, kind))
-    return Watched(path.name, float(empty.sum()) * period, tuple(bodies))
+    return Observed(path.name, float(empty.sum()) * period, tuple(bodies))
 
 
-def row(watched: Watched) -> str:
+def row(observed: Observed) -> str:
     """A line of the table."""
-    false = [body for body in watched.bodies if body.kind == "empty"]
-    minute = f"{60.0 * len(false) / watched.empty:.1f}" if watched.empty else ""
+    false = [body for body in observed.bodies if body.kind == "empty"]
+    minute = f"{60.0 * len(false) / observed.empty:.1f}" if observed.empty else ""
     seconds = sum(body.seconds for body in false)
-    told = f"{100.0 * sum(body.seconds * body.lost for body in false) / seconds:.0f} %" if false else ""
+    message = f"{100.0 * sum(body.seconds * body.lost for body in false) / seconds:.0f} %" if false else ""
     longest = f"{max(body.seconds for body in false):.1f}" if false else ""
-    left, others = (sum(body.kind == kind for body in watched.bodies) for kind in ("left", "others"))
-    cells = [watched.name, f"{watched.empty:.0f}", f"{len(false)}", minute, longest, told, f"{left}", f"{others}"]
+    left, others = (sum(body.kind == kind for body in observed.bodies) for kind in ("left", "others"))
+    cells = [observed.name, f"{observed.empty:.0f}", f"{len(false)}", minute, longest, message, f"{left}", f"{others}"]
     return "| " + " | ".join(cells) + " |"
 
 
@@ -127,7 +127,7 @@ def main() -> None:
         )
     print("| where | empty, s | false bodies | a minute | longest, s | called lost | left behind | people in view |")
     print("|---|---|---|---|---|---|---|---|")
-    all_of_them: list[Watched] = []
+    all_of_them: list[Observed] = []
     seeds = range(options.first, options.first + options.rooms)
     for place, sensor in enumerate(rooms.SENSORS):
         mine = [seed for seed in seeds if seed % len(rooms.SENSORS) == place]
@@ -137,15 +137,17 @@ def main() -> None:
             for body in in_room(rooms.room(seed), options.seconds, floor_known=seed // len(rooms.SENSORS) % 2 == 0)
         ]
         if mine:
-            all_of_them.append(Watched(f"{len(mine)} rooms, {sensor.name}", len(mine) * options.seconds, tuple(bodies)))
+            all_of_them.append(
+                Observed(f"{len(mine)} rooms, {sensor.name}", len(mine) * options.seconds, tuple(bodies))
+            )
             print(row(all_of_them[-1]), flush=True)
     for watch in [lambda: in_synthetic(options.seconds)] * (options.rooms > 0) + [
         lambda path=path: in_recording(path) for path in options.recordings
     ]:
         all_of_them.append(watch())
         print(row(all_of_them[-1]), flush=True)
-    total = tuple(body for watched in all_of_them for body in watched.bodies)
-    print(row(Watched("together", sum(watched.empty for watched in all_of_them), total)) + "\n")
+    total = tuple(body for observed in all_of_them for body in observed.bodies)
+    print(row(Observed("together", sum(observed.empty for observed in all_of_them), total)) + "\n")
     for body in total:
         print(f"{body.where}: {body.seconds:.1f} s, {100.0 * body.lost:.0f} % of it called lost")
 

@@ -58,7 +58,7 @@ class First:
     frame: int | None
     joints: np.ndarray
     reference: np.ndarray
-    exchanged: tuple[bool, bool]
+    swapped: tuple[bool, bool]
 
 
 def first(path: Path) -> First | None:
@@ -84,10 +84,10 @@ def first(path: Path) -> First | None:
         later = (np.array([frame.estimate.joints[name] for name in metrics.JOINTS]), places[nearest])
         if found is None:
             found, at_first = frame.index + 1, later
-    return First(recording.name, reference.exact, found, *at_first, (exchanged(*at_first), exchanged(*later)))
+    return First(recording.name, reference.exact, found, *at_first, (swapped(*at_first), swapped(*later)))
 
 
-def exchanged(joints: np.ndarray, reference: np.ndarray) -> bool:
+def swapped(joints: np.ndarray, reference: np.ndarray) -> bool:
     """Whether shoulders and hips (12, 3) lie nearer to the reference's opposite ones than to their own."""
     own = sum(np.linalg.norm(joints[[left, right]] - reference[[left, right]], axis=1).sum() for left, right in PAIRS)
     other = sum(np.linalg.norm(joints[[left, right]] - reference[[right, left]], axis=1).sum() for left, right in PAIRS)
@@ -101,7 +101,7 @@ def row(which: str, poses: Sequence[First]) -> str:
     joints, reference = (np.array([getattr(pose, what) for pose in poses]) for what in ("joints", "reference"))
     plain = metrics.mean_or_nan(metrics.joint_errors(joints, reference))
     without = metrics.mean_or_nan(metrics.without_offsets(joints, reference))
-    at_first, later = (sum(pose.exchanged[when] for pose in poses) for when in (0, 1))
+    at_first, later = (sum(pose.swapped[when] for pose in poses) for when in (0, 1))
     worst = f"{numbers.max()}" if numbers.max() <= LONGEST else "never"
     cells = [
         which,
@@ -147,7 +147,7 @@ def main() -> None:
         group = [pose for pose in poses if pose.exact == exact]
         if group:
             print(row(which, group))
-    wrong = [pose.name for pose in poses if any(pose.exchanged)]
+    wrong = [pose.name for pose in poses if any(pose.swapped)]
     late = [f"{pose.name} ({pose.frame or 'never'})" for pose in poses if pose.frame is None or pose.frame > IN_TIME]
     print(f"\nexchanged: {', '.join(wrong) or 'none'}\nlate: {', '.join(late) or 'none'}")
 

@@ -2,7 +2,7 @@
 
     python lab/experiments/fusion_experiment.py ../shared/data/rendered/dev_* --out out/fusion
 
-The 2-D cue is skin colour: head and hands in one colour picture. Which way a fast arm goes is partly chance: each recording is
+The 2-D cue is skin color: head and hands in one color picture. Which way a fast arm goes is partly chance: each recording is
 tracked eight times (`--starts N`), the first time from its own start and then with 4 mm of noise on the start's
 joints, and the table tells the means. How much of a change is chance is told by `--modes depth again`: depth alone once
 more, from joints moved by another 0.1 mm. Writes table.md, groups.png (error of each joint group) and frames_SOLVER.png (what
@@ -168,22 +168,22 @@ def draw(results: list[Result], paths: list[Path], solver: str, file: Path) -> N
         gain = (chosen["depth"].errors - chosen["fused"].errors)[0][:, hands].mean(axis=1)
         frame, picture = -1, None
         for index, recorded in enumerate(paired(recording)):
-            shown = next((item for item in recorded.measurements if isinstance(item, ColorImage)), None)
-            if shown is not None and (frame < 0 or gain[index] > gain[frame]):
-                frame, picture = index, shown
+            displayed = next((item for item in recorded.measurements if isinstance(item, ColorImage)), None)
+            if displayed is not None and (frame < 0 or gain[index] > gain[frame]):
+                frame, picture = index, displayed
         if picture is None:
-            raise SystemExit(f"{recording.name}: expected colour pictures, found none")
+            raise SystemExit(f"{recording.name}: expected color pictures, found none")
         truth = dict(zip(recording.reference.names, recording.reference.positions[frame], strict=True))
         tiles = []
         for mode in [mode for mode in ("depth", "2-D", "fused") if mode in chosen]:
             image = cv2.resize(picture.image, None, fx=1.5, fy=1.5, interpolation=cv2.INTER_CUBIC)
-            for joints, colour in ((truth, (255, 255, 255)), (chosen[mode].joints[frame], (0, 90, 255))):
+            for joints, color in ((truth, (255, 255, 255)), (chosen[mode].joints[frame], (0, 90, 255))):
                 points = in_sensor(picture.root_from_sensor, list(joints.values()))
                 pixels = dict(zip(joints, 1.5 * picture.camera.project(points) + 0.25, strict=True))
                 for a, b in LIMBS:
                     if np.isfinite([pixels[a], pixels[b]]).all():
                         start, end = np.round(pixels[a]).astype(int), np.round(pixels[b]).astype(int)
-                        cv2.line(image, tuple(start), tuple(end), colour, 2, cv2.LINE_AA)
+                        cv2.line(image, tuple(start), tuple(end), color, 2, cv2.LINE_AA)
             text = f"{mode} {100 * chosen[mode].errors[0, frame, hands].mean():.0f} cm"
             cv2.putText(image, text, (8, 22), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (0, 0, 0), 2, cv2.LINE_AA)
             tiles.append(image)

@@ -1,4 +1,4 @@
-"""Four real colour cameras and a keypoint network: rays alone carry the body (the balancing trial of Pose2Sim).
+"""Four real color cameras and a keypoint network: rays alone carry the body (the balancing trial of Pose2Sim).
 
     python lab/experiments/fusion_pose2sim.py ../shared/data/pose2sim --out out/pose2sim
 
@@ -48,7 +48,7 @@ class Run:
     triangulated: float
 
 
-def corrupted(recording: Recording, share: float, seed: int) -> Iterator[RecordedFrame]:
+def corrupted(recording: Recording, fraction: float, seed: int) -> Iterator[RecordedFrame]:
     """The recording with a share of all keypoints at random pixels, as sure of themselves as they were."""
     chance = np.random.default_rng(seed)
     for recorded in recording:
@@ -56,7 +56,7 @@ def corrupted(recording: Recording, share: float, seed: int) -> Iterator[Recorde
         for item in recorded.measurements:
             people = []
             for person in item.people:
-                wrong = chance.random(len(person)) < share
+                wrong = chance.random(len(person)) < fraction
                 person = person.copy()
                 size = (item.camera.width, item.camera.height)
                 person[wrong, :2] = chance.uniform((0, 0), size, (int(wrong.sum()), 2))
@@ -82,11 +82,11 @@ def triangulated(recording: Recording, seed: int, outliers: float) -> float:
             )
             if person is None:
                 continue
-            seen = [part for part in site_pixels(person, layout=item.layout)[0] if part.site in normal]
-            if not seen:
+            observed = [part for part in site_pixels(person, layout=item.layout)[0] if part.site in normal]
+            if not observed:
                 continue
-            origin, directions = world_rays(item.camera, item.root_from_sensor, [part.pixel for part in seen])
-            for part, direction in zip(seen, directions, strict=True):
+            origin, directions = world_rays(item.camera, item.root_from_sensor, [part.pixel for part in observed])
+            for part, direction in zip(observed, directions, strict=True):
                 across = part.confidence**2 * (np.eye(3) - np.outer(direction, direction))
                 if np.linalg.norm(np.cross(direction, places[part.site] - origin)) < 0.25:
                     normal[part.site][0][...] += across
@@ -105,17 +105,17 @@ def track(path: Path, name: str, config: voodoo.Config, *, model="papers", camer
     reference = recording.reference
     columns = [reference.names.index(name) for name in JOINTS]
     errors, estimates, seconds = [], [], 0.0
-    seen = 0
+    observed = 0
     for index, recorded in enumerate(corrupted(recording, outliers, seed)):
         began = time.process_time()
         estimate = front_end.step(recorded)
         seconds += time.process_time() - began
-        seen += sum(len(report.rays) for report in front_end.reports.values())
+        observed += sum(len(report.rays) for report in front_end.reports.values())
         estimates.append(estimate)
         found = np.array([estimate.joints[name] for name in JOINTS])
         errors.append(np.linalg.norm(found - reference.positions[index, columns], axis=1))
     alone = triangulated(recording, seed, outliers)
-    return Run(name, np.array(errors), estimates, seconds / len(errors), seen / len(errors), alone)
+    return Run(name, np.array(errors), estimates, seconds / len(errors), observed / len(errors), alone)
 
 
 def draw(path: Path, run: Run, file: Path, frame: int) -> None:
@@ -140,8 +140,8 @@ def draw(path: Path, run: Run, file: Path, frame: int) -> None:
         lines = [(f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in BONES]
         lines += [("l_shoulder", "r_shoulder"), ("l_hip", "r_hip"), ("vc7", "skull_tip")]
         for a, b in lines:
-            colour = {"l": (255, 80, 80), "r": (80, 80, 255)}.get(a[0] if a[1] == "_" else "", (80, 220, 80))
-            cv2.line(picture, pixels[a], pixels[b], colour, 6, cv2.LINE_AA)
+            color = {"l": (255, 80, 80), "r": (80, 80, 255)}.get(a[0] if a[1] == "_" else "", (80, 220, 80))
+            cv2.line(picture, pixels[a], pixels[b], color, 6, cv2.LINE_AA)
         tiles.append(cv2.resize(picture, (408, 720)))
     cv2.imwrite(str(file), np.hstack(tiles))
 

@@ -56,7 +56,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
         pixels[wrong] = chance.uniform((0, 0), (CAMERA.width, CAMERA.height), (int(wrong.sum()), 2))
         if rays:
             origin, directions = world_rays(CAMERA, np.eye(4), pixels)
-            seen = [
+            observed = [
                 SiteRay(
                     site,
                     origin,
@@ -69,7 +69,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
                 if np.isfinite(direction).all()
                 and gate.accepts_ray(site, predicted[site], origin, direction, recorded.stamp, "rays")
             ]
-            add_rays(frame, seen, model=model)
+            add_rays(frame, observed, model=model)
         estimate = tracker.step(frame)
         found[index] = [estimate.joints.get(name, np.full(3, np.nan)) for name in reference.names]
     errors = joint_errors(found, reference.positions, lag=LAG)

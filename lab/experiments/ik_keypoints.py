@@ -27,7 +27,9 @@ class Keypoints:
         """Camera -> offsets (N, 2) [px] of the known sites' keypoints from the truth as projected into it."""
         found = {}
         for camera, sites in self.pixels.items():
-            rows = [self.views[camera].project(truth[s])[0] - seen for s, seen in sites.items() if s not in LIMBS]
+            rows = [
+                self.views[camera].project(truth[s])[0] - observed for s, observed in sites.items() if s not in LIMBS
+            ]
             every = np.concatenate(rows)
             found[camera] = every[np.isfinite(every).all(axis=1)]
         return found
@@ -46,9 +48,9 @@ class Keypoints:
                 along = way * ((middle - start) @ way)
                 side = middle - start - along
                 places = start + along + np.outer(np.cos(TURNS), side) + np.outer(np.sin(TURNS), np.cross(way, side))
-                seen = [(self.views[camera], self.pixels[camera][joint][frame]) for camera in cameras]
+                observed = [(self.views[camera], self.pixels[camera][joint][frame]) for camera in cameras]
                 squares = [
-                    ((view.project(places)[0] - at) ** 2).sum(axis=1) for view, at in seen if np.isfinite(at).all()
+                    ((view.project(places)[0] - at) ** 2).sum(axis=1) for view, at in observed if np.isfinite(at).all()
                 ]
                 if not squares:
                     rows.append(np.full(3, np.nan))
@@ -71,7 +73,9 @@ def keypoints(recording: Recording, sites: Sequence[str]) -> Keypoints:
             found.views[item.sensor] = CameraView(item.camera, item.root_from_sensor)
             there = found.pixels.setdefault(item.sensor, {s: np.full((len(recording), 2), np.nan) for s in sites})
             for part in LAYOUTS[item.layout].parts:
-                u, v, sure = np.sum([share * item.people[0][index] for index, share in part.shares.items()], axis=0)
+                u, v, sure = np.sum(
+                    [fraction * item.people[0][index] for index, fraction in part.shares.items()], axis=0
+                )
                 if part.site in there and sure > SURE:
                     there[part.site][frame] = u, v
     return found

@@ -121,7 +121,7 @@ def steady(truth: Truth) -> dict[str, np.ndarray]:
         lengths = np.median(limb_lengths(truth)[joint], axis=0)
         measured = np.stack([truth[name] for name in names], axis=1)
         places = measured.copy()
-        # Least squares under two constraints, each linearised where the last step led.
+        # Least squares under two constraints, each linearized where the last step led.
         for _ in range(50):
             bones = np.diff(places, axis=1)
             now = np.linalg.norm(bones, axis=2)
@@ -130,8 +130,8 @@ def steady(truth: Truth) -> dict[str, np.ndarray]:
             for bone in (0, 1):
                 rows[:, bone, bone], rows[:, bone, bone + 1] = -ways[:, bone], ways[:, bone]
             rows = rows.reshape(-1, 2, 9)
-            wanted = (lengths - now)[..., None] + rows @ (places - measured).reshape(-1, 9, 1)
-            step = rows.transpose(0, 2, 1) @ np.linalg.solve(rows @ rows.transpose(0, 2, 1), wanted)
+            expected = (lengths - now)[..., None] + rows @ (places - measured).reshape(-1, 9, 1)
+            step = rows.transpose(0, 2, 1) @ np.linalg.solve(rows @ rows.transpose(0, 2, 1), expected)
             places = measured + step.reshape(-1, 3, 3)
         found.update({name: places[:, index] for index, name in enumerate(names)})
     return found

@@ -94,13 +94,14 @@ def four_cameras(path: Path) -> Trial:
         placed.name: (*read(video, placed.camera), placed.world_from_sensor)
         for placed, video in zip(recording.cameras, sorted((path / "videos").glob("*.mp4")), strict=True)
     }
-    seen_by = keypoints(recording, names)
-    trial = Trial(truth, steady(truth), stature(truth), {}, seen_by, seen_by.offsets(truth))
+    visible_in = keypoints(recording, names)
+    trial = Trial(truth, steady(truth), stature(truth), {}, visible_in, visible_in.offsets(truth))
     known = {name: places for name, places in truth.items() if name not in LIMBS}
     # Twice: elbows and knees found with the first silhouettes tell better where the person is not, hence the background.
     for _ in range(2):
         trial.views = {
-            name: (cut_out(*seen, known, trial.height, trial.border(name)), seen[2]) for name, seen in pictures.items()
+            name: (cut_out(*views, known, trial.height, trial.border(name)), views[2])
+            for name, views in pictures.items()
         }
         known = {**known, **trial.solve(trial.agreeing, truth)}
     return trial
@@ -114,14 +115,14 @@ def cut_out(
     sites = [{name: places[frame] for name, places in known.items()} for frame in frames]
     there = [surroundings(places, camera, pose, height=height) for places in sites]
     background = StillBackground(pictures[::LEARN_EVERY], occupied=there[::LEARN_EVERY])
-    outlines = []
+    silhouettes = []
     for picture, near, places in zip(pictures, there, sites, strict=True):
         trunk = np.zeros(near.shape, dtype=np.uint8)
         corners, _ = CameraView(camera, pose).project(np.stack([places[site] for site in CORNERS]))
         cv2.fillPoly(trunk, [cv2.convexHull(np.rint(corners).astype(np.int32))], 1)
         mask = filled((background.mask(picture) & near) | (trunk != 0))
-        outlines.append(ik.Silhouette(mask, camera=camera, world_from_camera=pose, border=border))
-    return outlines
+        silhouettes.append(ik.Silhouette(mask, camera=camera, world_from_camera=pose, border=border))
+    return silhouettes
 
 
 def read(video: Path, camera: voodoo.Camera) -> tuple[list[np.ndarray], voodoo.Camera]:
@@ -130,7 +131,7 @@ def read(video: Path, camera: voodoo.Camera) -> tuple[list[np.ndarray], voodoo.C
     while (found := capture.read())[0]:
         pictures.append(cv2.resize(found[1], None, fx=SCALE, fy=SCALE, interpolation=cv2.INTER_AREA))
     height, width = pictures[0].shape[:2]
-    # Integer coordinates are pixel centres.
+    # Integer coordinates are pixel centers.
     cx, cy = (SCALE * (value + 0.5) - 0.5 for value in (camera.cx, camera.cy))
     return pictures, voodoo.Camera(width, height, SCALE * camera.fx, SCALE * camera.fy, cx, cy, camera.distortion)
 

@@ -80,11 +80,11 @@ def main() -> None:
                 fastest[index] = min(fastest[index], time.perf_counter() - began)
         best, steps = fastest.sum(), sum(some.steps.sum() for some in found)
         took.append(1e6 * best / count)
-        tried, looked = (sum(getattr(some, name).sum() for some in found) / count for name in ("tried", "looked"))
-        looks.append(looked)
+        tried, checked = (sum(getattr(some, name).sum() for some in found) / count for name in ("tried", "looked"))
+        looks.append(checked)
         reached = np.linalg.norm(np.concatenate([some.joints[:, 0] for some in found]) - goals[:, 0], axis=1) < 1e-4
         print(
-            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {tried:.1f} | {looked:.1f} | "
+            f"| {views} | {count / best:.0f} | {1e6 * best / count:.1f} | {steps / count:.1f} | {tried:.1f} | {checked:.1f} | "
             f"{1e6 * best / steps:.2f} | "
             f"{100 * reached.mean():.1f} % |"
         )

@@ -24,7 +24,7 @@ import voodoo
 from voodoo import ik
 from voodoo.model.projection import CameraView, body_mask
 from voodoo.recordings import DepthImage
-from voodoo.sensors.depth import metres
+from voodoo.sensors.depth import meters
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
@@ -63,8 +63,8 @@ class Rendered:
         depth = self.depths[frame]
         known = {name: self.truth[name][frame] for name in KNOWN}
         mask = from_depth(depth, {**known, **last}, scene=self.scene)
-        seen = metres(depth) if deep else None
-        return ik.Silhouette(mask, camera=depth.camera, world_from_camera=depth.root_from_sensor, depth=seen)
+        observed = meters(depth) if deep else None
+        return ik.Silhouette(mask, camera=depth.camera, world_from_camera=depth.root_from_sensor, depth=observed)
 
     def solve(self, views: int, *, deep: bool = False, **options: Any) -> dict[str, np.ndarray]:
         """Positions (F, 3) of elbows and knees with so many views; `deep`: the first one with its depths; options of
@@ -133,12 +133,12 @@ def picture(
     mask = np.where(image.distance[..., None] < 0.0, 255, 90).astype(np.uint8).repeat(3, axis=2)
     canvas = cv2.resize(mask, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
     view = CameraView(image.camera, pose)
-    for colour, width, middle in zip(((0, 160, 0), (0, 0, 230), (230, 60, 0)), (4, 2, 2), joints, strict=True):
+    for color, width, middle in zip(((0, 160, 0), (0, 0, 230), (230, 60, 0)), (4, 2, 2), joints, strict=True):
         for joint, (_, first, last) in LIMBS.items():
             line, _ = view.project(np.stack([known[first], middle[joint], known[last]]))
             if np.isfinite(line).all():
                 points = np.rint(2.0 * line + 0.5).astype(np.int32)
-                cv2.polylines(canvas, [points], False, colour, width, cv2.LINE_AA)
+                cv2.polylines(canvas, [points], False, color, width, cv2.LINE_AA)
     return canvas
 
 

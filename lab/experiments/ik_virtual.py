@@ -3,7 +3,7 @@ images.
 
     python lab/experiments/ik_virtual.py [--out DIR]
 
-Writes experiment_1.png, _2.png and _3.png: above without, below with the image constraint; grey the start, red the
+Writes experiment_1.png, _2.png and _3.png: above without, below with the image constraint; gray the start, red the
 chain, blue the end point it shall reach, white (experiment 3: black) the silhouette it shall lie in (the object it shall avoid).
 """
 
@@ -109,9 +109,9 @@ def picture(chain: ik.Chain, experiment: Experiment, angles: np.ndarray, words: 
         canvas = np.where(experiment.mask[..., None] != 0, 255, 110).astype(np.uint8).repeat(3, axis=2)
     big = cv2.resize(canvas, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
 
-    def line(angles: np.ndarray, colour: tuple[int, int, int], width: int) -> np.ndarray:
+    def line(angles: np.ndarray, color: tuple[int, int, int], width: int) -> np.ndarray:
         points = np.rint(2.0 * pixels(chain, angles) + 0.5).astype(np.int32)
-        cv2.polylines(big, [points], False, colour, width, cv2.LINE_AA)
+        cv2.polylines(big, [points], False, color, width, cv2.LINE_AA)
         return points
 
     line(experiment.start, (170, 170, 170), 3)

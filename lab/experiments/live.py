@@ -68,7 +68,7 @@ class TooFast(Source):
         pass
 
 
-def watched(session: Session, seconds: float) -> dict[str, object]:
+def observed(session: Session, seconds: float) -> dict[str, object]:
     """Let a session run; its report, with memory."""
     began, settled = time.monotonic(), None
     while session.wait(0.2) and time.monotonic() - began < seconds:
@@ -76,10 +76,10 @@ def watched(session: Session, seconds: float) -> dict[str, object]:
             settled = memory_mb()
     ended = memory_mb()
     session.finish()
-    return shown(session.report()) | {"memory_mb": [round(settled or ended, 1), round(ended, 1)]}
+    return displayed(session.report()) | {"memory_mb": [round(settled or ended, 1), round(ended, 1)]}
 
 
-def shown(report: dict[str, object]) -> dict[str, object]:
+def displayed(report: dict[str, object]) -> dict[str, object]:
     names = ("rate_hz", "latency_ms", "tracking_ms", "received", "published", "dropped", "refused", "faults")
     return {name: report[name] for name in names}
 
@@ -91,17 +91,17 @@ def realsense(rate: float, seconds: float) -> dict[str, object]:
     with Live([RealSenseSource(device=camera.device, rate=int(rate))]) as live:
         session = Session(live, follower)
         with camera:
-            return watched(session, seconds)
+            return observed(session, seconds)
 
 
 def overload(seconds: float) -> dict[str, object]:
     images = pictures()
     with Live([TooFast(30.0, images)]) as live:
         session = Session(live, follower)
-        usual = watched(session, 5.0)
+        usual = observed(session, 5.0)
     rate = 4.0 / (1e-3 * usual["tracking_ms"]["p50"])
     with Live([TooFast(rate, images)]) as live:
-        return {"source_hz": rate} | watched(Session(live, follower), seconds)
+        return {"source_hz": rate} | observed(Session(live, follower), seconds)
 
 
 def ros2(peer: str, rate: float, seconds: float, queue: int) -> dict[str, object]:
@@ -135,7 +135,7 @@ def ros2(peer: str, rate: float, seconds: float, queue: int) -> dict[str, object
     ours.wait()
     latency = 1e3 * np.array([seconds for _, seconds in answer["states"]])
     tenth = max(len(latency) // 10, 1)
-    return shown(json.loads(report.read_text(encoding="utf-8"))) | {
+    return displayed(json.loads(report.read_text(encoding="utf-8"))) | {
         "sent": len(answer["sent"]),
         "skeletons_back": len(answer["states"]),
         "end_to_end_ms": {"p50": float(np.percentile(latency, 50)), "p99": float(np.percentile(latency, 99))},

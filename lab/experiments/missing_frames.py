@@ -2,8 +2,8 @@
 
     python lab/experiments/missing_frames.py RECORDINGS... [--every 12]
 
-Of every recording one frame at a time is missing, or has depths that are up to a millimetre off, or one pixel that is a
-millimetre off. Compared are the joints of every frame from 0.2 s after it on with those of the recording as it is. Prints a line
+Of every recording one frame at a time is missing, or has depths that are up to a millimeter off, or one pixel that is a
+millimeter off. Compared are the joints of every frame from 0.2 s after it on with those of the recording as it is. Prints a line
 a kind: mean, 99 % and greatest distance, share of joints within 5 mm and of poses
 whose joints are in the mean, and how far both are from the recording's exact truth.
 """
@@ -71,11 +71,11 @@ def changed(frame: RecordedFrame, kind: str) -> list[RecordedFrame]:
     for item in frame.measurements:
         if isinstance(item, DepthImage):
             image = item.image.astype(np.int64)
-            millimetre = max(round(0.001 / item.metres_per_unit), 1)
+            millimeter = max(round(0.001 / item.meters_per_unit), 1)
             if kind == "noise":
-                image = np.where(image > 0, image + millimetre * rng.integers(-1, 2, image.shape), 0)
+                image = np.where(image > 0, image + millimeter * rng.integers(-1, 2, image.shape), 0)
             else:
-                image[image.shape[0] // 2, image.shape[1] // 2] += millimetre
+                image[image.shape[0] // 2, image.shape[1] // 2] += millimeter
             item = replace(item, image=image.astype(item.image.dtype))
         items.append(item)
     return [RecordedFrame(frame.stamp, tuple(items))]

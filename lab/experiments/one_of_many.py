@@ -131,7 +131,7 @@ def stretches(flags: np.ndarray) -> list[slice]:
 
 
 def cm(errors: np.ndarray) -> str:
-    """Their mean in centimetres, nothing without any."""
+    """Their mean in centimeters, nothing without any."""
     mean = metrics.mean_or_nan(errors)
     return f"{100.0 * mean:.1f}" if np.isfinite(mean) else ""
 

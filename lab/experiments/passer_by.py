@@ -2,7 +2,7 @@
 
     python lab/experiments/passer_by.py D/rendered/dev_0*
 
-A made-up body walks by 0.8 m in front of the person, in depth and colour, and the person is tracked from the recording's own
+A made-up body walks by 0.8 m in front of the person, in depth and color, and the person is tracked from the recording's own
 start by one tracker, and found by `voodoo.People`. For the frames in which the passer-by is in the scene: those in which the
 root of the estimate is farther than 0.5 m from the person and the status is `tracking`, those in which it is that far at all,
 the greatest distance, and those without a pose. The id of the person is the one that is near them most often.

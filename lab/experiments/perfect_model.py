@@ -4,7 +4,7 @@
 
 Ten limbs, 25 moving freedoms, 640x480, noise 4 mm at 2.4 m, a wall behind; at 1, 3, 6 and 10 times the base speed. Then the
 same with a model that is 10 % too thick and 5 % too long. Writes table.md, errors.png (over time) and worst.png (the frame in
-which each speed is farthest off: truth, estimate over the image). Errors are of twelve joints, millimetres, at lag 0.
+which each speed is farthest off: truth, estimate over the image). Errors are of twelve joints, millimeters, at lag 0.
 """
 
 import argparse
@@ -95,13 +95,13 @@ def pose_floor(sequence: VirtualSequence, body: voodoo.Body) -> float:
 
 def picture(run: Run, sequence: VirtualSequence, title: str) -> np.ndarray:
     frame, estimate, body = run.worst
-    seen = voodoo.render_depth(
+    observed = voodoo.render_depth(
         sequence.body, frame.world_from_limb, camera=sequence.camera, world_from_sensor=sequence.world_from_sensor
     )
     near, far = 1.6, 3.7
     gray = np.clip(255.0 * (far - frame.image * 0.001) / (far - near), 0, 255).astype(np.uint8)
-    truth = cv2.applyColorMap(((seen.limb + 1) * 23).astype(np.uint8), cv2.COLORMAP_TURBO)
-    truth = (truth * (0.3 + 0.7 * gray[..., None] / 255.0) * (seen.limb >= 0)[..., None]).astype(np.uint8)
+    truth = cv2.applyColorMap(((observed.limb + 1) * 23).astype(np.uint8), cv2.COLORMAP_TURBO)
+    truth = (truth * (0.3 + 0.7 * gray[..., None] / 255.0) * (observed.limb >= 0)[..., None]).astype(np.uint8)
     canvas = cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR)
     draw_body(canvas, body, estimate, CameraView(sequence.camera, sequence.world_from_sensor, 1))
     both = np.hstack([truth, canvas])

@@ -57,28 +57,28 @@ class Judged:
 
 
 def net(ends, shape, depth, others, camera, cut_out):
-    """What speaks for a limb between two points (camera frame, metres), less what speaks against it; at most 1."""
+    """What speaks for a limb between two points (camera frame, meters), less what speaks against it; at most 1."""
     axis = ends[1] - ends[0]
     along = axis / np.linalg.norm(axis)
     total = 0.0
     for t in ALONG:
-        centre = ends[0] + t * axis
+        center = ends[0] + t * axis
         radius = (1.0 - t) * (shape.a0 + shape.b0) / 2 + t * (shape.a1 + shape.b1) / 2
-        ahead = -centre + (centre @ along) * along
+        ahead = -center + (center @ along) * along
         if np.linalg.norm(ahead) < 1e-6:
             continue
         ahead /= np.linalg.norm(ahead)
         for s in ACROSS:
-            place = centre + radius * (ahead * np.sqrt(1.0 - s * s) + np.cross(along, ahead) * s)
+            place = center + radius * (ahead * np.sqrt(1.0 - s * s) + np.cross(along, ahead) * s)
             column, row = np.rint(camera.project(place[None])[0]).astype(int)
             if not (0 <= column < camera.width and 0 <= row < camera.height):
                 continue
-            seen, other = depth[row, column], others[row, column]
-            if (other > 0.0 and other < place[2] - BEFORE_M) or (seen <= 0.0 and not cut_out):
+            observed, other = depth[row, column], others[row, column]
+            if (other > 0.0 and other < place[2] - BEFORE_M) or (observed <= 0.0 and not cut_out):
                 continue
-            if seen <= 0.0 or seen > place[2] + PAST_M:
+            if observed <= 0.0 or observed > place[2] + PAST_M:
                 total -= t
-            elif abs(seen - place[2]) < NEAR_M and not (other > 0.0 and abs(other - seen) < NEAR_M):
+            elif abs(observed - place[2]) < NEAR_M and not (other > 0.0 and abs(other - observed) < NEAR_M):
                 total += t
     return total / (sum(ALONG) * len(ACROSS))
 
@@ -108,8 +108,8 @@ def limb_nets(limb, both, body, cut):
     """What speaks for a limb (net) between each of two pairs of joints, world frame."""
     shape = body.limbs[body.limb_names.index(limb)].shape
     camera_from_root, depth, others, camera, cut_out = cut
-    seen = [points @ camera_from_root[:3, :3].T + camera_from_root[:3, 3] for points in both]
-    return np.array([net(ends, shape, depth, others, camera, cut_out) for ends in seen])
+    observed = [points @ camera_from_root[:3, :3].T + camera_from_root[:3, 3] for points in both]
+    return np.array([net(ends, shape, depth, others, camera, cut_out) for ends in observed])
 
 
 def judged(recording, by):
@@ -127,7 +127,7 @@ def judged(recording, by):
     cut_out = select_by(recording) == "segmented"
     for (step, body), mine, other, error in zip(steps, estimated, reference, errors, strict=True):
         image = next(item for item in step.recorded.measurements if isinstance(item, DepthImage))
-        depth = image.image * image.metres_per_unit
+        depth = image.image * image.meters_per_unit
         camera_from_root = np.linalg.inv(image.root_from_sensor)
         for side, kind in itertools.product("lr", CHAINS):
             joints = [metrics.JOINTS.index(f"{side}_{name}") for name in CHAINS[kind]]
@@ -167,7 +167,7 @@ def main() -> None:
     parser.add_argument("--offsets", action="store_true", help="without each joint's constant offset")
     options = parser.parse_args()
     by = Judged(options.bones, options.consistent, options.whole, options.offsets)
-    found, told = Counter(), Counter()
+    found, message = Counter(), Counter()
     for path in options.recordings:
         recording = voodoo.open_recording(path)
         if recording.reference is None:
@@ -175,19 +175,19 @@ def main() -> None:
         for winner, error, measured in judged(recording, by):
             for limit in (0.10, 0.15, 0.20):
                 found[winner, limit] += error > limit
-                told[winner, limit] += error > limit and not measured
+                message[winner, limit] += error > limit and not measured
     print("| off by more than | " + " | ".join(f"{name} explains the depth better" for name in GROUPS) + " | all |")
     print("|---|" + "---|" * (len(GROUPS) + 1))
     for limit in (0.10, 0.15, 0.20):
-        total, all_told = (sum(counts[name, limit] for name in GROUPS) for counts in (found, told))
+        total, all_reported = (sum(counts[name, limit] for name in GROUPS) for counts in (found, message))
         cells = [
-            f"{share(found[name, limit], total)}, told {share(told[name, limit], found[name, limit])}"
+            f"{fraction(found[name, limit], total)}, told {fraction(message[name, limit], found[name, limit])}"
             for name in GROUPS
         ]
-        print(f"| {100 * limit:.0f} cm | " + " | ".join(cells) + f" | {total}, told {share(all_told, total)} |")
+        print(f"| {100 * limit:.0f} cm | " + " | ".join(cells) + f" | {total}, told {fraction(all_reported, total)} |")
 
 
-def share(part: int, whole: int) -> str:
+def fraction(part: int, whole: int) -> str:
     return f"{100 * part / whole:.0f} %" if whole else "-"
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import voodoo
 
-METRES_PER_UNIT = 0.001
+METERS_PER_UNIT = 0.001
 RATE_HZ = 30.0
 FAR_M = 60.0
 """Farther than every wall."""
@@ -36,15 +36,15 @@ class Sensor:
     flying: float
 
     def image(self, depth: np.ndarray, chance: np.random.Generator) -> np.ndarray:
-        """What it measures of exact depths (H, W) [m]: (H, W) uint16 in METRES_PER_UNIT."""
-        seen = depth + self.sigma(depth) * chance.standard_normal(depth.shape)
+        """What it measures of exact depths (H, W) [m]: (H, W) uint16 in METERS_PER_UNIT."""
+        observed = depth + self.sigma(depth) * chance.standard_normal(depth.shape)
         beside = np.roll(depth, 1, axis=1)
         edge = np.abs(depth - beside) > np.maximum(0.06, 0.04 * depth)
         mixed = edge & (chance.random(depth.shape) < self.flying)
-        share = chance.random(depth.shape)
-        seen = np.where(mixed, share * depth + (1.0 - share) * beside, seen)
-        gone = (seen < self.reach[0]) | (seen > self.reach[1]) | (chance.random(depth.shape) < 0.004)
-        return np.where(gone, 0.0, np.rint(seen / METRES_PER_UNIT)).astype(np.uint16)
+        fraction = chance.random(depth.shape)
+        observed = np.where(mixed, fraction * depth + (1.0 - fraction) * beside, observed)
+        gone = (observed < self.reach[0]) | (observed > self.reach[1]) | (chance.random(depth.shape) < 0.004)
+        return np.where(gone, 0.0, np.rint(observed / METERS_PER_UNIT)).astype(np.uint16)
 
 
 SENSORS = (
@@ -148,7 +148,7 @@ class Room:
             frame.add_depth(
                 self.sensor.image(self.depth, chance),
                 camera=self.sensor.camera,
-                metres_per_unit=METRES_PER_UNIT,
+                meters_per_unit=METERS_PER_UNIT,
                 world_from_sensor=self.world_from_sensor,
             )
             if floor_known:

@@ -205,9 +205,9 @@ def main() -> None:
     (arguments.out / "table.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     names = Chain(body).angle_names[6:]
-    shown = [name for name in ("l_elbow_flexion", "r_shoulder_rx", "l_knee_flexion") if name in names]
-    figure, axes = plt.subplots(len(shown), 1, figsize=(9.0, 7.0), sharex=True, layout="constrained")
-    for row, name in zip(axes, shown, strict=True):
+    displayed = [name for name in ("l_elbow_flexion", "r_shoulder_rx", "l_knee_flexion") if name in names]
+    figure, axes = plt.subplots(len(displayed), 1, figsize=(9.0, 7.0), sharex=True, layout="constrained")
+    for row, name in zip(axes, displayed, strict=True):
         column = names.index(name)
         for strength, color, word in ((STRENGTHS[0], "#c8553d", "without"), (0.25, "#222222", "with penalty")):
             run = drawn[strength]

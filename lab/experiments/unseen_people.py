@@ -56,7 +56,7 @@ MIDDLE = np.linspace(0.3, 0.7, 5)
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What one recording gave; metres.
+    """What one recording gave; meters.
 
     Args:
         name: of the recording.
@@ -75,7 +75,7 @@ class Result:
     mean: float
     tracking_class: int
     lost: tuple[str, ...]
-    exchanged: tuple[bool, bool]
+    swapped: tuple[bool, bool]
     lengths: np.ndarray
     girths: np.ndarray
     about: dict[str, object] = field(default_factory=dict)
@@ -102,20 +102,20 @@ def run(path: Path, init: str) -> Result:
         known = [estimate.joints[name] for name in metrics.JOINTS] if there else np.full((12, 3), np.nan)
         places.append([np.array(known), np.where(inside_image(image, truth)[:, None], truth, np.nan), truth])
         sizes.append((lengths_of(np.array(known)), girths_of(tracker.body) if there else np.full(8, np.nan)))
-    joints, seen, truths = np.array(places).transpose(1, 0, 2, 3)
+    joints, observed, truths = np.array(places).transpose(1, 0, 2, 3)
     time = np.array(stamps)
-    errors = metrics.joint_errors(joints, seen)
-    missed = np.array([not there for there in posed])[:, None] & np.isfinite(seen).all(axis=2)
+    errors = metrics.joint_errors(joints, observed)
+    missed = np.array([not there for there in posed])[:, None] & np.isfinite(observed).all(axis=2)
     class_, lost = metrics.tracking_class(np.where(missed, NOWHERE_M, errors), time, limit=LIMIT_EXACT_M)
     at_end = [
         bool(row.any()) and bool(lost[np.flatnonzero(row)[-1], index])
-        for index, row in enumerate(np.isfinite(seen).all(axis=2).T)
+        for index, row in enumerate(np.isfinite(observed).all(axis=2).T)
     ]
     true_lengths = np.median([lengths_of(row) for row in truths], axis=0)
     radii = about.get("radii_m", {})
     true_girths = np.array([radii.get(f"{side}_{bone}", np.nan) for bone in BONES for side in "lr"])
     found = np.flatnonzero(posed)
-    came = int(np.argmax(np.isfinite(seen).all(axis=2).sum(axis=1) >= ENOUGH))
+    came = int(np.argmax(np.isfinite(observed).all(axis=2).sum(axis=1) >= ENOUGH))
     begin = int(found[0]) if len(found) else None
     at = [0, 0, 0] if begin is None else [begin, int(np.searchsorted(time, time[begin] + SECOND_S)), int(found[-1])]
     off = [np.array([sizes[min(index, len(sizes) - 1)][which] for index in at]) for which in (0, 1)]
@@ -127,7 +127,7 @@ def run(path: Path, init: str) -> Result:
         metrics.mean_or_nan(errors),
         int(class_ or 0),
         tuple(name for name, is_lost in zip(metrics.JOINTS, at_end, strict=True) if is_lost),
-        (exchanged(joints[at[0]], truths[at[0]]), exchanged(joints[later], truths[later])),
+        (swapped(joints[at[0]], truths[at[0]]), swapped(joints[later], truths[later])),
         off[0] - true_lengths,
         off[1] - true_girths,
         about,
@@ -162,14 +162,14 @@ def mean_radius(shape: voodoo.TaperedEllipticCylinder) -> float:
     return float(np.hypot(a * np.cos(angle), b * np.sin(angle)).mean())
 
 
-def exchanged(joints: np.ndarray, truth: np.ndarray) -> bool:
+def swapped(joints: np.ndarray, truth: np.ndarray) -> bool:
     """Whether shoulders and hips (12, 3) lie nearer to the truth's opposite ones than to their own."""
     own = sum(np.linalg.norm(joints[[left, right]] - truth[[left, right]], axis=1).sum() for left, right in PAIRS)
     other = sum(np.linalg.norm(joints[[left, right]] - truth[[right, left]], axis=1).sum() for left, right in PAIRS)
     return bool(other < own)
 
 
-def centimetres(value: float) -> str:
+def centimeters(value: float) -> str:
     """A number of a table."""
     return "-" if np.isnan(value) else f"{100.0 * value:.1f}"
 
@@ -178,14 +178,14 @@ def cells(results: Sequence[Result]) -> list[str]:
     """What a group of recordings gave, without its name."""
     late = sum(result.frame is None or result.frame > IN_TIME for result in results)
     firsts, means = (np.array([getattr(result, what) for result in results]) for what in ("first", "mean"))
-    turned = [sum(result.exchanged[when] for result in results) for when in (0, 1)]
+    turned = [sum(result.swapped[when] for result in results) for when in (0, 1)]
     lost = sum(result.tracking_class == 0 for result in results)
     classes = np.mean([result.tracking_class for result in results])
     return [
         f"{len(results)}",
         f"{late}",
-        centimetres(metrics.mean_or_nan(firsts)),
-        centimetres(metrics.mean_or_nan(means)),
+        centimeters(metrics.mean_or_nan(firsts)),
+        centimeters(metrics.mean_or_nan(means)),
         f"{turned[0]}; {turned[1]}",
         f"{lost}",
         f"{classes:.2f}",
@@ -209,7 +209,7 @@ def sizes_table(results: Sequence[Result]) -> None:
             part = errors if bone == "all" else errors[:, :, 2 * number : 2 * number + 2]
             row = [part[:, when] for when in range(len(WHEN))]
             numbers = [
-                f"{centimetres(metrics.mean_or_nan(np.abs(one)))} ({100.0 * metrics.mean_or_nan(one):+.1f})"
+                f"{centimeters(metrics.mean_or_nan(np.abs(one)))} ({100.0 * metrics.mean_or_nan(one):+.1f})"
                 for one in row
             ]
             if np.isfinite(part).any():
@@ -233,17 +233,17 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|")
     for result in results:
         sizes = [
-            " ".join(centimetres(metrics.mean_or_nan(np.abs(row))) for row in which)
+            " ".join(centimeters(metrics.mean_or_nan(np.abs(row))) for row in which)
             for which in (result.lengths, result.girths)
         ]
-        turned = " ".join("yes" if one else "no" for one in result.exchanged)
+        turned = " ".join("yes" if one else "no" for one in result.swapped)
         lost = ", ".join(result.lost) or "none"
         start = f"{result.frame or 'never'}"
         values = [
             result.name,
             start,
-            centimetres(result.first),
-            centimetres(result.mean),
+            centimeters(result.first),
+            centimeters(result.mean),
             turned,
             lost,
             f"{result.tracking_class}",

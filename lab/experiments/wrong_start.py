@@ -38,7 +38,7 @@ SOON_S = 0.3
 TURNS_DEG = (90.0, 180.0)
 MOVES_M = (0.2, 0.4, 0.6, 1.0)
 CASES = [(turn, 0.0) for turn in TURNS_DEG] + [(0.0, move) for move in MOVES_M]
-"""Degrees and metres."""
+"""Degrees and meters."""
 
 
 def words(turn: float, move: float) -> str:
@@ -54,7 +54,7 @@ def up_of(recording: Recording) -> np.ndarray:
 def disturbed(
     joints: dict[str, np.ndarray], turn: float, move: float, up: np.ndarray, angle: float
 ) -> dict[str, np.ndarray]:
-    """The joints turned about the vertical through the root by `turn` degrees, and moved by `move` metres in the level
+    """The joints turned about the vertical through the root by `turn` degrees, and moved by `move` meters in the level
     direction that an angle [rad] says."""
     root = joints["humanoid_root"]
     a = np.radians(turn)
@@ -97,7 +97,7 @@ def is_right(wrong: np.ndarray, right: np.ndarray, least: float) -> np.ndarray:
     return wrong <= np.maximum(least, FACTOR * right)
 
 
-def told(good: np.ndarray, called: np.ndarray, stamps: np.ndarray) -> tuple[bool, int, int]:
+def reported_counts(good: np.ndarray, called: np.ndarray, stamps: np.ndarray) -> tuple[bool, int, int]:
     """Whether within SOON_S a frame is right or not called "tracking"; of the wrong frames after that how many are called so, and
     how many there are."""
     soon = stamps - stamps[0] <= SOON_S + 1e-6
@@ -106,7 +106,7 @@ def told(good: np.ndarray, called: np.ndarray, stamps: np.ndarray) -> tuple[bool
 
 
 def seconds_until_right(wrong: np.ndarray, right: np.ndarray, stamps: np.ndarray, least: float = RIGHT_M) -> float:
-    """Seconds from the first frame to the first from which on the errors (F,) are small enough: `least` metres always are.
+    """Seconds from the first frame to the first from which on the errors (F,) are small enough: `least` meters always are.
     Infinite without one."""
     good = is_right(wrong, right, least)
     if not good[-1]:
@@ -128,11 +128,11 @@ def run(path: Path, at: Sequence[float], seed: int) -> tuple[list[list[float]], 
     body = voodoo.Body.human() if height is None else voodoo.Body.human(height)
     chance = np.random.default_rng(seed)
     times: list[list[float]] = [[] for _ in CASES]
-    said: list[list[tuple[bool, int, int]]] = [[] for _ in CASES]
+    reported: list[list[tuple[bool, int, int]]] = [[] for _ in CASES]
     left_out = 0
-    for share in at:
+    for fraction in at:
         angles = chance.uniform(0.0, 2.0 * np.pi, len(CASES))
-        first = round(share * (len(frames) - 1))
+        first = round(fraction * (len(frames) - 1))
         part = slice(first, int(np.searchsorted(stamps, stamps[first] + WINDOW_S)))
         there = reference.positions[np.argmin(np.abs(reference.stamps - stamps[first]))]
         joints = {
@@ -144,30 +144,30 @@ def run(path: Path, at: Sequence[float], seed: int) -> tuple[list[list[float]], 
         if right.mean() > RIGHT_M or len(right) < 2:
             left_out += 1
             continue
-        for times_of, said_of, (turn, move), angle in zip(times, said, CASES, angles, strict=True):
+        for times_of, reported_of, (turn, move), angle in zip(times, reported, CASES, angles, strict=True):
             start = disturbed(joints, turn, move, up_of(recording), angle)
             wrong, called = errors(recording, frames[part], start, body)
             least = RIGHT_M if reference.exact else RIGHT_OF_SKELETON_M
             times_of.append(seconds_until_right(wrong, right, stamps[part], least))
-            said_of.append(told(is_right(wrong, right, least), called, stamps[part]))
-    return times, said, left_out
+            reported_of.append(reported_counts(is_right(wrong, right, least), called, stamps[part]))
+    return times, reported, left_out
 
 
-def row(what: str, times: Sequence[float], said: Sequence[tuple[bool, int, int]]) -> str:
+def row(what: str, times: Sequence[float], reported: Sequence[tuple[bool, int, int]]) -> str:
     """A line of the table."""
     seconds = np.array(times)
     median = float(np.median(seconds)) if len(seconds) else float("nan")
-    shares = (
+    fractions = (
         [f"{100.0 * np.mean(seconds <= within + 1e-6):.0f} %" for within in (0.3, 1.0)] if len(seconds) else ["", ""]
     )
     never = int(np.isinf(seconds).sum())
-    soon = f"{100.0 * np.mean([one[0] for one in said]):.0f} %" if said else ""
-    called, wrong = sum(one[1] for one in said), sum(one[2] for one in said)
+    soon = f"{100.0 * np.mean([one[0] for one in reported]):.0f} %" if reported else ""
+    called, wrong = sum(one[1] for one in reported), sum(one[2] for one in reported)
     late = f"{100.0 * called / wrong:.0f} % of {wrong}" if wrong else "none"
     cells = [
         what,
         f"{median:.2f}" if np.isfinite(median) else "never",
-        *shares,
+        *fractions,
         f"{never}",
         f"{len(seconds)}",
         soon,
@@ -184,24 +184,28 @@ def main() -> None:
     )
     parser.add_argument("--every", type=int, default=1, help="use every n-th recording (default 1)")
     options = parser.parse_args()
-    if options.every < 1 or not all(0.0 <= share < 1.0 for share in options.at):
+    if options.every < 1 or not all(0.0 <= fraction < 1.0 for fraction in options.at):
         parser.error(f"--every, --at: expected at least 1 and shares in [0, 1), found {options.every} and {options.at}")
     all_times: list[list[float]] = [[] for _ in CASES]
-    all_said: list[list[tuple[bool, int, int]]] = [[] for _ in CASES]
+    all_reported: list[list[tuple[bool, int, int]]] = [[] for _ in CASES]
     left_out = 0
     for seed, path in enumerate(find_recordings(options.recordings)[:: options.every]):
-        times, said, out = run(path, options.at, seed)
+        times, reported, out = run(path, options.at, seed)
         left_out += out
         for index in range(len(CASES)):
             all_times[index] += times[index]
-            all_said[index] += said[index]
+            all_reported[index] += reported[index]
     print(
         "| start | right again after, s (median) | within 0.3 s | within 1 s | never | runs | right or said within 0.3 s "
         "| later wrong frames called tracking |\n|---|---|---|---|---|---|---|---|"
     )
-    for (turn, move), times, said in zip(CASES, all_times, all_said, strict=True):
-        print(row(words(turn, move), times, said))
-    print(row("all", [one for times in all_times for one in times], [one for said in all_said for one in said]))
+    for (turn, move), times, reported in zip(CASES, all_times, all_reported, strict=True):
+        print(row(words(turn, move), times, reported))
+    print(
+        row(
+            "all", [one for times in all_times for one in times], [one for reported in all_reported for one in reported]
+        )
+    )
     print(f"\nstarts left out, since the right one goes wrong: {left_out}")
 
 

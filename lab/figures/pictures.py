@@ -15,7 +15,7 @@ from voodoo.recordings import open_recording, sample_path
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.sheet import contact_sheet
 
-SHOWN = (0, 18, 53, 71)
+PICTURED = (0, 18, 53, 71)
 """Frames of the bundled recording in docs/demo.png."""
 WIDTH = 1068
 """Of docs/demo.png [px]."""
@@ -36,9 +36,9 @@ def _demo(target: Path) -> None:
     recording = open_recording(sample_path())
     tracker, overlay, tiles = start_tracker(recording), Overlay(recording), []
     for frame in track(recording, tracker):
-        if frame.index in SHOWN:
-            shown = overlay.draw(
+        if frame.index in PICTURED:
+            displayed = overlay.draw(
                 frame.recorded, tracker.body, frame.estimate, index=frame.index, front_end=frame.front_end
             )
-            tiles.append(shown.copy())
+            tiles.append(displayed.copy())
     cv2.imwrite(str(target), contact_sheet(tiles, columns=2, width=WIDTH))

@@ -152,8 +152,8 @@ def main() -> None:
         goal[6:] = middle + rng.uniform(-0.15, 0.15, n - 6)
         start[6:] = middle
         goal[:6] = rng.uniform(-0.1, 0.1, 6)
-        wanted = chain.forward(goal)[1]
-        problems.append((start, np.stack([wanted[site] for site in SITES])))
+        expected = chain.forward(goal)[1]
+        problems.append((start, np.stack([expected[site] for site in SITES])))
     # All postures by one, then all by the other, several times; the fastest of each, so that what else the machine does counts
     # for neither.
     rounds = []

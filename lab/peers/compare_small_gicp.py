@@ -6,7 +6,7 @@ The scene is a torso-sized tapered cylinder, seen as noisy points, displaced by 
 
 What each does in an iteration, for every point:
   voodoo      closest point and normal on the analytic surface (SIMD), box test, gate, moments for the orientation
-  small_gicp  nearest neighbour in a k-d tree over a sampled surface with estimated normals, gate, 6x6 point-to-plane
+  small_gicp  nearest neighbor in a k-d tree over a sampled surface with estimated normals, gate, 6x6 point-to-plane
               accumulation, and at least one evaluation of the error (Levenberg-Marquardt)
 Building the tree and estimating normals is left out: small_gicp does it once for a target that stays rigid.
 The cost of an iteration is the difference between runs of many and of few iterations, the median of several.

@@ -47,7 +47,7 @@ def test_a_lost_joint_is_named(disturbed, monkeypatch):
 
         def __init__(self, body):
             blind = voodoo.Config(
-                gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, outline=False
+                gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, depth_contour=False
             )
             super().__init__(body, config=blind)
 

@@ -24,7 +24,9 @@ def test_only_what_is_lost_gets_a_picture(monkeypatch):
 
     def blind(recording, **how):
         """A tracker whose body cannot move: it stays where it started."""
-        still = voodoo.Config(gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, outline=False)
+        still = voodoo.Config(
+            gate_start=0.001, gate_end=0.001, hypotheses=False, relocalization=False, depth_contour=False
+        )
         return running.start_tracker(recording, config=still, **how)
 
     monkeypatch.setattr(failures, "start_tracker", blind)

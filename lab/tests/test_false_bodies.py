@@ -43,7 +43,7 @@ def test_a_room_comes_from_its_seed(false_bodies):
     assert room.sensor is other.sensor and not np.array_equal(room.depth, other.depth)
     image = room.sensor.image(room.depth, np.random.default_rng(0))
     known = image > 0
-    noise = image[known] * false_bodies.rooms.METRES_PER_UNIT - room.depth[known]
+    noise = image[known] * false_bodies.rooms.METERS_PER_UNIT - room.depth[known]
     assert known.mean() > 0.8 and 0.01 < np.median(np.abs(noise)) < 0.03
     x, y = room.things[0][1:]
     assert room.nearest(x, y) == room.things[0][0]
@@ -52,13 +52,13 @@ def test_a_room_comes_from_its_seed(false_bodies):
 def test_the_table_counts_runs_of_frames_with_a_body(false_bodies, monkeypatch, capsys):
     """Four frames of every room: a body in the second and third; two of a recording, one left behind by a person."""
 
-    class Said:
+    class Reported:
         def __init__(self, status):
             self.status = status
             self.joints = {"humanoid_root": np.zeros(3)} if status != "searching" else {}
 
-    said = [Said(status) for status in ("searching", "tracking", "lost", "searching")]
-    monkeypatch.setattr(false_bodies, "stepped", lambda frames: said)
+    reported = [Reported(status) for status in ("searching", "tracking", "lost", "searching")]
+    monkeypatch.setattr(false_bodies, "stepped", lambda frames: reported)
     one_of_many = sys.modules["one_of_many"]
     stamps = np.arange(8) / 10.0
     truth = one_of_many.People(stamps, np.array([1]), np.zeros((8, 1)), np.zeros((8, 1, 3)), np.zeros((8, 1, 12, 3)))

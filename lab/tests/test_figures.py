@@ -20,15 +20,15 @@ def test_a_page_shows_the_figures_of_the_runs(page: Path):
 
 def test_a_number_that_a_hand_has_changed_is_found():
     text = PAGES[0].read_text(encoding="utf-8")
-    shown = f"{RUNS['rendered'].values['mean_cm']} cm mean joint error"
-    assert shown in text
-    assert updated(text.replace(shown, "1.1 cm mean joint error"), MACHINES, RUNS) == text
+    displayed = f"{RUNS['rendered'].values['mean_cm']} cm mean joint error"
+    assert displayed in text
+    assert updated(text.replace(displayed, "1.1 cm mean joint error"), MACHINES, RUNS) == text
 
 
-def test_every_block_is_shown_and_every_run_is_used():
+def test_every_block_is_displayed_and_every_run_is_used():
     blocks = {path.stem for path in (HERE / "blocks").glob("*.md")} | {"runs"}
-    shown = {name for page in PAGES for name, _ in BLOCK.findall(page.read_text(encoding="utf-8"))}
-    assert shown == blocks
+    displayed = {name for page in PAGES for name, _ in BLOCK.findall(page.read_text(encoding="utf-8"))}
+    assert displayed == blocks
     used = {run for path in (HERE / "blocks").glob("*.md") for run, *_ in VALUE.findall(path.read_text("utf-8"))}
     assert used == set(RUNS)
 
@@ -54,5 +54,5 @@ def test_commits_and_scripts_of_the_runs_are_there():
     ):
         pytest.skip("no history")
     for run in RUNS.values():
-        shown = subprocess.run([*git, "show", "-s", "--format=%as", run.commit], capture_output=True, text=True)
-        assert shown.stdout.strip() == run.date, f"{run.id}: {run.commit} {shown.stderr}"
+        displayed = subprocess.run([*git, "show", "-s", "--format=%as", run.commit], capture_output=True, text=True)
+        assert displayed.stdout.strip() == run.date, f"{run.id}: {run.commit} {displayed.stderr}"

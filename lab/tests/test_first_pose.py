@@ -35,14 +35,14 @@ def test_the_bundled_person_is_found_in_the_first_frames(first_pose, monkeypatch
     assert lines[-2:] == ["exchanged: none", "late: none"]
 
 
-def test_who_is_turned_about_or_mirrored_is_exchanged(first_pose):
+def test_who_is_turned_about_or_mirrored_is_swapped(first_pose):
     joints = standing()
     about = joints * (1.0, -1.0, 1.0)
-    assert not first_pose.exchanged(joints + 0.1, joints)
-    assert first_pose.exchanged(about, joints)
+    assert not first_pose.swapped(joints + 0.1, joints)
+    assert first_pose.swapped(about, joints)
 
 
-def test_late_starts_and_constant_offsets_are_told(first_pose):
+def test_late_starts_and_constant_offsets_are_reported(first_pose):
     """A skeleton whose hips are always 8 cm higher: no error once the offset is removed."""
     ours, theirs = standing(), standing()
     theirs[[JOINTS.index("l_hip"), JOINTS.index("r_hip")], 2] += 0.06

@@ -48,15 +48,15 @@ def test_images_halve_the_error_of_the_inner_joints(sequence, solved, name):
         view = CameraView(ik_tables.SIDE_CAMERA, sequence.side_pose(frame))
         for joint, (_, first, last) in ik_limbs.LIMBS.items():
             ends = np.stack([sequence.truth[site][frame] for site in (first, joint, last)])
-            along = np.concatenate([ends[:1] + (ends[1] - ends[0]) * share for share in (0.3, 0.6)]
-                                   + [ends[1:2] + (ends[2] - ends[1]) * share for share in (0.2, 0.5, 0.8)])  # fmt: skip
+            along = np.concatenate([ends[:1] + (ends[1] - ends[0]) * fraction for fraction in (0.3, 0.6)]
+                                   + [ends[1:2] + (ends[2] - ends[1]) * fraction for fraction in (0.2, 0.5, 0.8)])  # fmt: skip
             u, v = np.rint(view.project(along)[0]).astype(int).T
-            seen = (u >= 0) & (v >= 0) & (u < 320) & (v < 240)
-            assert (sequence.side[frame].distance[v[seen], u[seen]] < -1.0).all(), (frame, joint)
+            observed = (u >= 0) & (v >= 0) & (u < 320) & (v < 240)
+            assert (sequence.side[frame].distance[v[observed], u[observed]] < -1.0).all(), (frame, joint)
 
 
 @pytest.mark.parametrize("name", [pytest.param("dev_03_punch", marks=pytest.mark.long), "dev_07_sword_cmu"])
-def test_the_mean_posture_helps_where_one_view_does_not_tell(solved, name):
+def test_the_mean_posture_helps_where_one_view_does_not_report(solved, name):
     alone = solved(name, 1)
     plain, one, two = (solved(name, views, rest="mean") for views in (0, 1, 2))
     assert one.mean() < 0.9 * alone.mean() and (one < alone + 0.001).all()
@@ -67,7 +67,7 @@ def test_the_mean_posture_helps_where_one_view_does_not_tell(solved, name):
         assert one[1] - two[1] < 0.55 * (alone[1] - without[1]) and (one < 0.5 * plain).all()
 
 
-def test_depths_tell_of_arms_before_the_trunk(solved):
+def test_depths_report_of_arms_before_the_trunk(solved):
     outline, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
     assert deep[0] < 0.5 * outline[0] and deep[1] < outline[1] + 0.001
 

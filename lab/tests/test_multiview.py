@@ -1,4 +1,4 @@
-"""Recordings of colour cameras as lab.training.multiview makes them: what can be tracked, with the joints where they are seen."""
+"""Recordings of color cameras as lab.training.multiview makes them: what can be tracked, with the joints where they are seen."""
 
 import cv2
 import numpy as np
@@ -13,7 +13,7 @@ from voodoo.recordings import open_recording
 
 
 @pytest.mark.long
-def test_joints_lie_where_the_person_is_seen(voodoo_data, tmp_path):
+def test_joints_lie_where_the_person_is_visible(voodoo_data, tmp_path):
     if not (voodoo_data / "bodies").is_dir() or not (voodoo_data / "mocap").is_dir():
         pytest.skip(f"no bodies and mocap in {voodoo_data}")
     how = {"seed": 5, "clip": "06_12", "body": 7, "cameras": 2, "first": 60, "frames": 2}
@@ -26,7 +26,7 @@ def test_joints_lie_where_the_person_is_seen(voodoo_data, tmp_path):
         places = recording.reference.positions[index]
         for item, colored in zip(recorded.measurements, dressed[index].measurements, strict=True):
             pixels, _ = CameraView(item.camera, item.root_from_sensor, 1.0).project(places)
-            seen = cv2.cvtColor(item.image, cv2.COLOR_BGR2GRAY) > 128
+            observed = cv2.cvtColor(item.image, cv2.COLOR_BGR2GRAY) > 128
             columns, rows = np.rint(pixels).astype(int).T
-            assert seen[rows, columns].mean() > 0.9 and 0.01 < seen.mean() < 0.2
+            assert observed[rows, columns].mean() > 0.9 and 0.01 < observed.mean() < 0.2
             assert colored.image.std() > 10.0

@@ -69,7 +69,7 @@ def test_found_seated_gone_and_the_next_one_found(many):
     ]
 
 
-def test_a_root_belongs_to_the_nearest_person_within_half_a_metre(many):
+def test_a_root_belongs_to_the_nearest_person_within_half_a_meter(many):
     roots = np.array([[2.4, 0.0, 0.9], [2.6, 0.0, 0.9], [2.0, 1.0, 0.9], [np.nan] * 3])
     truth = made(many)
     four = many.People(

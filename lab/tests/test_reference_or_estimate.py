@@ -20,14 +20,14 @@ def scene(middle_m):
     return depth
 
 
-def test_a_limb_that_is_seen_alone_wins():
+def test_a_limb_that_is_visible_alone_wins():
     net = load_experiment("reference_or_estimate").net
-    seen = net(UPRIGHT, LIMB, scene(1.96), EMPTY, CAMERA, False)
+    observed = net(UPRIGHT, LIMB, scene(1.96), EMPTY, CAMERA, False)
     aside = net(UPRIGHT + [0.3, 0.0, 0.0], LIMB, scene(1.96), EMPTY, CAMERA, False)
-    assert seen > 0.9 and aside == pytest.approx(-1.0)
+    assert observed > 0.9 and aside == pytest.approx(-1.0)
 
 
-def test_what_another_limb_explains_or_hides_says_nothing():
+def test_what_another_limb_explains_or_hides_reports_nothing():
     net = load_experiment("reference_or_estimate").net
     assert net(UPRIGHT, LIMB, scene(1.96), scene(1.97), CAMERA, False) == 0.0
     assert net(UPRIGHT, LIMB, scene(1.5), scene(1.5), CAMERA, False) == 0.0

@@ -103,5 +103,5 @@ def test_a_recording_that_nothing_was_tuned_on_has_its_joints_inside_what_the_ca
         at = (truth[reference.names.index("humanoid_root")] - pose[:3, 3]) @ pose[:3, :3]
         u, v = round(camera.fx * at[0] / at[2] + camera.cx), round(camera.fy * at[1] / at[2] + camera.cy)
         if 0 <= u < camera.width and 0 <= v < camera.height and image.image[v, u]:
-            inside.append(at[2] - image.image[v, u] * image.metres_per_unit)
+            inside.append(at[2] - image.image[v, u] * image.meters_per_unit)
     assert len(inside) > 30 and -0.1 < np.median(inside) < 1.5  # hidden by furniture at most

@@ -44,7 +44,7 @@ def test_what_the_image_does_not_hold_is_not_judged(unseen):
 def test_the_bundled_recording_starts_at_once(unseen, monkeypatch, capsys):
     result = unseen.run(BUNDLED, "auto")
     assert result.frame == 1 and result.first < 0.05 and result.mean < 0.05 and result.lost == ()
-    assert result.exchanged == (False, False) and np.isnan(result.girths).all()
+    assert result.swapped == (False, False) and np.isnan(result.girths).all()
     assert result.lengths.shape == (3, 8) and np.abs(result.lengths).mean() < 0.03
     cells = unseen.cells([result])
     assert cells[:2] == ["1", "0"] and cells[4:6] == ["0; 0", "0"]

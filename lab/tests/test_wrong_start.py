@@ -47,7 +47,7 @@ def test_right_again_is_right_to_the_end(wrong):
 
 
 def test_the_table_has_a_row_for_every_disturbance(wrong, monkeypatch, capsys):
-    """Over two tenths of a second; a start that is one metre off is not right in its first frame by chance."""
+    """Over two tenths of a second; a start that is one meter off is not right in its first frame by chance."""
     monkeypatch.setattr(wrong, "WINDOW_S", 0.2)
     monkeypatch.setattr(wrong, "CASES", [(0.0, 0.0), (180.0, 0.0)])
     monkeypatch.setattr(sys, "argv", ["wrong_start.py", str(BUNDLED), "--at", "0.1"])
@@ -60,28 +60,28 @@ def test_the_table_has_a_row_for_every_disturbance(wrong, monkeypatch, capsys):
     assert lines[-1].endswith(": 0")
 
 
-def test_shares_count_runs_that_are_never_right(wrong):
-    said = [(True, 0, 0), (True, 0, 0), (True, 3, 10), (False, 1, 10)]
-    cells = [cell.strip() for cell in wrong.row("all", [0.1, 0.3, 0.9, np.inf], said).split("|")[1:-1]]
+def test_fractions_count_runs_that_are_never_right(wrong):
+    reported = [(True, 0, 0), (True, 0, 0), (True, 3, 10), (False, 1, 10)]
+    cells = [cell.strip() for cell in wrong.row("all", [0.1, 0.3, 0.9, np.inf], reported).split("|")[1:-1]]
     assert cells == ["all", "0.60", "50 %", "75 %", "1", "4", "75 %", "20 % of 20"]
     assert wrong.row("all", [], []).count("|") == 9
 
 
-def test_a_wrong_start_is_told_by_being_right_or_by_the_status(wrong):
+def test_a_wrong_start_is_reported_by_being_right_or_by_the_status(wrong):
     stamps = np.arange(6) / 10.0
     bad, good = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)
     tracking = np.ones(6, dtype=bool)
-    assert wrong.told(bad, tracking, stamps) == (False, 2, 2)
-    assert wrong.told(good, tracking, stamps) == (True, 0, 0)
+    assert wrong.reported_counts(bad, tracking, stamps) == (False, 2, 2)
+    assert wrong.reported_counts(good, tracking, stamps) == (True, 0, 0)
     late = np.array([1, 1, 1, 1, 0, 1], dtype=bool)
-    assert wrong.told(bad, late, stamps) == (False, 1, 2), "too late"
+    assert wrong.reported_counts(bad, late, stamps) == (False, 1, 2), "too late"
     soon = np.array([1, 1, 1, 0, 1, 1], dtype=bool)
-    assert wrong.told(bad, soon, stamps) == (True, 2, 2)
+    assert wrong.reported_counts(bad, soon, stamps) == (True, 2, 2)
 
 
 @pytest.mark.parametrize("scale", [0.75, 1.25])
 def test_a_start_elsewhere_that_had_another_stature_leaves_it_too(scale):
-    """Half a metre beside the person, and of a child's or a giant's size."""
+    """Half a meter beside the person, and of a child's or a giant's size."""
     recording = open_recording(sample_path())
     names, truth = recording.reference.names, recording.reference.positions
     root = truth[0][names.index("humanoid_root")]

@@ -45,7 +45,7 @@ CHAINS = (("LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand", "LThumb", "Left
 
 @dataclass(frozen=True)
 class Body:
-    """One body of the set: vertices (V, 3), bone starts (31, 3) and sites (17, 3) at rest, in metres."""
+    """One body of the set: vertices (V, 3), bone starts (31, 3) and sites (17, 3) at rest, in meters."""
 
     set: Bodies
     vertices: Array
@@ -99,7 +99,7 @@ class Body:
         return r
 
     def posed(self, pose: Pose, rng: np.random.Generator, dressed: bool = True) -> tuple[Array, dict[str, Array]]:
-        """The surface (V, 3) and the joints, in metres, the pelvis at the origin."""
+        """The surface (V, 3) and the joints, in meters, the pelvis at the origin."""
         r = self.rotations(pose, rng.normal(0.0, 0.5, 2))
         p = np.zeros((len(r), 3))
         for i, parent in enumerate(self.set.parent):

@@ -11,7 +11,7 @@ from lab.training.scenes import Frame, Person
 from voodoo import Camera, _core
 
 Array = NDArray[np.float64]
-PERSON_SHARE = (0.1, 0.45)  # of a candidate's pixels: below the first it is nobody, above the second somebody
+PERSON_FRACTION = (0.1, 0.45)  # of a candidate's pixels: below the first it is nobody, above the second somebody
 PERSON_COVER = 0.5  # of the person's pixels that a candidate must hold
 LEAST_JOINTS = 5  # seen, for a person to be worth learning from
 NEAREST = 0.3  # m; joints nearer to the camera's plane have no place in the picture
@@ -27,10 +27,10 @@ class Sample:
     person: bool
     joints: Array
     weight: Array
-    seen: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     facing: float
     lengths: Array
-    share: float
+    fraction: float
     cover: float
     up_known: bool
 
@@ -67,20 +67,20 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
         inside = frame.labels[candidate.mask]
         total = max(len(inside), 1)
         held = {label: int((inside == label).sum()) for label in counts}
-        if sum(held.values()) < PERSON_SHARE[0] * total:
+        if sum(held.values()) < PERSON_FRACTION[0] * total:
             if len(no) < (1 if frame.people else most) and (not frame.people or rng.random() < 0.5):
                 no.append(_sample(candidate, None, 0.0, 0.0, up is not None))
             continue
         for person in frame.people:
-            share, cover = held[person.label] / total, held[person.label] / max(counts[person.label], 1)
-            fits = share > PERSON_SHARE[1] and cover > PERSON_COVER and person.seen.sum() >= LEAST_JOINTS
+            fraction, cover = held[person.label] / total, held[person.label] / max(counts[person.label], 1)
+            fits = fraction > PERSON_FRACTION[1] and cover > PERSON_COVER and person.seen.sum() >= LEAST_JOINTS
             if fits and len(yes) < most:
-                yes.append(_sample(candidate, person, share, cover, up is not None))
+                yes.append(_sample(candidate, person, fraction, cover, up is not None))
                 break
     return yes + no
 
 
-def _sample(candidate: _core.PersonCandidate, person: Person | None, share: float, cover: float, up: bool) -> Sample:
+def _sample(candidate: _core.PersonCandidate, person: Person | None, fraction: float, cover: float, up: bool) -> Sample:
     crop, middle = candidate.crop, np.array(candidate.middle)
     picture, mask = crop[0].astype(np.float16), np.packbits(crop[1] > 0.5, axis=-1)
     if person is None:
@@ -94,4 +94,4 @@ def _sample(candidate: _core.PersonCandidate, person: Person | None, share: floa
     towards = -person.joints[2] / np.linalg.norm(person.joints[2])
     facing = float(person.forward @ towards)
     joints = np.clip(joints, -2.0, 2.0)
-    return Sample(picture, mask, middle, True, joints, weight, person.seen, facing, person.lengths, share, cover, up)
+    return Sample(picture, mask, middle, True, joints, weight, person.seen, facing, person.lengths, fraction, cover, up)

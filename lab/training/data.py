@@ -61,10 +61,10 @@ def main() -> None:
     parser.add_argument("--held-out", action="store_true", help="bodies and motions that training does not see")
     a = parser.parse_args()
     a.out.mkdir(parents=True, exist_ok=True)
-    share = -(-a.count // a.processes)
+    fraction = -(-a.count // a.processes)
     workers = []
     for i in range(a.processes):
-        options = {"seed": a.seed, "worker": i, "count": share, "held_out": a.held_out}
+        options = {"seed": a.seed, "worker": i, "count": fraction, "held_out": a.held_out}
         workers.append(multiprocessing.get_context("spawn").Process(target=make, args=(a.out, a.data), kwargs=options))
         workers[-1].start()
     for w in workers:

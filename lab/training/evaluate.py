@@ -62,17 +62,17 @@ def _bones(points: Array) -> dict[str, Array]:
     return {k: 0.5 * (gap(f"l_{a}", f"l_{b}") + gap(f"r_{a}", f"r_{b}")) for k, (a, b) in LINKS.items()}
 
 
-def measure(said: dict[str, Array], true: dict[str, Array]) -> dict[str, Any]:
+def measure(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, Any]:
     """Errors of joints (cm), exchanges, sizes, calibration, and how persons are told from other things."""
     people = true["person"] > 0.5
     use = true["weight"][people] > 0.9
-    want, got = (lifted(x[people], true["middle"][people]) for x in (true["joints"], said["joints"]))
+    want, got = (lifted(x[people], true["middle"][people]) for x in (true["joints"], reported["joints"]))
     error = np.linalg.norm(got - want, axis=-1)
     whole = use.all(1)
     swapped = np.linalg.norm(got[:, SWAP] - want, axis=-1)[:, 3:]
     paired = np.where(use[:, 3:], error[:, 3:], 0).sum(1) > np.where(use[:, 3:], swapped, 0).sum(1) + 0.02
     sure = np.abs(true["facing"][people]) > 0.3
-    wrong = (said["facing"][people] > 0) != (true["facing"][people] > 0)
+    wrong = (reported["facing"][people] > 0) != (true["facing"][people] > 0)
     out: dict[str, Any] = {
         "people": int(people.sum()), "others": int((~people).sum()), "whole": int(whole.sum()),
         "mean_cm": 100 * error[use].mean(), "median_cm": 100 * np.median(error[use]),
@@ -85,19 +85,19 @@ def measure(said: dict[str, Array], true: dict[str, Array]) -> dict[str, Any]:
     }  # fmt: skip
     bones = {k: (_bones(got)[k] - v)[whole] for k, v in _bones(want).items()}
     out["bones_from_joints_cm"] = {k: [100 * v.mean(), 100 * np.abs(v).mean()] for k, v in bones.items()}
-    if "length" in said:
-        off = np.exp(said["length"][people]) - true["lengths"][people]
+    if "length" in reported:
+        off = np.exp(reported["length"][people]) - true["lengths"][people]
         names = (*BONES, "stature")
         out["lengths_cm"] = {
             n: [100 * off[whole, i].mean(), 100 * np.abs(off[whole, i]).mean()] for i, n in enumerate(names)
         }
         out["lengths_cm_partial"] = {n: 100 * np.abs(off[~whole, i]).mean() for i, n in enumerate(names)}
-        log_off = np.abs(said["length"][people] - np.log(true["lengths"][people]))
-        out["length_within_scale"] = _within(log_off, np.exp(said["length_scale"][people]))
-        each = np.abs(said["joints"][people] - true["joints"][people]).mean(-1)
-        out["joint_within_scale"] = _within(each[use], np.exp(said["scale"][people])[use])
-        out["hidden_within_scale"] = _within(each[~use], np.exp(said["scale"][people])[~use])
-    score = said["person"]
+        log_off = np.abs(reported["length"][people] - np.log(true["lengths"][people]))
+        out["length_within_scale"] = _within(log_off, np.exp(reported["length_scale"][people]))
+        each = np.abs(reported["joints"][people] - true["joints"][people]).mean(-1)
+        out["joint_within_scale"] = _within(each[use], np.exp(reported["scale"][people])[use])
+        out["hidden_within_scale"] = _within(each[~use], np.exp(reported["scale"][people])[~use])
+    score = reported["person"]
     out["person"] = {f"{t:+.0f}": [(score[people] > t).mean(), (score[people][whole] > t).mean(), (score[~people] > t).mean()]
                      for t in THRESHOLDS}  # fmt: skip
     return out

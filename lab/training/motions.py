@@ -17,7 +17,7 @@ from lab.training.rotations import about, part, shortest, unit
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 RATE = 30.0
-MILLIMETRE = 1000.0
+MILLIMETER = 1000.0
 Clips = dict[str, tuple[list[Pose], Array]]
 
 
@@ -38,7 +38,7 @@ def clips_of(data: Path) -> Clips:
     kept = sorted(set(stored["clip"].tolist()))[poses.HELD_OUT_CLIPS // 2 :: poses.HELD_OUT_CLIPS]
     found = {}
     for clip in kept:
-        positions = stored["positions_m"][stored["clip"] == clip] / MILLIMETRE
+        positions = stored["positions_m"][stored["clip"] == clip] / MILLIMETER
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # clips in which nobody stands upright give nothing
             made = poses.from_positions(positions, names)
@@ -101,8 +101,8 @@ def story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
         other = keys[min(number + 1, len(keys) - 1)]
         rest, move = int(rng.integers(6, 20)), int(rng.integers(18, 38))
         for step in range(rest + (move if other is not key else 0)):
-            share = max(step - rest, 0) / move
-            pose = _between(key, other, share * share * (3 - 2 * share))
+            fraction = max(step - rest, 0) / move
+            pose = _between(key, other, fraction * fraction * (3 - 2 * fraction))
             surface, at = body.posed(pose, np.random.default_rng(dress))
             feet = 0.5 * (at["l_ankle"] + at["r_ankle"])
             shift = -np.array([feet[0], feet[1], surface[:, 2].min()])
@@ -120,11 +120,11 @@ def _legs_of(pose: Pose, other: Pose) -> Pose:
     return Pose(pose.pelvis, other.chest, other.head, limbs, other.clavicle)
 
 
-def _between(a: Pose, b: Pose, share: float) -> Pose:
+def _between(a: Pose, b: Pose, fraction: float) -> Pose:
     """A pose on the way from one to another: limbs turn relative to the trunk."""
 
     def turned(one: Array, other: Array) -> Array:
-        return one @ part(one.T @ other, share)
+        return one @ part(one.T @ other, fraction)
 
     pelvis, chest, head = turned(a.pelvis, b.pelvis), turned(a.chest, b.chest), turned(a.head, b.head)
     limbs = np.zeros((2, 6, 3))
@@ -132,6 +132,6 @@ def _between(a: Pose, b: Pose, share: float) -> Pose:
         for bone in range(6):
             which = ("chest", chest) if bone < 3 else ("pelvis", pelvis)
             one, other = (unit(getattr(p, which[0]).T @ p.limbs[side, bone]) for p in (a, b))
-            limbs[side, bone] = which[1] @ part(shortest(one, other), share) @ one
+            limbs[side, bone] = which[1] @ part(shortest(one, other), fraction) @ one
     clavicle = np.stack([turned(a.clavicle[k], b.clavicle[k]) for k in range(2)])
     return Pose(pelvis, chest, head, limbs, clavicle)

@@ -1,4 +1,4 @@
-"""Recordings of a person before several colour cameras, with exact truth: other bodies, clothes, rooms and motions.
+"""Recordings of a person before several color cameras, with exact truth: other bodies, clothes, rooms and motions.
 
     python -m lab.training.multiview OUT --seed 1 --clip 05_18 --body 3 [--cameras 4] [--frames 120] [--alike]
 
@@ -40,8 +40,8 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class Look:
-    """What everything looks like: faces and base colours (BGR) by label, of the room and of the body, and its light."""
+class Appearance:
+    """What everything looks like: faces and base colors (BGR) by label, of the room and of the body, and its light."""
 
     room: list[tuple[Array, NDArray[np.int32]]]
     body: list[NDArray[np.int32]]
@@ -80,7 +80,7 @@ def _box(low: Array, high: Array) -> tuple[Array, NDArray[np.int32]]:
 
 
 def _clothes(rng: np.random.Generator, body: Body) -> tuple[list[NDArray[np.int32]], Array]:
-    """Triangles of the body by colour, and these colours."""
+    """Triangles of the body by color, and these colors."""
     region, z = body.set.region, body.vertices[:, 2]
     kind = np.zeros(len(z), dtype=int)  # skin
     kind[(region["trunk"] + region["upper"]) > 0.5] = 1
@@ -104,7 +104,7 @@ def _clothes(rng: np.random.Generator, body: Body) -> tuple[list[NDArray[np.int3
     return groups, np.array(colors)
 
 
-def _look(rng: np.random.Generator, body: Body, middle: Array, *, flat: bool, alike: bool) -> Look:
+def _appearance(rng: np.random.Generator, body: Body, middle: Array, *, flat: bool, alike: bool) -> Appearance:
     """A room with furniture about the person, and clothes."""
     wall = np.array([rng.uniform(4.5, 6.0), rng.uniform(4.5, 6.0)])
     low, high = np.array([*(middle[:2] - wall), 0.0]), np.array([*(middle[:2] + wall), 2.9])
@@ -116,35 +116,37 @@ def _look(rng: np.random.Generator, body: Body, middle: Array, *, flat: bool, al
         size = rng.uniform(0.1, 0.45, 2)
         room.append(_box(np.array([*(place - size), 0.0]), np.array([*(place + size), rng.uniform(0.3, 1.1)])))
     groups, clothes = _clothes(rng, body)
-    grey = rng.uniform(70, 200, (len(room), 1))
+    gray = rng.uniform(70, 200, (len(room), 1))
     if alike:
         dyed = clothes[rng.integers(SHADES, 3 * SHADES, len(room))]
         room_colors = np.clip(dyed + rng.normal(0, 10, dyed.shape), 20, 230)
     else:
-        room_colors = np.clip(grey + rng.normal(0, 30, (len(room), 3)), 20, 230)
+        room_colors = np.clip(gray + rng.normal(0, 30, (len(room), 3)), 20, 230)
     colors = np.vstack([clothes, room_colors])
     light = np.array([rng.normal(), rng.normal(), 2.0])
     waves = rng.normal(0, 1, (12, 3)) * rng.uniform(2, 25, (12, 1))
-    return Look(room, groups, colors, waves, light / np.linalg.norm(light), flat)
+    return Appearance(room, groups, colors, waves, light / np.linalg.norm(light), flat)
 
 
-def _shoot(camera: Camera, look: Look, points: Array | None, time: float, rng: np.random.Generator) -> Picture:
+def _shoot(
+    camera: Camera, appearance: Appearance, points: Array | None, time: float, rng: np.random.Generator
+) -> Picture:
     """A picture of the room and a body's surface (V, 3), world frame, if there is one."""
     from_world = np.linalg.inv(camera.pose)
     depth, labels = np.full(SIZE, np.inf), np.full(SIZE, NOTHING, dtype=np.uint8)
 
-    def seen(surface: Array) -> Array:
+    def observed(surface: Array) -> Array:
         return np.ascontiguousarray(surface @ from_world[:3, :3].T + from_world[:3, 3])
 
-    for number, (corners, faces) in enumerate(look.room):
+    for number, (corners, faces) in enumerate(appearance.room):
         # One is inside the room: its walls face inward, and boxes need no culling.
-        raster.draw(seen(corners), faces, len(look.body) + number, camera.intrinsics, False, depth, labels)
+        raster.draw(observed(corners), faces, len(appearance.body) + number, camera.intrinsics, False, depth, labels)
     if points is not None:
-        surface = seen(points)
-        for number, faces in enumerate(look.body):
+        surface = observed(points)
+        for number, faces in enumerate(appearance.body):
             raster.draw(surface, faces, number, camera.intrinsics, True, depth, labels)
-    if look.flat:
-        return np.repeat(np.where(labels < len(look.body), 235, 20).astype(np.uint8)[..., None], 3, axis=2)
+    if appearance.flat:
+        return np.repeat(np.where(labels < len(appearance.body), 235, 20).astype(np.uint8)[..., None], 3, axis=2)
     fx, fy, cx, cy = camera.intrinsics
     v, u = np.mgrid[: SIZE[0], : SIZE[1]]
     z = np.where(np.isfinite(depth), depth, 10.0)
@@ -153,18 +155,18 @@ def _shoot(camera: Camera, look: Look, points: Array | None, time: float, rng: n
     normal = np.cross(across, down)
     normal /= np.linalg.norm(normal, axis=2, keepdims=True) + 1e-12
     normal *= np.sign(((camera.pose[:3, 3] - place) * normal).sum(axis=2, keepdims=True))
-    shade = 0.6 + 0.4 * np.clip(normal @ look.light, 0, 1)
+    shade = 0.6 + 0.4 * np.clip(normal @ appearance.light, 0, 1)
     texture = np.zeros(SIZE)
-    for wave in look.waves:
+    for wave in appearance.waves:
         texture += np.sin(place @ wave)
-    still = labels >= len(look.body)
-    shade *= np.where(still, 1 + 0.09 * texture / np.sqrt(len(look.waves)), 1.0)
+    still = labels >= len(appearance.body)
+    shade *= np.where(still, 1 + 0.09 * texture / np.sqrt(len(appearance.waves)), 1.0)
     if points is not None:
         # A soft shadow on the floor.
-        under = place[..., :2] - points[:, :2].mean(axis=0) + 0.5 * look.light[:2]
+        under = place[..., :2] - points[:, :2].mean(axis=0) + 0.5 * appearance.light[:2]
         shade *= 1 - 0.3 * np.exp(-(under**2).sum(axis=2) / 0.3) * (place[..., 2] < 0.02)
     shade *= 1 + 0.06 * np.sin(place[..., 0] * 1.3 + 0.7 * time) + 0.02 * np.sin(1.1 * time)
-    image = look.colors[np.minimum(labels, len(look.colors) - 1)] * shade[..., None] * camera.gains
+    image = appearance.colors[np.minimum(labels, len(appearance.colors) - 1)] * shade[..., None] * camera.gains
     image = cv2.GaussianBlur(image, (0, 0), 0.6)
     image += rng.normal(0, 1.4, image.shape) * np.sqrt(np.maximum(image, 1) / 110)
     return np.clip(image, 0, 255).astype(np.uint8)
@@ -185,7 +187,7 @@ def _calibration(cameras: list[Camera]) -> str:
 
 
 def _motion(data: Path, clip: str, first: int, frames: int) -> tuple[list[poses.Pose], Array]:
-    """Poses of a clip, and where its root is (F, 3) in metres, of the clip's own person."""
+    """Poses of a clip, and where its root is (F, 3) in meters, of the clip's own person."""
     stored = np.load(data / "mocap" / "sequences.npz")
     names = [str(name) for name in stored["joint_names"]]
     chosen = stored["positions_m"][stored["clip"] == clip] / 1000.0
@@ -236,20 +238,20 @@ def make(
     middle = np.array([*np.mean([surface.mean(axis=0)[:2] for surface in surfaces], axis=0), 0.0])
     surfaces = [surface - [0, 0, floor] for surface in surfaces]
     joints = [{name: place - [0, 0, floor] for name, place in places.items()} for places in joints]
-    look, views = _look(rng, person, middle, flat=silhouettes, alike=alike), _cameras(rng, cameras, middle)
+    appearance, views = _appearance(rng, person, middle, flat=silhouettes, alike=alike), _cameras(rng, cameras, middle)
     (out / "videos").mkdir(parents=True, exist_ok=True)
     (out / "background").mkdir(exist_ok=True)
     (out / "Calib_scene.toml").write_text(_calibration(views))
     for number, camera in enumerate(views):
         for index in range(4):
-            empty = _shoot(camera, look, None, -0.5 * (index + 1), rng)
+            empty = _shoot(camera, appearance, None, -0.5 * (index + 1), rng)
             cv2.imwrite(str(out / "background" / f"cam_{number}_{index}.png"), empty)
         film = cv2.VideoWriter(
             str(out / "videos" / f"cam_{number}.avi"), cv2.VideoWriter_fourcc(*"MJPG"), RATE, SIZE[::-1]
         )
         film.set(cv2.VIDEOWRITER_PROP_QUALITY, 85)
         for index, surface in enumerate(surfaces):
-            film.write(_shoot(camera, look, surface, index / RATE, rng))
+            film.write(_shoot(camera, appearance, surface, index / RATE, rng))
         film.release()
     start = {name: [float(value) for value in place] for name, place in joints[0].items()}
     (out / "init.json").write_text(json.dumps({"height_m": round(person.stature, 3), "joints": start}))
@@ -273,7 +275,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="first frame of the clip")
     parser.add_argument("--frames", type=int, default=120)
     parser.add_argument("--silhouettes", action="store_true", help="the person white before black")
-    parser.add_argument("--alike", action="store_true", help="the room in the colours of the clothes")
+    parser.add_argument("--alike", action="store_true", help="the room in the colors of the clothes")
     options = vars(parser.parse_args())
     make(options.pop("out"), options.pop("data"), **options)
 

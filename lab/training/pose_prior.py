@@ -28,7 +28,7 @@ BENT = 0.3
 """A limb bent by less (sine) does not tell how the one above it is twisted."""
 LEAST_SIGMA = 0.14
 """Standard deviation added to every component, radians: bodies differ, and markers slip."""
-SEEN_SIGMA = 0.1
+OBSERVED_SIGMA = 0.1
 """That of a joint that shows, radians, where it is measured how well it tells others."""
 HEADER = """//! How people move, in numbers: made by `python -m lab.training.pose_prior`, not to be edited.
 //!
@@ -105,13 +105,13 @@ def statistics(found: Array) -> tuple[Array, Array]:
     return both.mean(0), np.asarray(np.linalg.inv(covariance), dtype=np.float64)
 
 
-def told(found: Array, mean: Array, precision: Array, hidden: list[str]) -> Array:
+def message(found: Array, mean: Array, precision: Array, hidden: list[str]) -> Array:
     """Turns in which those of the hidden joints are what the others tell."""
-    seen = np.full(SIZE, SEEN_SIGMA**-2)
+    observed = np.full(SIZE, OBSERVED_SIGMA**-2)
     for joint in hidden:
-        seen[columns(joint)] = 0.0
-    off = np.linalg.solve(precision + np.diag(seen), ((found - mean) * seen).T).T
-    return np.where(seen > 0, found, mean + off)
+        observed[columns(joint)] = 0.0
+    off = np.linalg.solve(precision + np.diag(observed), ((found - mean) * observed).T).T
+    return np.where(observed > 0, found, mean + off)
 
 
 def written(mean: Array, precision: Array) -> str:
@@ -148,7 +148,7 @@ def main() -> None:
     print("| hidden | by the mean, degrees | by the others |\n|---|---|---|")
     for hidden in (["l_shoulder", "l_elbow"], ["l_elbow"], ["l_hip", "l_knee"], ["l_knee"], ["vl3"]):
         at = np.r_[tuple(columns(joint) for joint in hidden)]
-        off = left_out - told(left_out, mean, precision, hidden)
+        off = left_out - message(left_out, mean, precision, hidden)
         errors = [np.degrees(np.sqrt((d[:, at] ** 2).sum(1).mean())) for d in (left_out - mean, off)]
         print(f"| {', '.join(hidden)} | {errors[0]:.0f} | {errors[1]:.0f} |")
 

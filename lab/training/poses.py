@@ -65,7 +65,7 @@ def _tilt(axis: Array, lateral: Array, reference: Array) -> tuple[Array, float]:
 
 
 def from_positions(positions: Array, names: list[str]) -> list[Pose]:
-    """Poses of motion capture: positions (N, 22, 3) in metres, z up, of the joints `names`."""
+    """Poses of motion capture: positions (N, 22, 3) in meters, z up, of the joints `names`."""
     p = {n: positions[:, i].astype(float) for i, n in enumerate(names)}
     trunk, thighs = unit(p["neck"] - p["root"]), [unit(p[s + "_knee"] - p[s + "_hip"]) for s in "lr"]
     calm = (trunk[:, 2] > 0.97) & (thighs[0][:, 2] < -0.96) & (thighs[1][:, 2] < -0.96)

@@ -1,4 +1,4 @@
-"""A depth rasteriser: triangles in the camera's frame to distance along the optical axis, and who is seen."""
+"""A depth rasterizer: triangles in the camera's frame to distance along the optical axis, and who is seen."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _triangle(
 
 @njit(cache=True, fastmath=True)
 def draw(points: Array, faces: Indices, label: int, camera: Four, closed: bool, depth: Array, labels: Labels) -> None:
-    """Draw a mesh (points in metres, optical frame) into `depth` and `labels` with camera = (fx, fy, cx, cy).
+    """Draw a mesh (points in meters, optical frame) into `depth` and `labels` with camera = (fx, fy, cx, cy).
 
     `closed` meshes have outward faces (counter-clockwise): those that look away are skipped.
     """

@@ -59,8 +59,8 @@ def vector(r: Array) -> Array:
     return v * (angle / n) if n > 1e-9 else np.zeros(3)
 
 
-def part(r: Array, share: float) -> Array:
+def part(r: Array, fraction: float) -> Array:
     """A share of a rotation, along the shortest way."""
     v = vector(r)
     n = float(np.linalg.norm(v))
-    return about_axis(v / n, n * share) if n > 1e-9 else np.eye(3)
+    return about_axis(v / n, n * fraction) if n > 1e-9 else np.eye(3)

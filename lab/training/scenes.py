@@ -27,7 +27,7 @@ class Person:
     joints: Array
     forward: Array
     lengths: Array
-    seen: NDArray[np.bool_]  # joints in the image and not hidden by something else
+    observed: NDArray[np.bool_]  # joints in the image and not hidden by something else
     inside: NDArray[np.bool_]  # joints in the image
     pixels: int
 
@@ -128,8 +128,8 @@ class Scenes:
         people = []
         for label, joints, forward, body in placed:
             at = np.stack([r @ joints[n] + t for n in JOINTS])
-            inside, seen = _visible(at, sensor, depth, labels, label)
-            people.append(Person(label, at, r @ forward, body.lengths, seen, inside, int((labels == label).sum())))
+            inside, observed = _visible(at, sensor, depth, labels, label)
+            people.append(Person(label, at, r @ forward, body.lengths, observed, inside, int((labels == label).sum())))
         image, who = sensors.sense(rng, sensor, depth, labels)
         if sensor.user_mask and people:
             fx, fy, cx, cy = sensor.intrinsics
@@ -138,11 +138,11 @@ class Scenes:
             image = sensors.user_mask(rng, image, who, height)
             who[image == 0] = 0
         tilt = about("x", rng.normal(0, 0.015)) @ about("z", rng.normal(0, 0.015))
-        x, told = rng.random(), None
+        x, message = rng.random(), None
         if x < 0.35:
-            told = (tilt @ up, floor + rng.normal(0, 0.015))
-        known = tilt @ up if told is not None or x < 0.75 or abs(up[1]) < 0.6 else None
-        return Frame(image.astype(np.float32), who, sensor.intrinsics, known, told, people)
+            message = (tilt @ up, floor + rng.normal(0, 0.015))
+        known = tilt @ up if message is not None or x < 0.75 or abs(up[1]) < 0.6 else None
+        return Frame(image.astype(np.float32), who, sensor.intrinsics, known, message, people)
 
 
 def _carried(rng: Rng, joints: dict[str, Array], pose: Pose) -> list[shapes.Mesh]:
@@ -219,9 +219,9 @@ def _furnish(rng: Rng, world: _World, at: list[Array], away: float, people: int,
 def _occlude(rng: Rng, world: _World, at: Array, away: float) -> None:
     """Something between the camera and the person."""
     make = shapes.IN_FRONT[rng.integers(len(shapes.IN_FRONT))]
-    share = rng.uniform(0.35, 0.8) if rng.random() < 0.6 else 1 - 0.5 / away
+    fraction = rng.uniform(0.35, 0.8) if rng.random() < 0.6 else 1 - 0.5 / away
     side = rng.normal(0, 0.3)
-    x, y = at[0] * share - at[1] / away * side, at[1] * share + at[0] / away * side
+    x, y = at[0] * fraction - at[1] / away * side, at[1] * fraction + at[0] / away * side
     if np.hypot(x, y) > 0.6:
         world.add(shapes.moved(make(rng), (float(x), float(y)), rng.uniform(-np.pi, np.pi)))
 
@@ -243,9 +243,9 @@ def _visible(
     z = np.maximum(at[:, 2], 0.05)
     u, v = np.rint(fx * at[:, 0] / z + cx).astype(int), np.rint(fy * at[:, 1] / z + cy).astype(int)
     inside = (u >= 0) & (v >= 0) & (u < sensor.width) & (v < sensor.height) & (at[:, 2] > 0.2)
-    seen = inside.copy()
+    observed = inside.copy()
     for i in np.nonzero(inside)[0]:
         own = labels[max(v[i] - 1, 0) : v[i] + 2, max(u[i] - 1, 0) : u[i] + 2] == label
         near = depth[v[i], u[i]] < at[i, 2] - 0.03
-        seen[i] = own.any() or not near
-    return inside, seen
+        observed[i] = own.any() or not near
+    return inside, observed

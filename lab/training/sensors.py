@@ -106,7 +106,7 @@ def sense(
     depth, labels = true.copy(), labels.copy()
     h, w = depth.shape
     border = edges(depth)
-    if rng.random() < 0.7:  # ragged borders: a pixel near one takes a neighbour's depth
+    if rng.random() < 0.7:  # ragged borders: a pixel near one takes a neighbor's depth
         y, x = np.nonzero(border & (rng.random(depth.shape) < rng.uniform(0.1, 0.6)))
         yy, xx = np.clip(y + rng.integers(-1, 2, len(y)), 0, h - 1), np.clip(x + rng.integers(-1, 2, len(x)), 0, w - 1)
         depth[y, x], labels[y, x] = true[yy, xx], labels[yy, xx]

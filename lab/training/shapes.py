@@ -1,4 +1,4 @@
-"""Rooms' contents as meshes: boxes, tubes and balls, and the furniture made of them. Metres, z up, on the floor."""
+"""Rooms' contents as meshes: boxes, tubes and balls, and the furniture made of them. Meters, z up, on the floor."""
 
 from __future__ import annotations
 
@@ -254,8 +254,8 @@ def room(rng: Rng, back: float, left: float, right: float, front: float) -> list
     if rng.random() < 0.93:
         parts.append(_quad([(-front, -right, 0), (back, -right, 0), (back, left, 0), (-front, left, 0)]))
     walls = ([(back, -right), (back, left)], [(-front, left), (back, left)], [(-front, -right), (back, -right)])
-    for (a, b), share in zip(walls, (0.85, 0.6, 0.6), strict=True):
-        if rng.random() < share:
+    for (a, b), fraction in zip(walls, (0.85, 0.6, 0.6), strict=True):
+        if rng.random() < fraction:
             parts.append(_quad([(*a, 0), (*b, 0), (*b, h), (*a, h)]))
     if rng.random() < 0.5:
         parts.append(_quad([(-front, -right, h), (back, -right, h), (back, left, h), (-front, left, h)]))

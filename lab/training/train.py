@@ -44,7 +44,7 @@ class Plan:
     save_s: float = 240.0
 
     @property
-    def share(self) -> tuple[int, int]:
+    def fraction(self) -> tuple[int, int]:
         """Pictures with and without a person in the batch of one process."""
         each = self.batch // self.processes
         return each - each // 5, each // 5
@@ -61,7 +61,7 @@ def loss_of(out: Output, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
     joints = (weight[..., None] * functional.smooth_l1_loss(out.joints, target, beta=BETA, reduction="none")).sum() / 3
     anchors = functional.smooth_l1_loss(out.anchors, target[..., :2], beta=BETA, reduction="none")
     anchors = (weight[..., None] * anchors).sum() / 2
-    seen = functional.binary_cross_entropy_with_logits(out.visible[people], batch["seen"][people].float())
+    observed = functional.binary_cross_entropy_with_logits(out.visible[people], batch["seen"][people].float())
     sure = person * (batch["facing"].abs() / 0.3).clamp(max=1)
     facing = functional.binary_cross_entropy_with_logits(out.facing, (batch["facing"] > 0).float(), reduction="none")
     facing = (facing * sure).sum() / sure.sum().clamp(min=1)
@@ -74,7 +74,7 @@ def loss_of(out: Output, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
     narrow = out.length_scale.clamp(-6, 1)
     sizes = off[people].mean()
     size_spread = (narrow + off.detach() / narrow.exp())[people].mean()
-    total = joints + 0.2 * anchors + 0.02 * seen + 0.03 * (facing + who)
+    total = joints + 0.2 * anchors + 0.02 * observed + 0.03 * (facing + who)
     total = total + 0.01 * spread + 0.1 * sizes + 0.005 * size_spread
     with torch.no_grad():
         e = (out.joints - target).norm(dim=-1)
@@ -112,11 +112,11 @@ def check(net: Net, store: Store, most: int = 1000) -> dict[str, float]:
 
 @dataclass
 class Training:
-    """The state of a training: the network, its mean over steps, and the optimiser."""
+    """The state of a training: the network, its mean over steps, and the optimizer."""
 
     net: Net
     mean: Net
-    optimiser: torch.optim.Optimizer
+    optimizer: torch.optim.Optimizer
     step: int = 0
     views: int = 0
 
@@ -127,38 +127,38 @@ class Training:
         net = Net(small).to(device, memory_format=torch.channels_last)
         plain = [p for p in net.parameters() if p.ndim <= 1]
         groups = [{"params": [p for p in net.parameters() if p.ndim > 1], "weight_decay": 0.02}]
-        optimiser = torch.optim.AdamW([*groups, {"params": plain, "weight_decay": 0.0}], lr=rate)
-        return cls(net, copy.deepcopy(net).requires_grad_(False), optimiser)
+        optimizer = torch.optim.AdamW([*groups, {"params": plain, "weight_decay": 0.0}], lr=rate)
+        return cls(net, copy.deepcopy(net).requires_grad_(False), optimizer)
 
     def save(self, path: Path) -> None:
         """Everything that is needed to go on."""
         part = path.with_suffix(".part")
-        keep = {"net": self.net.state_dict(), "mean": self.mean.state_dict(), "optimiser": self.optimiser.state_dict()}
+        keep = {"net": self.net.state_dict(), "mean": self.mean.state_dict(), "optimizer": self.optimizer.state_dict()}
         torch.save({**keep, "step": self.step, "views": self.views}, part)
         part.rename(path)
 
     def load(self, path: Path) -> None:
         """Go on from a state."""
         kept = torch.load(path, weights_only=True, map_location="cpu")
-        for name in ("net", "mean", "optimiser"):
+        for name in ("net", "mean", "optimizer"):
             getattr(self, name).load_state_dict(kept[name])
         self.step, self.views = kept["step"], kept["views"]
 
     def update(self, batch: Batch, rate: float, done: float = 0.0) -> tuple[dict[str, Tensor], float]:
         """One step; parts of the loss, and `done` of the first process."""
-        for group in self.optimiser.param_groups:
+        for group in self.optimizer.param_groups:
             group["lr"] = rate
         x = batch["x"].contiguous(memory_format=torch.channels_last)
         with torch.autocast(x.device.type, torch.bfloat16):
             out = self.net(x)
         loss, parts = loss_of(out, batch)
-        self.optimiser.zero_grad(set_to_none=True)
+        self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         shared = 1
         if dist.is_initialized():
             shared, done = self._share(done)
         torch.nn.utils.clip_grad_norm_(self.net.parameters(), 1.0)
-        self.optimiser.step()
+        self.optimizer.step()
         self.step, self.views = self.step + 1, self.views + len(x) * shared
         keep = min(EMA, (1 + self.step) / (10 + self.step))
         with torch.no_grad():
@@ -183,7 +183,7 @@ def run(training: Training, data: Store, held: Store | None, plan: Plan, state: 
     """Train by a plan; states and figures go to the folder `state`."""
     rng = np.random.default_rng([seed, training.step, rank])
     torch.manual_seed(int(rng.integers(2**31)))
-    start = saved = looked = time.monotonic()
+    start = saved = checked = time.monotonic()
     first, log, done = training.step, [], 0.0
     while done < 1:
         rate = plan.rate * (0.5 + 0.5 * math.cos(math.pi * done)) + 1e-6
@@ -197,9 +197,9 @@ def run(training: Training, data: Store, held: Store | None, plan: Plan, state: 
         if len(log) == 100:
             if rank == 0:
                 mean = {k: round(float(sum(p[k] for p in log)) / len(log), 4) for k in log[0]}
-                speed = 100 * plan.batch / (time.monotonic() - looked)
+                speed = 100 * plan.batch / (time.monotonic() - checked)
                 print(f"step {training.step} {100 * done:.1f} % rate {rate:.1e} {speed:.0f} views/s {mean}", flush=True)
-            log, looked = [], time.monotonic()
+            log, checked = [], time.monotonic()
         if now - saved > plan.save_s:
             saved = now
             if rank == 0:

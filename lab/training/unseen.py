@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from lab.training import poses, raster, sensors, shapes
 from lab.training.bodies import BONES, JOINTS, Bodies, Body
-from lab.training.motions import MILLIMETRE, RATE, Clips, Motion, clips_of, story, walk
+from lab.training.motions import MILLIMETER, RATE, Clips, Motion, clips_of, story, walk
 from lab.training.poses import Pose
 from lab.training.rotations import about, unit
 
@@ -156,7 +156,7 @@ def make(
     for frame, surface in enumerate(motion.surfaces):
         depth, labels = empty[0].copy(), empty[1].copy()
         _draw(view, surface, bodies.faces, 1, depth, labels)
-        image = np.rint(noise(depth) * MILLIMETRE).astype(np.uint16)
+        image = np.rint(noise(depth) * MILLIMETER).astype(np.uint16)
         cv2.imwrite(str(out / "depth" / f"{frame / RATE:.6f}.png"), image)
     _write_calibration(out, view, root_from_camera, plan.floor)
     names = ",".join(f"{name}_{axis}" for name in JOINTS for axis in "xyz")
@@ -199,7 +199,7 @@ def _view(
     sensor = sensors.Sensor(size[0], size[1], float(np.deg2rad(size[2])), plan.kind, 8.0, 0.001, False)
     cut = plan.person == "cut"
     middle = np.array([*motion.joints[:, 2, :2].mean(axis=0), 0.0])
-    wanted = CUT if cut else WHOLE
+    expected = CUT if cut else WHOLE
     drawn_height = plan.height if height is None else height
     for _ in range(TRIES):
         away = rng.uniform(1.3, 3.0) if cut else rng.uniform(1.6, 4.2)
@@ -215,9 +215,9 @@ def _view(
         pose[:3, 3] = [0, 0, max(high, 0.4)]
         view = View(sensor, pose, float(pose[2, 3]), down, faces)
         joints = (motion.joints - middle) @ turn.T + shift
-        share = _inside(view, joints)
+        fraction = _inside(view, joints)
         far = np.linalg.norm(joints[:, 2, :2], axis=1)
-        if wanted[0] <= share < wanted[1] and 1.0 <= far.min() and far.max() <= 4.7:
+        if expected[0] <= fraction < expected[1] and 1.0 <= far.min() and far.max() <= 4.7:
             surfaces = [(surface - middle) @ turn.T + shift for surface in motion.surfaces]
             return Motion(surfaces, joints, motion.words, motion.seat), view
     raise NotToBeHadError(f"{motion.words}: expected a view of it from {drawn_height} m, {plan.person}, found none")
@@ -237,8 +237,8 @@ def _room(rng: Rng, motion: Motion, view: View, plan: Plan) -> list[shapes.Mesh]
     low, high = HIDDEN if plan.person == "hidden" else (0.0, HIDDEN[0])
     for _ in range(TRIES):
         meshes = _furnished(rng, motion, hidden=plan.person == "hidden")
-        shares = [_hidden(view, motion.surfaces[i], meshes) for i in (0, len(motion.surfaces) // 2, -1)]
-        if max(shares) < high and low <= np.mean(shares):
+        fractions = [_hidden(view, motion.surfaces[i], meshes) for i in (0, len(motion.surfaces) // 2, -1)]
+        if max(fractions) < high and low <= np.mean(fractions):
             return meshes
     raise NotToBeHadError(f"{motion.words}: expected furniture with somebody {plan.person}, found none")
 
@@ -292,8 +292,8 @@ def _draw(
     labels: NDArray[np.uint8],
     closed: bool = True,
 ) -> None:
-    seen = np.ascontiguousarray((points - view.pose[:3, 3]) @ view.pose[:3, :3])
-    raster.draw(seen, faces, label, view.sensor.intrinsics, closed, depth, labels)
+    observed = np.ascontiguousarray((points - view.pose[:3, 3]) @ view.pose[:3, :3])
+    raster.draw(observed, faces, label, view.sensor.intrinsics, closed, depth, labels)
 
 
 def _drawn(view: View, room: list[shapes.Mesh]) -> tuple[Array, NDArray[np.uint8]]:
@@ -318,12 +318,12 @@ def _noise(rng: Rng, sensor: sensors.Sensor) -> Callable[[Array], Array]:
         y, x = np.nonzero(border & (rng.random(true.shape) < flying))
         beside = true[np.clip(y + rng.integers(-1, 2, len(y)), 0, len(true) - 1),
                       np.clip(x + rng.integers(-1, 2, len(x)), 0, true.shape[1] - 1)]  # fmt: skip
-        share = rng.random(len(y))
-        depth[y, x] = share * depth[y, x] + (1 - share) * np.minimum(beside, depth[y, x] + 2.0)
+        fraction = rng.random(len(y))
+        depth[y, x] = fraction * depth[y, x] + (1 - fraction) * np.minimum(beside, depth[y, x] + 2.0)
         return np.where(sensors.grazing(true, focal) < 0.08, 0.0, depth)
 
     def stereo(true: Array) -> Array:
-        # Disparities with noise that neighbours share, in steps of a sixteenth of a pixel, fattened borders.
+        # Disparities with noise that neighbors share, in steps of a sixteenth of a pixel, fattened borders.
         fat = cv2.erode(true, np.ones((3, 3)))
         near = np.where(rng.random(true.shape) < 0.4, fat, true)
         disparity = matched / near + 0.08 * gain * sensors._smooth(rng, true.shape, grain)
@@ -367,7 +367,7 @@ def _write_calibration(out: Path, view: View, root_from_camera: Array, floor_kno
         f"{name} = {value!r}"
         for name, value in zip(("fx", "fy", "cx", "cy"), map(float, (fx, fy, cx, cy)), strict=True)
     ]
-    lines += [f"depth_factor = {MILLIMETRE}", 'sensor_frame = "camera_depth_optical_frame"']
+    lines += [f"depth_factor = {MILLIMETER}", 'sensor_frame = "camera_depth_optical_frame"']
     if floor_known:
         lines += ['root_frame = "base_link"', f"root_from_sensor = {root_from_camera.tolist()}"]
     (out / "calibration.toml").write_text("\n".join(lines) + "\n")

@@ -76,7 +76,7 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Scale at which the robust kernel stops narrowing, for the whole-body solvers. (unit: m; range: 0.001 to
     10)
     """
-    outline_sigma: float = 0.01
+    depth_contour_sigma: float = 0.01
     """Standard deviation of an edge of the outline, for the whole-body solvers. (unit: m; range: 0.0001 to 1)"""
     prediction: float = 0.6
     """Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body
@@ -104,12 +104,12 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     """Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person; for a lost
     one that no detector knows or sees in everything of its size that is no background (whole-body solvers).
     """
-    outline: bool = True
+    depth_contour: bool = True
     """Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body
     solvers).
     """
     regions: bool = True
-    """Draw the limbs' contours to the edges of their colours in colour pictures (whole-body solvers)."""
+    """Draw the limbs' contours to the edges of their colors in color pictures (whole-body solvers)."""
     facing: bool = True
     """Match depth pixels inside a limb to the side that faces their camera (whole-body solvers)."""
     limits: bool = True

@@ -1,4 +1,4 @@
-"""The compiled core. Arrays are NumPy; lengths in metres, times in seconds, angles in radians."""
+"""The compiled core. Arrays are NumPy; lengths in meters, times in seconds, angles in radians."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -99,12 +99,12 @@ def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int
 
 @final
 class BodyView:
-    """What a depth camera saw of the body, in the picture of a colour camera beside it.
+    """What a depth camera saw of the body, in the picture of a color camera beside it.
 
     Args:
         mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
         pixels: (N, 2) of the points in the picture.
-        depths: (N,) of the points along the colour camera's optical axis [m].
+        depths: (N,) of the points along the color camera's optical axis [m].
         still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
         before: (H, W) of the picture: True where something is before what was seen there once. None: not known.
 
@@ -147,7 +147,7 @@ def body_view(
     camera: _Camera,
     joints: npt.NDArray[np.float64],
     *,
-    metres_per_unit: float,
+    meters_per_unit: float,
     world_from_depth: npt.NDArray[np.float64],
     color_from_depth: npt.NDArray[np.float64],
     color_camera: _Camera,
@@ -163,10 +163,10 @@ def body_view(
         depth: (H, W).
         camera: its calibration.
         joints: (N, 3) of the body in the world [m].
-        metres_per_unit: of `depth`.
+        meters_per_unit: of `depth`.
         world_from_depth, color_from_depth: (4, 4).
-        color_camera: calibration of the colour camera.
-        beyond: where the depth camera does not look (H, W) at a distance from it [m], in the colour picture.
+        color_camera: calibration of the color camera.
+        beyond: where the depth camera does not look (H, W) at a distance from it [m], in the color picture.
         reach: what is within so many rows and columns of a point belongs to it.
         step: every step-th row and column of the depth image is used.
         margin: enlargement of the box around the body [m].
@@ -182,7 +182,7 @@ class SkinTeacher:
 
     def __new__(cls) -> SkinTeacher: ...
     @property
-    def learnt(self) -> int: ...
+    def learned(self) -> int: ...
     @property
     def skin(self) -> npt.NDArray[np.float32]: ...
     def learn(
@@ -492,17 +492,17 @@ class Frame:
         image: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
         *,
         camera: _Camera,
-        metres_per_unit: float = 0.001,
+        meters_per_unit: float = 0.001,
         world_from_sensor: npt.ArrayLike | None = None,
         weight: float = 1.0,
         source: str = "depth",
     ) -> None:
-        """Add an organised depth image: depth along the optical axis (z, not range).
+        """Add an organized depth image: depth along the optical axis (z, not range).
 
         Args:
             image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned; no masked array.
             camera: its calibration, a voodoo.Camera of the same size.
-            metres_per_unit: of the image. The default is that of uint16 in millimetres; an image in metres needs 1.0.
+            meters_per_unit: of the image. The default is that of uint16 in millimeters; an image in meters needs 1.0.
             world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
             weight: weight of each pixel, above zero; a larger one costs no time.
             source: name for the report in `Estimate.sources`.
@@ -519,14 +519,14 @@ class Frame:
         stamp: float | None = None,
         source: str = "color",
     ) -> None:
-        """Add a colour or grey picture: Tracker fits the body's contour to its regions, People tells persons apart by clothes.
+        """Add a color or gray picture: Tracker fits the body's contour to its regions, People tells persons apart by clothes.
 
         Args:
             image: (height, width, 3) uint8, channels in any order that is the same in all frames, or (height, width) uint8.
             camera: its calibration, a voodoo.Camera of the same size; Tracker refuses one with distortion: undistort first.
             world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
             stamp: when the picture was taken [s], within 0.25 s of the frame's; the frame's by default.
-            source: name of the camera, the same in every frame: what is learnt of colours goes by it, and the report in
+            source: name of the camera, the same in every frame: what is learned of colors goes by it, and the report in
                 `Estimate.sources`.
 
         Raises:
@@ -605,7 +605,7 @@ class Frame:
 
 @final
 class PersonCandidate:
-    """What may be a person in a depth image, with the picture of it that the network looks at. Camera frame, metres."""
+    """What may be a person in a depth image, with the picture of it that the network looks at. Camera frame, meters."""
 
     @property
     def crop(self) -> npt.NDArray[np.float32]:
@@ -674,7 +674,7 @@ class Detector:
 
 @final
 class Detection:
-    """A person in a depth image. World frame, metres."""
+    """A person in a depth image. World frame, meters."""
 
     @property
     def joints(self) -> dict[str, npt.NDArray[np.float64]]:
@@ -712,7 +712,7 @@ class Detection:
 
 @final
 class Estimate:
-    """What a step found; immutable. World frame, metres, seconds."""
+    """What a step found; immutable. World frame, meters, seconds."""
 
     @property
     def stamp(self) -> float:
@@ -842,7 +842,7 @@ class People:
     def detector_failures(self) -> int: ...
     def step(self, frame: Frame, own: Sequence[tuple[int, Frame]]) -> list[tuple[int, Estimate]]: ...
     def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
-    def wants_colors(self) -> bool: ...
+    def needs_colors(self) -> bool: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
     def estimate(self, id: int) -> Estimate | None: ...
     def body(self, id: int) -> Body | None: ...

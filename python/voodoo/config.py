@@ -103,7 +103,7 @@ class Config(ConfigFields, frozen=True):
             if words:
                 facts.append("one of: " + ", ".join(words))
             notes[name] = [*doc.splitlines(), *([f"({'; '.join(facts)})"] if facts else [])]
-        title = "Configuration of the voodoo tracker. Lengths in metres, times in seconds, angles in radians."
+        title = "Configuration of the voodoo tracker. Lengths in meters, times in seconds, angles in radians."
         return commented(self.values(), title=title, notes=notes)
 
     @classmethod

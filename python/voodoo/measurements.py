@@ -24,7 +24,7 @@ class DepthImage:
         sensor: topic or folder it came from.
         stamp: time of measurement [s].
         image: (H, W) uint16 or float32; 0, NaN and infinity mean "no return".
-        metres_per_unit: metres of one unit of `image`.
+        meters_per_unit: meters of one unit of `image`.
         camera: calibration; its size is the image's.
         root_from_sensor: (4, 4) rigid transform from the optical frame to the recording's root frame.
     """
@@ -32,7 +32,7 @@ class DepthImage:
     sensor: str
     stamp: float
     image: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
-    metres_per_unit: float
+    meters_per_unit: float
     camera: Camera
     root_from_sensor: FloatArray
 
@@ -100,7 +100,7 @@ def _beams(angle_min: float, angle_increment: float, count: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ColorImage:
-    """A colour image, decoded when `image` is first asked for.
+    """A color image, decoded when `image` is first asked for.
 
     Args:
         sensor: topic or folder it came from.

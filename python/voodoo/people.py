@@ -62,7 +62,7 @@ class People:
     """Follows everybody who comes, each with a number that lasts.
 
     Nobody needs to say where they are: persons are found in depth images. A pixel belongs to the person whose surface explains
-    it. Who is hidden is carried, and who comes back has the same number where size, place, time and, with colour pictures,
+    it. Who is hidden is carried, and who comes back has the same number where size, place, time and, with color pictures,
     clothes agree.
 
     Args:
@@ -132,9 +132,9 @@ class People:
         """Everybody at the frame's time. Releases the GIL; after a refused frame all is as before.
 
         Args:
-            frame: what all have in common: depth images, free points, colour pictures, the floor. Whose it is, is found out.
+            frame: what all have in common: depth images, free points, color pictures, the floor. Whose it is, is found out.
             own: number of a person -> points, positions and rays of this person alone, with the same stamp; their depth images
-                and colour pictures are not looked at.
+                and color pictures are not looked at.
 
         Raises:
             MeasurementError: time not after the last frame, or a measurement that cannot be used.
@@ -167,9 +167,9 @@ class People:
         self._core.only(list(persons) or None)
 
     @property
-    def wants_color(self) -> bool:
-        """Whether a colour picture would tell something in the next frame; to decode it for nothing costs time."""
-        return self._core.wants_colors()
+    def needs_color(self) -> bool:
+        """Whether a color picture would tell something in the next frame; to decode it for nothing costs time."""
+        return self._core.needs_colors()
 
     def body(self, person: int) -> Body:
         """The body of a person who is there, in their sizes.

@@ -18,14 +18,14 @@ from voodoo.model.joint import number_of
 
 
 class RegionLines(NamedTuple):
-    """Lines across the contours of limbs in one picture, and where their colours end; pixels.
+    """Lines across the contours of limbs in one picture, and where their colors end; pixels.
 
     Args:
         limbs: (N,) index in `Body.limb_names`.
         places: (N, 2) where the contour of the posed body is seen.
         normals: (N, 2) unit vectors outward.
-        offsets: (N,) how far outward the edge of the colours lies.
-        sigmas: (N,) its standard deviation; infinite where the colours tell nothing.
+        offsets: (N,) how far outward the edge of the colors lies.
+        sigmas: (N,) its standard deviation; infinite where the colors tell nothing.
     """
 
     limbs: npt.NDArray[np.int64]
@@ -99,12 +99,12 @@ class Tracker:
         Raises:
             BodyError: an unknown name, or an entry that is not three finite numbers.
             MeasurementError: the positions do not fix the pose, or with `fit_sizes` would make the body more than ten times
-                larger or smaller: they are not in metres. The tracker is unchanged.
+                larger or smaller: they are not in meters. The tracker is unchanged.
         """
         return self._core._reset(checked_joints(joints), fit_sizes=fit_sizes)
 
     def search(self) -> None:
-        """Give up the pose and what was learnt with it: from the next step on somebody is looked for, as in a new tracker."""
+        """Give up the pose and what was learned with it: from the next step on somebody is looked for, as in a new tracker."""
         self._core = _core.Tracker(self._initial.core, self.config.values(), self.detector)
         for source, images in self._backgrounds.items():
             self._core._set_background(source, images)
@@ -119,10 +119,10 @@ class Tracker:
         return self._core._reset_pose(ordered_poses(self.body, world_from_limb))
 
     def set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None:
-        """Show the scene without anybody in it, as the colour camera `source` sees it (`Frame.add_color`).
+        """Show the scene without anybody in it, as the color camera `source` sees it (`Frame.add_color`).
 
         What a pixel shows then is compared with what it shows now; not needed, but it helps where clothes and scene have
-        one colour. It stays over `reset` and `search`.
+        one color. It stays over `reset` and `search`.
 
         Args:
             source: name of the camera.
@@ -135,9 +135,9 @@ class Tracker:
         """
         if not isinstance(source, str):
             raise MeasurementError(f"source: expected a name, found {type(source).__name__}")
-        shown = tuple(images)
-        self._core._set_background(source, shown)
-        self._backgrounds[source] = shown
+        pictures = tuple(images)
+        self._core._set_background(source, pictures)
+        self._backgrounds[source] = pictures
 
     def step(self, frame: Frame) -> Estimate:
         """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.
@@ -154,16 +154,16 @@ class Tracker:
         return self._core.step(_frame(frame))
 
     def region_lines(self, source: str) -> RegionLines:
-        """The lines of the last step in the picture of the colour camera `source`; none where it gave no picture."""
+        """The lines of the last step in the picture of the color camera `source`; none where it gave no picture."""
         rows = self._core._region_lines(source).reshape(-1, 7)
         return RegionLines(rows[:, 0].astype(np.int64), rows[:, 1:3], rows[:, 3:5], rows[:, 5], rows[:, 6])
 
     def segment(
         self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None
     ) -> dict[str, npt.NDArray[np.float32]]:
-        """Which pixels of a frame's colour pictures are the body, with a pose as the shape prior (R07 section 3.1).
+        """Which pixels of a frame's color pictures are the body, with a pose as the shape prior (R07 section 3.1).
 
-        Colours are those that were learnt in steps, or by `learn_colors`; a camera that is new learns them at this pose first.
+        Colors are those that were learned in steps, or by `learn_colors`; a camera that is new learns them at this pose first.
         Nothing else changes.
 
         Args:
@@ -180,7 +180,7 @@ class Tracker:
         return self._core._segment(_frame(frame), self._ordered(world_from_limb))
 
     def learn_colors(self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None) -> None:
-        """Learn the colours of the body, and of what is around it, in a frame's pictures; steps do so by themselves.
+        """Learn the colors of the body, and of what is around it, in a frame's pictures; steps do so by themselves.
 
         Args, Raises: as of `segment`.
         """

@@ -29,7 +29,7 @@ def test_images_arrive_as_they_were_taken(images):
         frame = live.next(2.0)
         (item,) = frame.measurements
         assert np.array_equal(item.image, images[0])
-        assert item.metres_per_unit == 0.001
+        assert item.meters_per_unit == 0.001
         assert item.camera == CAMERA
         assert abs(time.time() - frame.stamp) < 0.5
         assert live.by_host_clock
@@ -53,7 +53,7 @@ def test_a_person_is_tracked(images, rate):
     assert session.persons() == {1: "lost"} or session.live.status == "ended"
 
 
-def test_a_calibration_says_where_it_is(images, tmp_path):
+def test_a_calibration_reports_where_it_is(images, tmp_path):
     file = tmp_path / "place.toml"
     file.write_text(
         "width = 640\nheight = 480\nfx = 525.0\nfy = 525.0\ncx = 319.5\ncy = 239.5\nroot_frame = 'base_link'\n"
@@ -74,8 +74,8 @@ def test_a_calibration_says_where_it_is(images, tmp_path):
 
 def test_a_stalled_camera_publishes_nothing(images):
     camera = SoftwareCamera(30.0, images)
-    told = []
-    with Live([RealSenseSource(device=camera.device)], tell=told.append) as live:
+    message = []
+    with Live([RealSenseSource(device=camera.device)], on_message=message.append) as live:
         session = Session(live, follower)
         with camera:
             session.wait(2.0)
@@ -94,12 +94,12 @@ def test_a_stalled_camera_publishes_nothing(images):
         assert session.persons() == {1: "tracking"}
         session.finish()
     assert live.faults.counts == {"stalled": 1}
-    assert any("data again" in line for line in told)
+    assert any("data again" in line for line in message)
 
 
 def test_no_camera_is_waited_for():
-    told = []
-    with voodoo.live.open(RealSenseSource(serial="000000000000"), tell=told.append) as live:
+    message = []
+    with voodoo.live.open(RealSenseSource(serial="000000000000"), on_message=message.append) as live:
         assert live.next(0.7) is None
         assert live.status == "waiting"
-    assert any("expected the camera, found none" in line for line in told)
+    assert any("expected the camera, found none" in line for line in message)

@@ -55,9 +55,9 @@ def peer(images, *words):
 
 def finish(process):
     process.terminate()
-    told = process.communicate(timeout=30)[1]
-    assert process.returncode == 143, told
-    return told
+    message = process.communicate(timeout=30)[1]
+    assert process.returncode == 143, message
+    return message
 
 
 @pytest.mark.parametrize("quality", ["reliable", "sensor data"])
@@ -65,11 +65,11 @@ def test_depth_arrives_and_skeletons_come_back(images, tmp_path, quality):
     ours = voodoo_live(f"ros2:{TOPIC}", "--report", "r.json", "--out", "pose.npz", cwd=tmp_path)
     words = ["--sensor-data"] if quality == "sensor data" else []
     theirs = json.loads(peer(images, "--count", str(COUNT), *words).communicate(timeout=90)[0])
-    told = finish(ours)
+    message = finish(ours)
     report = json.loads((tmp_path / "r.json").read_text())
     stamps = [stamp for stamp, _ in theirs["states"]]
     assert len(theirs["sent"]) == COUNT
-    assert report["received"] == COUNT, told
+    assert report["received"] == COUNT, message
     assert report["published"] + report["dropped"] == COUNT
     assert report["dropped"] <= COUNT // BUSY
     assert len(stamps) == len(theirs["markers"]) == report["with_pose"] >= COUNT - COUNT // BUSY
@@ -194,7 +194,7 @@ def test_bodies_before_a_camera_that_moves_come_back_as_transforms(images, tmp_p
     base_from_camera[:3] = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1]]
     robot, listener = Node(), Node()
     out = robot.advertise("/tf", kind)
-    heard = listener.subscribe("/tf", Offer(kind, reliable=True, latched=False), depth=100)
+    received = listener.subscribe("/tf", Offer(kind, reliable=True, latched=False), depth=100)
     ours = voodoo_live(f"ros2:{TOPIC}", "--report", "r.json", cwd=tmp_path)
     camera = peer(images, "--count", str(COUNT))
     bodies = {}
@@ -203,7 +203,7 @@ def test_bodies_before_a_camera_that_moves_come_back_as_transforms(images, tmp_p
         odom_from_base[1, 3] = speed * (due - begun)
         out.write(cdr(transforms("base_link", "camera_optical", due, base_from_camera)))
         out.write(cdr(transforms("odom", "base_link", due, odom_from_base)))
-        for raw in heard.take():
+        for raw in received.take():
             for one in STORE.deserialize_cdr(raw, kind).transforms:
                 if one.child_frame_id == "body_1":
                     assert one.header.frame_id == "odom"
@@ -244,7 +244,7 @@ def test_the_node_for_those_who_have_ros(images):
     assert "l_elbow_1" in theirs["names"]
 
 
-def test_offers_are_seen_with_their_quality():
+def test_offers_are_visible_with_their_quality():
     ours, theirs = Node(), Node()
     published = theirs.advertise("/scan", "sensor_msgs/msg/LaserScan")
     until = time.monotonic() + 5.0

@@ -21,8 +21,8 @@ CHROMIUM = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
 )
 
-COLOURS = 300
-"""A page that loads has a few greys; one that shows points and text has thousands of shades."""
+COLORS = 300
+"""A page that loads has a few grays; one that shows points and text has thousands of shades."""
 
 
 def free_port():
@@ -61,18 +61,18 @@ def live(port, tmp_path):
 def test_a_live_session_is_served(tmp_path):
     port = free_port()
     process = live(port, tmp_path)
-    told = ""
+    message = ""
     for line in process.stderr:
-        told += line
+        message += line
         if " Hz; " in line:
             break
     try:
-        assert f"look at http://127.0.0.1:{port}/?url=rerun" in told
+        assert f"look at http://127.0.0.1:{port}/?url=rerun" in message
         assert b"Rerun" in urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=5).read()
     finally:
         process.terminate()
-        told += process.communicate(timeout=30)[1]
-    assert process.returncode == 143, told
+        message += process.communicate(timeout=30)[1]
+    assert process.returncode == 143, message
     assert port not in listening()
 
 
@@ -90,8 +90,8 @@ def pictures_of(address, folder):
         until, pages = time.monotonic() + 30.0, []
         while not pages and time.monotonic() < until:
             try:
-                told = json.loads(urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=5).read())
-                pages = [page["webSocketDebuggerUrl"] for page in told if page["type"] == "page"]
+                message = json.loads(urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=5).read())
+                pages = [page["webSocketDebuggerUrl"] for page in message if page["type"] == "page"]
             except OSError:
                 time.sleep(0.2)
         line = websocket.create_connection(pages[0], timeout=30)
@@ -111,7 +111,7 @@ def pictures_of(address, folder):
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
 def test_a_browser_shows_it(tmp_path):
-    """A browser without a screen draws somebody: a page that loads, or fails, has a few greys."""
+    """A browser without a screen draws somebody: a page that loads, or fails, has a few grays."""
     port = free_port()
     process = live(port, tmp_path)
     address = ""
@@ -124,9 +124,9 @@ def test_a_browser_shows_it(tmp_path):
         most = 0
         for image in pictures_of(address, tmp_path):
             most = max(most, len({tuple(pixel) for pixel in image[::5, ::5].reshape(-1, 3).tolist()}))
-            if most > COLOURS:
+            if most > COLORS:
                 break
-        assert most > COLOURS
+        assert most > COLORS
     finally:
         process.terminate()
         process.communicate(timeout=30)

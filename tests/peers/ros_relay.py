@@ -24,11 +24,11 @@ def main():
         time.sleep(0.05)
     while not pairs.keys() <= node.offers().keys():
         node.wait(0.05)
-    heard = [node.subscribe(name, node.offers()[name], depth=50) for name in pairs]
+    received = [node.subscribe(name, node.offers()[name], depth=50) for name in pairs]
     count = 0
     while True:
         node.wait(0.1)
-        for subscription in heard:
+        for subscription in received:
             for raw in subscription.take():
                 count += subscription.kind == image
                 if subscription.kind == info or count % chosen.lose:

@@ -277,7 +277,7 @@ config! {
     /// Scale at which the robust kernel stops narrowing, for the whole-body solvers.
     kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
     /// Standard deviation of an edge of the outline, for the whole-body solvers.
-    outline_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
+    depth_contour_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
     /// Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body solvers).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
     /// Standard deviation of the root's unexpected turn in 1/30 s.
@@ -296,8 +296,8 @@ config! {
     /// knows or sees in everything of its size that is no background (whole-body solvers).
     relocalization: bool = true, "";
     /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
-    outline: bool = true, "";
-    /// Draw the limbs' contours to the edges of their colours in colour pictures (whole-body solvers).
+    depth_contour: bool = true, "";
+    /// Draw the limbs' contours to the edges of their colors in color pictures (whole-body solvers).
     regions: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
     facing: bool = true, "";

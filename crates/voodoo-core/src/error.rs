@@ -84,7 +84,7 @@ impl CameraError {
 pub enum TrackError {
     /// `step` before `reset`.
     #[error("the tracker has no pose yet: call reset first")]
-    NotInitialised,
+    NotInitialized,
     /// A stamp that is not finite.
     #[error("stamp: expected a finite time in seconds, found {0}")]
     Stamp(f64),

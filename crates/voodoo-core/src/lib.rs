@@ -19,7 +19,7 @@
 //! let start: Vec<(usize, Vec3)> =
 //!     (0..body.sites().len()).map(|site| (site, body.site_position(&standing, site))).collect();
 //!
-//! // What a sensor measured, in metres: here points all over the limbs.
+//! // What a sensor measured, in meters: here points all over the limbs.
 //! let mut points = Vec::new();
 //! for (limb, world_from_limb) in body.limbs().iter().zip(&standing) {
 //!     let shape = &limb.shape;
@@ -99,7 +99,7 @@ pub use observation::frame::{
 };
 pub use observation::picture::{ColorImage, ColorPixels};
 pub use observation::sites::{SiteGate, SiteRay};
-pub use people::{Options, People};
+pub use people::{People, PeopleOptions};
 pub use regions::RegionLine;
 pub use shape::ray::RayHit;
 pub use shape::{Region, ShapeError, SurfaceBatch, TaperedEllipticCylinder};

@@ -15,7 +15,7 @@ use crate::visibility::render::{Rendering, Viewpoint};
 /// The camera, which stands in the world's origin and looks along z.
 static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
 
-/// Depth of the wall behind the body, millimetres.
+/// Depth of the wall behind the body, millimeters.
 const WALL: u16 = 4500;
 
 /// A human who stands 2.6 m before the camera and faces it.
@@ -33,7 +33,7 @@ pub(crate) fn stand(body: &Body) -> Vec<Pose> {
     body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces))
 }
 
-/// Depth in millimetres, as the camera sees a posed body before nothing.
+/// Depth in millimeters, as the camera sees a posed body before nothing.
 pub(crate) fn depth(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
     let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
@@ -46,28 +46,28 @@ pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     depth(body, poses).into_iter().map(|depth| if depth == 0 { WALL } else { depth }).collect()
 }
 
-/// Puts a board that faces the camera before what an image shows; half its width and height, metres.
-pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
+/// Puts a board that faces the camera before what an image shows; half its width and height, meters.
+pub(crate) fn put_board(pixels: &mut [u16], center: Vec3, [width, height]: [f64; 2]) {
     for (index, pixel) in pixels.iter_mut().enumerate() {
-        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| centre.z * ray);
-        let depth = (1000.0 * centre.z) as u16;
-        if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
+        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| center.z * ray);
+        let depth = (1000.0 * center.z) as u16;
+        if (x - center.x).abs() < width && (y - center.y).abs() < height && (*pixel == 0 || depth < *pixel) {
             *pixel = depth;
         }
     }
 }
 
 /// A frame of one depth image.
-pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, look: impl FnOnce(&Frame) -> R) -> R {
+pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, check: impl FnOnce(&Frame) -> R) -> R {
     let images = [DepthImage {
         pixels: DepthPixels::U16(pixels),
         camera: &CAMERA,
-        metres_per_unit: 0.001,
+        meters_per_unit: 0.001,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,
     }];
-    look(&Frame { images: &images, ..Frame::empty(stamp) })
+    check(&Frame { images: &images, ..Frame::empty(stamp) })
 }
 
 /// What a frame of `pixels` is to a part of the tracker that expects the body at `poses`, as in the first frame after a reset.
@@ -76,9 +76,9 @@ pub(crate) fn with_context<R>(
     config: &Config,
     model: &Model,
     poses: &[Pose],
-    look: impl FnOnce(Context) -> R,
+    check: impl FnOnce(Context) -> R,
 ) -> R {
-    with_setting(pixels, config, model, poses, |setting| look(setting.of(model)))
+    with_setting(pixels, config, model, poses, |setting| check(setting.with_model(model)))
 }
 
 /// The same for a part that changes the model.
@@ -87,7 +87,7 @@ pub(crate) fn with_setting<R>(
     config: &Config,
     model: &Model,
     poses: &[Pose],
-    look: impl FnOnce(Setting) -> R,
+    check: impl FnOnce(Setting) -> R,
 ) -> R {
     with_frame(pixels, 0.0, |frame| {
         let mut observer = Observer::default();
@@ -100,14 +100,19 @@ pub(crate) fn with_setting<R>(
             own: Own::default(),
         };
         observer.observe(frame, expected, config);
-        look(Setting { config, seen: observer.seen(frame, Vec3::ZERO), previous: poses, time_scale: 1.0 })
+        check(Setting {
+            config,
+            observation: observer.observation(frame, Vec3::ZERO),
+            previous: poses,
+            time_scale: 1.0,
+        })
     })
 }
 
-/// Poses turned about a line through `centre`.
-pub(crate) fn turned(poses: &[Pose], centre: Vec3, axis: Vec3, angle: f64) -> Vec<Pose> {
+/// Poses turned about a line through `center`.
+pub(crate) fn turned(poses: &[Pose], center: Vec3, axis: Vec3, angle: f64) -> Vec<Pose> {
     let turn = Quat::from_axis_angle(axis, angle);
-    let place = |pose: &Pose| Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
+    let place = |pose: &Pose| Pose::from_parts(center + turn * (pose.translation - center), turn * pose.rotation);
     poses.iter().map(place).collect()
 }
 
@@ -121,7 +126,7 @@ pub(crate) fn first_arm(model: &Model) -> usize {
     model.extremities.iter().position(|chain| !chain.leg).unwrap()
 }
 
-/// Poses with the first arm stretched out to its side, upwards by `rise` metres, and the place where it ends.
+/// Poses with the first arm stretched out to its side, upwards by `rise` meters, and the place where it ends.
 pub(crate) fn raised(model: &Model, poses: &[Pose], rise: f64) -> (Vec<Pose>, Vec3) {
     let arm = &model.extremities[first_arm(model)];
     let root = arm.root(&model.body, poses);
@@ -132,12 +137,12 @@ pub(crate) fn raised(model: &Model, poses: &[Pose], rise: f64) -> (Vec<Pose>, Ve
     (raised, end)
 }
 
-/// Parameters with which nothing is learnt of the scene, and candidates reach as far as the body does.
+/// Parameters with which nothing is learned of the scene, and candidates reach as far as the body does.
 pub(crate) fn without_background() -> Config {
     Config { background: false, body_box_margin: 0.6, ..Config::default() }
 }
 
-/// Greatest distance between the limbs of two poses, metres.
+/// Greatest distance between the limbs of two poses, meters.
 pub(crate) fn farthest(first: &[Pose], second: &[Pose]) -> f64 {
     first.iter().zip(second).map(|(a, b)| a.translation.distance(b.translation)).fold(0.0, f64::max)
 }
@@ -147,13 +152,13 @@ pub(crate) fn pinhole(width: usize, height: usize, intrinsics: [f64; 4]) -> &'st
     Box::leak(Box::new(Camera::pinhole(width, height, intrinsics).unwrap()))
 }
 
-/// A depth image in metres whose centre is that of its pixels, from a camera at the world's origin.
+/// A depth image in meters whose center is that of its pixels, from a camera at the world's origin.
 pub(crate) fn image(pixels: &[f32], width: usize, focal: f64) -> DepthImage<'_> {
     let height = pixels.len() / width;
     DepthImage {
         pixels: DepthPixels::F32(pixels),
         camera: pinhole(width, height, [focal, focal, 0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)]),
-        metres_per_unit: 1.0,
+        meters_per_unit: 1.0,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

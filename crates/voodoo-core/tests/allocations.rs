@@ -10,7 +10,7 @@ use counting::allocations_so_far;
 use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
 
-use voodoo_core::{Body, Config, Options, People, Tracker};
+use voodoo_core::{Body, Config, People, PeopleOptions, Tracker};
 use voodoo_core::{Frame, PositionRelation, RayRelation};
 use voodoo_core::{Rendering, Viewpoint};
 
@@ -59,13 +59,13 @@ fn people_allocations() -> [usize; 2] {
     let camera = scene::DepthCamera { width: 160, height: 124, focal: 110.0 };
     let mut noise = scene::Noise(3);
     let mut pixels = vec![u16::MAX; 160 * 124];
-    let mut people = People::new(body.clone(), Config::default(), Options::default()).unwrap();
+    let mut people = People::new(body.clone(), Config::default(), PeopleOptions::default()).unwrap();
     for aside in [-0.6, 0.6] {
         let shift = Vec3::new(0.3, aside, 0.0);
         let place = |pose: &Pose| Pose::from_parts(pose.translation + shift, pose.rotation);
         let poses: Vec<Pose> = scene::standing(&body).iter().map(place).collect();
-        let (seen, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
-        pixels.iter_mut().zip(seen).for_each(|(all, pixel)| *all = pixel.min(*all));
+        let (frame_pixels, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
+        pixels.iter_mut().zip(frame_pixels).for_each(|(all, pixel)| *all = pixel.min(*all));
         let sites = (0..body.sites().len()).map(|site| (site, body.site_position(&poses, site)));
         people.add(&sites.collect::<Vec<_>>(), false).unwrap();
     }
@@ -80,7 +80,7 @@ fn people_allocations() -> [usize; 2] {
             counts[1] += 1;
         }
     }
-    assert_eq!(people.there().count(), 2, "both are followed");
+    assert_eq!(people.present().count(), 2, "both are followed");
     counts
 }
 
@@ -99,7 +99,7 @@ fn allocations_of_a_rendering() -> usize {
     allocations_so_far() - before
 }
 
-/// Allocations of warm steps by colour pictures of so many cameras alone, of a body that stands and one that steps aside.
+/// Allocations of warm steps by color pictures of so many cameras alone, of a body that stands and one that steps aside.
 fn region_allocations(cameras: usize) -> usize {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let standing = color_scene::standing(&body);
@@ -131,7 +131,7 @@ fn a_warm_step_or_rendering_allocates_nothing() {
 
     assert_eq!(allocations_of_a_rendering(), 0);
     for cameras in [4, 2] {
-        assert_eq!(region_allocations(cameras), 0, "colour regions of {cameras} cameras");
+        assert_eq!(region_allocations(cameras), 0, "color regions of {cameras} cameras");
     }
     let [allocating, all] = people_allocations();
     assert!(allocating == 0, "{allocating} of {all} frames of two persons");

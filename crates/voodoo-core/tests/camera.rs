@@ -41,7 +41,7 @@ fn within(noise: &mut Noise, low: f64, high: f64) -> f64 {
 }
 
 #[test]
-fn the_ray_behind_a_pixel_is_seen_in_it_and_the_pixel_of_a_ray_looks_along_it() {
+fn the_ray_behind_a_pixel_is_visible_in_it_and_the_pixel_of_a_ray_looks_along_it() {
     let mut noise = Noise(5);
     for lens in lenses() {
         let camera = through(lens);
@@ -72,7 +72,7 @@ fn a_fisheye_sees_nearly_to_its_plane() {
 }
 
 #[test]
-fn beyond_the_radius_at_which_a_lens_folds_nothing_is_seen() {
+fn beyond_the_radius_at_which_a_lens_folds_nothing_is_visible() {
     // r (1 - 0.25 r^2) is greatest at r = sqrt(4 / 3).
     let camera = through(Lens::PlumbBob([-0.25, 0.0, 0.0, 0.0, 0.0]));
     assert!(camera.project(Vec3::new(1.15, 0.0, 1.0)).is_some());
@@ -90,11 +90,11 @@ fn gradients_are_the_differences_of_projections() {
             let z = within(&mut noise, 0.5, 5.0);
             let point = Vec3::new(within(&mut noise, -0.7, 0.7) * z, within(&mut noise, -0.5, 0.5) * z, z);
             for along in [[1.0, 0.0], [0.0, 1.0], [0.6, -0.8]] {
-                let seen = |point: Vec3| camera.project(point).map(|[u, v]| along[0] * u + along[1] * v).unwrap();
+                let observed = |point: Vec3| camera.project(point).map(|[u, v]| along[0] * u + along[1] * v).unwrap();
                 let gradient = camera.gradient(point, along).unwrap();
                 for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
                     let step = 1e-5;
-                    let slope = (seen(point + axis * step) - seen(point - axis * step)) / (2.0 * step);
+                    let slope = (observed(point + axis * step) - observed(point - axis * step)) / (2.0 * step);
                     let found = gradient.dot(axis);
                     assert!((slope - found).abs() < 1e-4 * (1.0 + slope.abs()), "{slope} {found} {lens:?} {point}");
                 }
@@ -122,7 +122,7 @@ fn rays_of_pixels_are_those_of_their_centers() {
 }
 
 #[test]
-fn a_window_holds_all_that_is_seen_of_a_box() {
+fn a_window_holds_all_that_is_visible_of_a_box() {
     let mut noise = Noise(7);
     for lens in lenses() {
         let camera = through(lens);
@@ -132,15 +132,15 @@ fn a_window_holds_all_that_is_seen_of_a_box() {
                 Vec3::new(within(&mut noise, -3.0, 2.0), within(&mut noise, -3.0, 2.0), within(&mut noise, 0.2, 3.0));
             let size = Vec3::new(0.7, 1.1, 0.5);
             let corner = |index: usize| {
-                let share = |bit: usize| f64::from(u8::from(index & bit != 0));
-                low + size * Vec3::new(share(1), share(2), share(4))
+                let fraction = |bit: usize| f64::from(u8::from(index & bit != 0));
+                low + size * Vec3::new(fraction(1), fraction(2), fraction(4))
             };
             let [columns, rows] = camera.window((0..8).map(corner));
             smaller += usize::from(columns.len() * rows.len() < 320 * 240);
             for _ in 0..200 {
-                let share =
+                let fraction =
                     Vec3::new(within(&mut noise, 0.0, 1.0), within(&mut noise, 0.0, 1.0), within(&mut noise, 0.0, 1.0));
-                if let Some(index) = camera.index_of(low + size * share) {
+                if let Some(index) = camera.index_of(low + size * fraction) {
                     assert!(columns.contains(&(index % 320)) && rows.contains(&(index / 320)), "{lens:?} {low}");
                 }
             }

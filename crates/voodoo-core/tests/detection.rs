@@ -4,7 +4,7 @@
 use crate::scene;
 use voodoo_core::DepthImage;
 use voodoo_core::HumanModel;
-use voodoo_core::Options;
+use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Config, Frame, People, Status, Tracker};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
@@ -60,23 +60,23 @@ impl Detect for Fixed {
         }
         let mut depth = Vec::new();
         around.open_depth(image, &mut depth);
-        let shows = |root: Vec3| {
+        let displays = |root: Vec3| {
             let point = |index: usize| image.world_from_sensor * image.back_project(index, depth[index]);
             let within = |index: usize| (point(index) - root).abs().max_element() < 0.9;
             (0..depth.len()).filter(|index| depth[*index] > 0.0 && depth[*index] < 3.0 && within(*index)).count() > 100
         };
-        Ok(self.found.iter().filter(|(root, _)| shows(*root)).map(|(_, seen)| seen.clone()).collect())
+        Ok(self.found.iter().filter(|(root, _)| displays(*root)).map(|(_, observed)| observed.clone()).collect())
     }
 }
 
-/// The greatest distance of a tracked site from the truth, metres.
+/// The greatest distance of a tracked site from the truth, meters.
 fn farthest(tracker: &Tracker, body: &Body, poses: &[Pose]) -> f64 {
     let sites = tracker.estimate().sites.iter().enumerate();
     sites.map(|(site, place)| place.distance(body.site_position(poses, site))).fold(0.0, f64::max)
 }
 
 /// Shows a tracker an image so many times.
-fn show(tracker: &mut Tracker, pixels: &[u16], frames: std::ops::Range<i32>) {
+fn feed(tracker: &mut Tracker, pixels: &[u16], frames: std::ops::Range<i32>) {
     let images = [CAMERA.image(pixels)];
     for frame in frames {
         tracker.step(&Frame::empty(f64::from(frame) / 30.0).with_images(&images)).unwrap();
@@ -93,7 +93,7 @@ fn a_detector_of_five_joints_starts_a_body_from_nothing_and_names_that_the_body_
     for joints in [&FIVE[..], &nose, &FIVE[1..]] {
         let detector = Fixed::of(joints).seeing(&body, &poses);
         let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap().with_detector(Box::new(detector));
-        show(&mut tracker, &pixels, 0..10);
+        feed(&mut tracker, &pixels, 0..10);
         assert_eq!(tracker.estimate().status, Status::Tracking, "{joints:?}");
         let off = farthest(&tracker, &body, &poses);
         assert!(off < 0.08, "{joints:?}: {off} m off");
@@ -112,7 +112,7 @@ fn joints_are_those_of_the_body_after_its_limbs_were_edited() {
         tracker.remove_limb(hand).unwrap();
     }
     assert!(tracker.can_search() && tracker.body().sites().len() < body.sites().len());
-    show(&mut tracker, &pixels, 0..10);
+    feed(&mut tracker, &pixels, 0..10);
     assert_eq!(tracker.estimate().status, Status::Tracking);
     for name in FIVE {
         let truth = body.site_position(&poses, body.site_index(name).unwrap());
@@ -142,7 +142,7 @@ fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() 
         let mut detector = detector.seeing(&body, &poses);
         detector.found[0].1.lengths = lengths.iter().map(|(_, length)| [*length, 0.02]).collect();
         let mut tracker = Tracker::new(body.clone(), config.clone()).unwrap().with_detector(Box::new(detector));
-        show(&mut tracker, &pixels, 0..1);
+        feed(&mut tracker, &pixels, 0..1);
         let shape = |name: &str| tracker.body().limbs()[body.limb_index(name).unwrap()].shape.length();
         ["l_thigh", "r_thigh", "l_calf"].map(shape)
     };
@@ -162,7 +162,7 @@ fn lengths_that_are_reported_set_the_sizes_and_others_stay_as_they_were_given() 
 }
 
 #[test]
-fn a_detector_that_fails_leaves_the_step_as_it_would_be_without_detections_and_says_why() {
+fn a_detector_that_fails_leaves_the_step_as_it_would_be_without_detections_and_reports_why() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let poses = scene::standing(&body);
     let (pixels, _) = CAMERA.shoot(&body, &poses, 0.005, &mut scene::Noise(3));
@@ -194,21 +194,23 @@ fn what_cannot_be_meant_is_a_failure_that_names_it() {
     let good = Fixed::of(&FIVE).seeing(&body, &poses);
     type Wrong = fn(&mut Detection);
     let wrongs: [(&str, Wrong); 7] = [
-        ("detection[0].joints: expected 5", |seen| seen.joints.truncate(2)),
-        ("detection[0].joints[1]: expected finite", |seen| seen.joints[1].as_mut().unwrap().position.x = f64::NAN),
-        ("detection[0].joints[0].sigma: expected finite metres > 0", |seen| {
-            seen.joints[0].as_mut().unwrap().sigma = 0.0
+        ("detection[0].joints: expected 5", |observed| observed.joints.truncate(2)),
+        ("detection[0].joints[1]: expected finite", |observed| {
+            observed.joints[1].as_mut().unwrap().position.x = f64::NAN
         }),
-        ("detection[0].lengths: expected 0", |seen| seen.lengths = vec![[1.0, 0.1]]),
-        ("detection[0].person and facing", |seen| seen.person = f64::NAN),
-        ("detection[0].low and high", |seen| seen.high = Vec3::INFINITY),
-        ("detection[0].pixels: expected indices below 19840", |seen| seen.pixels = vec![usize::MAX]),
+        ("detection[0].joints[0].sigma: expected finite meters > 0", |observed| {
+            observed.joints[0].as_mut().unwrap().sigma = 0.0
+        }),
+        ("detection[0].lengths: expected 0", |observed| observed.lengths = vec![[1.0, 0.1]]),
+        ("detection[0].person and facing", |observed| observed.person = f64::NAN),
+        ("detection[0].low and high", |observed| observed.high = Vec3::INFINITY),
+        ("detection[0].pixels: expected indices below 19840", |observed| observed.pixels = vec![usize::MAX]),
     ];
     for (words, wrong) in wrongs {
         let mut detector = good.clone();
         wrong(&mut detector.found[0].1);
         let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap().with_detector(Box::new(detector));
-        show(&mut tracker, &pixels, 0..3);
+        feed(&mut tracker, &pixels, 0..3);
         let error = tracker.detector_error().map(ToString::to_string).unwrap_or_default();
         assert!(error.starts_with(words), "{error}");
         assert_eq!(tracker.estimate().status, Status::Searching, "{words}");
@@ -224,8 +226,8 @@ fn several_persons_are_found_by_any_detector_and_without_one_who_is_added_is_fol
     });
     let mut pixels = vec![u16::MAX; CAMERA.width * CAMERA.height];
     for poses in &places {
-        let (seen, _) = CAMERA.shoot(&body, poses, 0.002, &mut scene::Noise(4));
-        pixels.iter_mut().zip(seen).for_each(|(all, pixel)| *all = pixel.min(*all));
+        let (observed, _) = CAMERA.shoot(&body, poses, 0.002, &mut scene::Noise(4));
+        pixels.iter_mut().zip(observed).for_each(|(all, pixel)| *all = pixel.min(*all));
     }
     let images = [CAMERA.image(&pixels)];
     let step = |people: &mut People, frames: i32| {
@@ -234,9 +236,9 @@ fn several_persons_are_found_by_any_detector_and_without_one_who_is_added_is_fol
         }
     };
     let roots = |people: &People| -> Vec<Vec3> {
-        people.there().map(|(_, tracker)| tracker.estimate().world_from_limb[0].translation).collect()
+        people.present().map(|(_, tracker)| tracker.estimate().world_from_limb[0].translation).collect()
     };
-    let new = || People::new(body.clone(), Config::default(), Options::default()).unwrap();
+    let new = || People::new(body.clone(), Config::default(), PeopleOptions::default()).unwrap();
     let mut people =
         new().with_detector(Box::new(Fixed::of(&FIVE).seeing(&body, &places[0]).seeing(&body, &places[1])));
     step(&mut people, 12);
@@ -248,12 +250,12 @@ fn several_persons_are_found_by_any_detector_and_without_one_who_is_added_is_fol
     let mut failing = new().with_detector(Box::new(Fixed { fails: true, ..Fixed::of(&FIVE) }));
     step(&mut failing, 1);
     assert_eq!(failing.detector_error().map(ToString::to_string).as_deref(), Some("out of order"));
-    let mut told = new();
+    let mut given = new();
     let positions: Vec<(usize, Vec3)> =
         (0..body.sites().len()).map(|site| (site, body.site_position(&places[0], site))).collect();
-    assert!(told.add(&positions[..1], true).is_err(), "one position fixes no pose");
-    assert_eq!(told.add(&positions, false).unwrap(), 1);
-    step(&mut told, 3);
-    let found = roots(&told);
+    assert!(given.add(&positions[..1], true).is_err(), "one position fixes no pose");
+    assert_eq!(given.add(&positions, false).unwrap(), 1);
+    step(&mut given, 3);
+    let found = roots(&given);
     assert!(found.len() == 1 && found[0].distance(places[0][0].translation) < 0.1, "{found:?}");
 }

@@ -203,7 +203,7 @@ fn step(from: &mut Hostile, tracker: &mut Tracker, good: &[[f64; 3]], stamp: &mu
     let image = DepthImage {
         pixels: DepthPixels::F32(&pixels),
         camera: &camera,
-        metres_per_unit: from.positive(1.0),
+        meters_per_unit: from.positive(1.0),
         world_from_sensor: if from.below(4) == 0 { from.pose() } else { scene::DepthCamera::world_from_sensor() },
         weight: from.positive(1.0),
         source: 0,

@@ -32,13 +32,13 @@ fn moved(poses: &[Pose], motion: &Pose) -> Vec<Pose> {
     poses.iter().map(|pose| *motion * *pose).collect()
 }
 
-/// A motion of the standing person about its own place: up to `turn` radians and `shift` metres.
+/// A motion of the standing person about its own place: up to `turn` radians and `shift` meters.
 fn small_motion(turn: f64, shift: f64) -> impl Strategy<Value = Pose> {
     (any::<u64>()).prop_map(move |seed| {
         let mut noise = scene::Noise(seed);
-        let centre = scene::standing(&human())[0].translation;
+        let center = scene::standing(&human())[0].translation;
         let rotation = Quat::from_scaled_axis(noise.vector(turn));
-        Pose::from_parts(centre - rotation * centre + noise.vector(shift), rotation)
+        Pose::from_parts(center - rotation * center + noise.vector(shift), rotation)
     })
 }
 
@@ -60,10 +60,10 @@ proptest! {
         let truth = Body::human(stature, HumanModel::Papers).unwrap();
         let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
         let poses = scene::bent(&truth, root, 0.5, &mut noise);
-        let wanted = sites(&truth, &poses);
-        let named: Vec<(usize, Vec3)> = wanted.iter().copied().enumerate().collect();
+        let expected = sites(&truth, &poses);
+        let named: Vec<(usize, Vec3)> = expected.iter().copied().enumerate().collect();
         let (body, found) = human().fit(&named, true).unwrap();
-        prop_assert!(largest_distance(&sites(&body, &found), &wanted) < 1e-6);
+        prop_assert!(largest_distance(&sites(&body, &found), &expected) < 1e-6);
         for (limb, original) in body.limbs().iter().zip(truth.limbs()) {
             let off = (limb.shape.length() - original.shape.length()).abs();
             prop_assert!(off < 1e-4, "length of {} is {off} m off", limb.name);
@@ -75,9 +75,9 @@ proptest! {
         let mut noise = scene::Noise(seed);
         let truth = Body::human(1.6, HumanModel::Full).unwrap();
         let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
-        let wanted = sites(&truth, &scene::bent(&truth, root, 0.5, &mut noise));
+        let expected = sites(&truth, &scene::bent(&truth, root, 0.5, &mut noise));
         let away = Vec3::new(east, north, 100.0);
-        let named = |shift: Vec3| wanted.iter().map(|place| *place + shift).enumerate().collect::<Vec<_>>();
+        let named = |shift: Vec3| expected.iter().map(|place| *place + shift).enumerate().collect::<Vec<_>>();
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let (here, poses) = body.fit(&named(Vec3::ZERO), true).unwrap();
         let (there, mut moved) = body.fit(&named(away), true).unwrap();
@@ -92,14 +92,14 @@ proptest! {
         let mut noise = scene::Noise(seed);
         let truth = Body::human(stature, HumanModel::Full).unwrap();
         let root = Pose::from_parts(noise.vector(3.0), Quat::from_scaled_axis(noise.vector(3.0)));
-        let mut wanted = sites(&truth, &truth.rest_pose(root));
+        let mut expected = sites(&truth, &truth.rest_pose(root));
         // Shrugged: both shoulders higher than at rest; the arms hang where they hung.
         for name in ["l_shoulder", "r_shoulder"] {
-            wanted[truth.site_index(name).unwrap()] += root.rotation * Vec3::Z * (0.1 * rise * stature);
+            expected[truth.site_index(name).unwrap()] += root.rotation * Vec3::Z * (0.1 * rise * stature);
         }
-        let named: Vec<(usize, Vec3)> = wanted.iter().copied().enumerate().collect();
+        let named: Vec<(usize, Vec3)> = expected.iter().copied().enumerate().collect();
         let (body, found) = Body::human(1.75, HumanModel::Full).unwrap().fit(&named, true).unwrap();
-        prop_assert!(largest_distance(&sites(&body, &found), &wanted) < 1e-6);
+        prop_assert!(largest_distance(&sites(&body, &found), &expected) < 1e-6);
     }
 
     #[test]
@@ -132,19 +132,19 @@ proptest! {
     }
 
     #[test]
-    fn a_foreshortened_calf_is_as_long_as_its_pair(share in 0.5..0.74_f64, other in 0.77..1.0_f64) {
+    fn a_foreshortened_calf_is_as_long_as_its_pair(fraction in 0.5..0.74_f64, other in 0.77..1.0_f64) {
         let truth = Body::human(1.7, HumanModel::Full).unwrap();
         let measured = sites(&truth, &truth.rest_pose(Pose::IDENTITY));
-        let fitted = |name: &str, share: f64| {
+        let fitted = |name: &str, fraction: f64| {
             let (knee, ankle) = (truth.site_index("l_knee").unwrap(), truth.site_index(name).unwrap());
             let mut named: Vec<(usize, Vec3)> = measured.iter().copied().enumerate().collect();
-            named[ankle].1 = named[knee].1.lerp(named[ankle].1, share);
+            named[ankle].1 = named[knee].1.lerp(named[ankle].1, fraction);
             named.retain(|(site, _)| !truth.sites()[*site].name.ends_with("toe"));
             let (body, _) = truth.fit(&named, true).unwrap();
             let length = |name: &str| body.limbs()[body.limb_index(name).unwrap()].shape.length();
             length("l_calf") / length("r_calf")
         };
-        prop_assert!((fitted("l_ankle", share) - 1.0).abs() < 1e-6);
+        prop_assert!((fitted("l_ankle", fraction) - 1.0).abs() < 1e-6);
         // What persons may differ by is believed.
         prop_assert!((fitted("l_ankle", other) - other).abs() < 1e-2);
     }

@@ -20,19 +20,19 @@ fn started() -> (Tracker, Vec<[f64; 3]>) {
 /// Refuses `bad` after one good frame, naming `what`, and goes on as if it had never come.
 #[track_caller]
 fn refused(bad: &Frame, what: &str) {
-    let ((mut seen, points), (mut spared, _)) = (started(), started());
+    let ((mut refusing, points), (mut spared, _)) = (started(), started());
     let clouds = [scene::cloud(&points)];
-    for tracker in [&mut seen, &mut spared] {
+    for tracker in [&mut refusing, &mut spared] {
         tracker.step(&scene::with_cloud(1.0, &clouds)).unwrap();
     }
-    let before = scene::bits(seen.estimate());
-    let error = seen.step(bad).unwrap_err();
+    let before = scene::bits(refusing.estimate());
+    let error = refusing.step(bad).unwrap_err();
     assert!(error.to_string().contains(what), "expected {what:?} in {error}");
-    assert_eq!(scene::bits(seen.estimate()), before, "the refusal changed the estimate");
+    assert_eq!(scene::bits(refusing.estimate()), before, "the refusal changed the estimate");
     for stamp in [2.0, 3.0] {
         let frame = scene::with_cloud(stamp, &clouds);
-        let (seen, spared) = (seen.step(&frame).unwrap(), spared.step(&frame).unwrap());
-        assert_eq!(scene::bits(seen), scene::bits(spared), "the refusal left a trace");
+        let (refusing, spared) = (refusing.step(&frame).unwrap(), spared.step(&frame).unwrap());
+        assert_eq!(scene::bits(refusing), scene::bits(spared), "the refusal left a trace");
     }
 }
 
@@ -76,7 +76,7 @@ fn bad_images_are_refused() {
     let base = DepthImage {
         pixels: DepthPixels::U16(&pixels),
         camera: &camera,
-        metres_per_unit: 0.001,
+        meters_per_unit: 0.001,
         world_from_sensor: scene::DepthCamera::world_from_sensor(),
         weight: 1.0,
         source: 0,
@@ -84,8 +84,8 @@ fn bad_images_are_refused() {
     for (image, what) in [
         (DepthImage { camera: &wider, ..base }, "depth[0].image"),
         (DepthImage { pixels: DepthPixels::U16(&[]), ..base }, "depth[0].image"),
-        (DepthImage { metres_per_unit: 0.0, ..base }, "depth[0].metres_per_unit"),
-        (DepthImage { metres_per_unit: f64::NAN, ..base }, "depth[0].metres_per_unit"),
+        (DepthImage { meters_per_unit: 0.0, ..base }, "depth[0].meters_per_unit"),
+        (DepthImage { meters_per_unit: f64::NAN, ..base }, "depth[0].meters_per_unit"),
         (DepthImage { weight: -2.0, ..base }, "depth[0].weight"),
         (
             DepthImage { world_from_sensor: Pose::from_parts(Vec3::NAN, Quat::IDENTITY), ..base },
@@ -132,7 +132,7 @@ fn a_tracker_without_a_pose_searches_and_refuses_every_frame_of_a_body_that_no_d
     assert!(matches!(tracker.step(&Frame::empty(0.0)), Err(TrackError::TimeBackwards { .. })));
     let two = Fixed::of(&["l_hip", "r_hip", "nose"]);
     for mut tracker in [new(), new().with_detector(Box::new(two))] {
-        assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+        assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialized);
         assert!(tracker.estimate().stamp.is_nan());
     }
     let tracker = new();
@@ -151,8 +151,8 @@ fn a_refused_reset_changes_nothing() {
     assert!(matches!(tracker.reset(&line, true), Err(TrackError::Underdetermined { .. })));
     assert!(tracker.reset(&[(99, Vec3::ZERO)], true).unwrap_err().to_string().contains("99"));
     assert!(tracker.reset(&[(0, Vec3::NAN); 3], true).unwrap_err().to_string().contains("humanoid_root"));
-    let millimetres: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();
-    assert!(tracker.reset(&millimetres, true).unwrap_err().to_string().contains("found 1000.0000 times"));
+    let millimeters: Vec<_> = sites_of(&tracker).into_iter().map(|(site, place)| (site, place * 1000.0)).collect();
+    assert!(tracker.reset(&millimeters, true).unwrap_err().to_string().contains("found 1000.0000 times"));
     assert!(tracker.reset_pose(&[Pose::IDENTITY]).unwrap_err().to_string().contains("10 limbs"));
     assert!(tracker.scale(0.0).is_err() && tracker.scale(f64::NAN).is_err());
     assert!(tracker.remove_limb("torso").is_err() && tracker.remove_limb("tail").is_err());
@@ -230,7 +230,7 @@ fn joints_have_the_bands_of_their_kind() {
         let joint = &limbs[1].parent.as_ref().unwrap().1;
         let points: Vec<Vec3> = joint.band_points().collect();
         assert_eq!((joint.kind(), joint.band_count(), points.len()), (kind, count, count));
-        assert!(points.iter().sum::<Vec3>().length() < 1e-12, "the bands lie about the centre");
+        assert!(points.iter().sum::<Vec3>().length() < 1e-12, "the bands lie about the center");
         for point in points {
             let (a, b) = (point.x.abs(), point.y.abs());
             assert!([a, b] == [0.0; 2] || [a, 0.0] == [semi_axes[0], b] || [0.0, b] == [a, semi_axes[1]]);
@@ -264,6 +264,6 @@ fn configuration_entries_keep_their_ranges() {
         }
         assert!(!field.doc.is_empty());
     }
-    let unknown = Config::default().set("colour", &RawValue::Switch(true)).unwrap_err();
-    assert_eq!(unknown, ConfigError::UnknownKey("colour".into()));
+    let unknown = Config::default().set("color", &RawValue::Switch(true)).unwrap_err();
+    assert_eq!(unknown, ConfigError::UnknownKey("color".into()));
 }

@@ -1,4 +1,4 @@
-//! Pose from colour regions alone: followed, told, refused and the same every time.
+//! Pose from color regions alone: followed, told, refused and the same every time.
 #![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use crate::{color_scene, scene};
@@ -24,11 +24,11 @@ fn posed(body: &Body, time: f64) -> Vec<Pose> {
         standing(body).iter().map(|pose| Pose::from_parts(pose.translation + time * STEP, pose.rotation)).collect();
     let upper = body.limb_index("l_upperarm").unwrap();
     let joint = &body.limbs()[upper].parent.as_ref().unwrap().1;
-    let centre = poses[upper] * joint.limb_from_joint.translation;
+    let center = poses[upper] * joint.limb_from_joint.translation;
     let turn = Quat::from_axis_angle(Vec3::X, 0.3 + 0.06 * time);
     for name in ["l_upperarm", "l_forearm", "l_hand"] {
         let pose = &mut poses[body.limb_index(name).unwrap()];
-        *pose = Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
+        *pose = Pose::from_parts(center + turn * (pose.translation - center), turn * pose.rotation);
     }
     poses
 }
@@ -44,7 +44,7 @@ fn started(body: &Body, config: Config) -> Tracker {
     tracker
 }
 
-/// Greatest distance of the sites from those of the body at a time, metres, and their mean.
+/// Greatest distance of the sites from those of the body at a time, meters, and their mean.
 fn off(body: &Body, estimate: &Estimate, time: f64) -> (f64, f64) {
     let poses = posed(body, time);
     let far: Vec<f64> =
@@ -52,20 +52,20 @@ fn off(body: &Body, estimate: &Estimate, time: f64) -> (f64, f64) {
     (far.iter().copied().fold(0.0, f64::max), far.iter().sum::<f64>() / far.len() as f64)
 }
 
-/// Follows the body through the frames; `late` is how much earlier each camera looked than the frame's stamp, in frames, and `told`
+/// Follows the body through the frames; `late` is how much earlier each camera looked than the frame's stamp, in frames, and `stamped`
 /// whether its stamp says so.
-fn followed(config: Config, late: [f64; CAMERAS], told: bool, grey: bool) -> Estimate {
+fn followed(config: Config, late: [f64; CAMERAS], stamped: bool, gray: bool) -> Estimate {
     let body = human();
     let mut tracker = started(&body, config);
     for frame in 0..FRAMES {
         let all = pictures(&body, |camera| frame as f64 - late[camera]);
-        let greys: Vec<Vec<u8>> =
+        let grays: Vec<Vec<u8>> =
             all.iter().map(|one| one.iter().map(|[r, g, b]| r / 4 + g / 2 + b / 4).collect()).collect();
         let stamp = frame as f64 / RATE;
         let colors: Vec<ColorImage> = (0..CAMERAS)
             .map(|camera| {
-                let image = picture(&all[camera], camera, stamp - if told { late[camera] / RATE } else { 0.0 });
-                if grey { ColorImage { pixels: ColorPixels::Grey(&greys[camera]), ..image } } else { image }
+                let image = picture(&all[camera], camera, stamp - if stamped { late[camera] / RATE } else { 0.0 });
+                if gray { ColorImage { pixels: ColorPixels::Gray(&grays[camera]), ..image } } else { image }
             })
             .collect();
         tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
@@ -74,16 +74,16 @@ fn followed(config: Config, late: [f64; CAMERAS], told: bool, grey: bool) -> Est
 }
 
 #[test]
-fn a_body_is_followed_by_colours_or_grey_alone_and_its_limbs_are_measured() {
+fn a_body_is_followed_by_colors_or_gray_alone_and_its_limbs_are_measured() {
     let body = human();
-    for (grey, most, mean) in [(false, 0.045, 0.015), (true, 0.06, 0.02)] {
-        let estimate = followed(Config::default(), [0.0; CAMERAS], true, grey);
+    for (gray, most, mean) in [(false, 0.045, 0.015), (true, 0.06, 0.02)] {
+        let estimate = followed(Config::default(), [0.0; CAMERAS], true, gray);
         let (farthest, middle) = off(&body, &estimate, (FRAMES - 1) as f64);
-        assert!(farthest < most && middle < mean, "grey {grey}: {farthest} m, mean {middle} m");
-        assert_eq!(estimate.status, Status::Tracking, "grey {grey}");
+        assert!(farthest < most && middle < mean, "gray {gray}: {farthest} m, mean {middle} m");
+        assert_eq!(estimate.status, Status::Tracking, "gray {gray}");
         for name in ["head", "l_forearm", "r_forearm", "l_thigh", "r_thigh", "l_calf", "r_calf"] {
             let status = estimate.limb_status[body.limb_index(name).unwrap()];
-            assert_eq!(status, LimbStatus::Measured, "grey {grey}: {name}");
+            assert_eq!(status, LimbStatus::Measured, "gray {gray}: {name}");
         }
     }
     // Without regions the pictures say nothing: the body stays where it was.
@@ -94,22 +94,24 @@ fn a_body_is_followed_by_colours_or_grey_alone_and_its_limbs_are_measured() {
 #[test]
 fn a_camera_that_looked_earlier_saw_the_body_of_then() {
     let (body, late) = (human(), [0.0, 0.5, 0.8, 0.3]);
-    let [told, untold] = [true, false].map(|told| {
-        let estimate = followed(Config::default(), late, told, false);
+    let [stamped, unstamped] = [true, false].map(|stamped| {
+        let estimate = followed(Config::default(), late, stamped, false);
         off(&body, &estimate, (FRAMES - 1) as f64).1
     });
-    assert!(told < 0.015 && untold > told + 0.003, "told {told} m, untold {untold} m");
+    assert!(stamped < 0.015 && unstamped > stamped + 0.003, "told {stamped} m, untold {unstamped} m");
 }
 
 #[test]
 fn a_body_that_is_not_in_the_pictures_is_not_tracked() {
     let body = human();
     let mut tracker = started(&body, Config::default());
-    let (seen, empty) = (pictures(&body, |_| 0.0), (0..CAMERAS).map(|camera| shoot(None, camera)).collect::<Vec<_>>());
+    let (observed, empty) =
+        (pictures(&body, |_| 0.0), (0..CAMERAS).map(|camera| shoot(None, camera)).collect::<Vec<_>>());
     for frame in 0..12 {
         let stamp = frame as f64 / RATE;
-        let shown = if frame < 4 { &seen } else { &empty };
-        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&shown[camera], camera, stamp)).collect();
+        let pictures_now = if frame < 4 { &observed } else { &empty };
+        let colors: Vec<ColorImage> =
+            (0..CAMERAS).map(|camera| picture(&pictures_now[camera], camera, stamp)).collect();
         let status = tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap().status;
         assert!(frame >= 4 || status == Status::Tracking, "{status:?} in frame {frame}");
     }
@@ -120,15 +122,15 @@ fn a_body_that_is_not_in_the_pictures_is_not_tracked() {
 fn swung(body: &Body, limbs: [&str; 3], turn: Quat) -> Vec<Pose> {
     let mut poses = standing(body);
     let upper = body.limb_index(limbs[0]).unwrap();
-    let centre = poses[upper] * body.limbs()[upper].parent.as_ref().unwrap().1.limb_from_joint.translation;
+    let center = poses[upper] * body.limbs()[upper].parent.as_ref().unwrap().1.limb_from_joint.translation;
     for name in limbs {
         let pose = &mut poses[body.limb_index(name).unwrap()];
-        *pose = Pose::from_parts(centre + turn * (pose.translation - centre), turn * pose.rotation);
+        *pose = Pose::from_parts(center + turn * (pose.translation - center), turn * pose.rotation);
     }
     poses
 }
 
-/// How far the end of a limb is off, metres, after it was swung away between two frames.
+/// How far the end of a limb is off, meters, after it was swung away between two frames.
 fn after_a_swing(config: Config, limbs: [&str; 3], turn: Quat, frames: usize) -> f64 {
     let body = human();
     let mut tracker = Tracker::new(body.clone(), config).unwrap();
@@ -137,8 +139,8 @@ fn after_a_swing(config: Config, limbs: [&str; 3], turn: Quat, frames: usize) ->
     let shots = [&still, &away].map(|poses| (0..CAMERAS).map(|n| shoot(Some((&body, poses)), n)).collect::<Vec<_>>());
     for frame in 0..4 + frames {
         let stamp = frame as f64 / RATE;
-        let seen = &shots[usize::from(frame >= 4)];
-        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, stamp)).collect();
+        let shot = &shots[usize::from(frame >= 4)];
+        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&shot[camera], camera, stamp)).collect();
         tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
     }
     let end = body.limb_index(limbs[1]).unwrap();
@@ -147,7 +149,7 @@ fn after_a_swing(config: Config, limbs: [&str; 3], turn: Quat, frames: usize) ->
 }
 
 #[test]
-fn an_arm_or_leg_that_is_lost_in_colours_is_looked_for_and_found() {
+fn an_arm_or_leg_that_is_lost_in_colors_is_searched_for_and_found() {
     let arm = (["l_upperarm", "l_forearm", "l_hand"], Quat::from_rotation_x(1.6));
     let leg = (["r_thigh", "r_calf", "r_foot"], Quat::from_rotation_y(-0.9));
     for (limbs, turn) in [arm, leg] {
@@ -159,7 +161,7 @@ fn an_arm_or_leg_that_is_lost_in_colours_is_looked_for_and_found() {
 }
 
 /// How many edges the first camera finds on the left arm, with a depth camera beside it; before the half of the picture with that
-/// arm, or before the other one, stands a board in the clothes' colour.
+/// arm, or before the other one, stands a board in the clothes' color.
 fn edges_beside_depth(body: &Body, before_arm: bool) -> usize {
     let poses = standing(body);
     let (mut pixels, mut depth) = (shoot(Some((body, &poses)), 0), depth_of(body, &poses, 0));
@@ -184,7 +186,7 @@ fn what_a_depth_camera_sees_before_the_body_hides_its_edges() {
     assert!(beside > 10 && before == 0, "{beside} edges, {before} behind a board");
 }
 
-/// How far an ankle is off, metres, eight frames after both legs of a stride changed places between two frames.
+/// How far an ankle is off, meters, eight frames after both legs of a stride changed places between two frames.
 fn after_a_change_of_step(hypotheses: bool) -> f64 {
     let body = human();
     let stride = |left: f64| {
@@ -202,8 +204,8 @@ fn after_a_change_of_step(hypotheses: bool) -> f64 {
     let shots = [&before, &after].map(|poses| (0..CAMERAS).map(|n| shoot(Some((&body, poses)), n)).collect::<Vec<_>>());
     for frame in 0..12 {
         let stamp = frame as f64 / RATE;
-        let seen = &shots[usize::from(frame >= 4)];
-        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, stamp)).collect();
+        let shot = &shots[usize::from(frame >= 4)];
+        let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&shot[camera], camera, stamp)).collect();
         tracker.step(&Frame::empty(stamp).with_colors(&colors)).unwrap();
     }
     let calf = body.limb_index("l_calf").unwrap();
@@ -212,7 +214,7 @@ fn after_a_change_of_step(hypotheses: bool) -> f64 {
 }
 
 #[test]
-fn legs_that_change_places_between_two_frames_are_exchanged() {
+fn legs_that_change_places_between_two_frames_are_swapped() {
     let [with, without] = [true, false].map(after_a_change_of_step);
     assert!(with < 0.06 && without > 0.15, "{with} m, and {without} m where nothing is tried");
 }
@@ -228,8 +230,8 @@ fn the_same_pictures_give_the_same_bits() {
 fn what_cannot_be_used_is_refused_and_changes_nothing() {
     let body = human();
     let mut tracker = started(&body, Config::default());
-    let seen = pictures(&body, |_| 0.0);
-    let good: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&seen[camera], camera, 0.0)).collect();
+    let observed = pictures(&body, |_| 0.0);
+    let good: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&observed[camera], camera, 0.0)).collect();
     tracker.step(&Frame::empty(0.0).with_colors(&good)).unwrap();
     let small = [[0_u8; 3]; 6];
     tracker.set_background(0, &[(ColorPixels::Color(&small), [2, 3])]).unwrap();
@@ -237,14 +239,14 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
     let refused = |tracker: &mut Tracker, pictures: &[ColorImage]| {
         tracker.step(&Frame::empty(0.1).with_colors(pictures)).unwrap_err().to_string()
     };
-    let at = |camera: usize, stamp: f64| picture(&seen[camera], camera, stamp);
+    let at = |camera: usize, stamp: f64| picture(&observed[camera], camera, stamp);
     assert!(refused(&mut tracker, &[at(0, 0.1)]).contains("color[0].image: expected a picture like those"));
     assert!(refused(&mut tracker, &[at(1, 0.1), at(1, 0.1)]).contains("color[1].source"));
     assert!(refused(&mut tracker, &[at(1, 0.4)]).contains("color[0].stamp"));
     let bent = Camera::new(WIDTH, HEIGHT, [200.0, 200.0, 119.5, 99.5], Lens::Fisheye([0.0; 4])).unwrap();
     assert!(refused(&mut tracker, &[ColorImage { camera: &bent, ..at(1, 0.1) }]).contains("color[0].camera"));
-    let unlike = [(ColorPixels::Color(&small[..]), [2, 3]), (ColorPixels::Color(&small[..4]), [2, 2])];
-    assert!(tracker.set_background(0, &unlike).unwrap_err().to_string().contains("images[1]"));
+    let unequal = [(ColorPixels::Color(&small[..]), [2, 3]), (ColorPixels::Color(&small[..4]), [2, 2])];
+    assert!(tracker.set_background(0, &unequal).unwrap_err().to_string().contains("images[1]"));
     assert_eq!(format!("{tracker:?}"), before);
     tracker.set_background(0, &[]).unwrap();
     let next: Vec<ColorImage> = (0..CAMERAS).map(|camera| at(camera, 0.1)).collect();
@@ -254,8 +256,8 @@ fn what_cannot_be_used_is_refused_and_changes_nothing() {
 #[test]
 fn pictures_of_the_empty_scene_help_where_clothes_are_as_the_room() {
     let body = human();
-    let seen = |time: f64| pictures(&body, |_| time);
-    // A room of the shirt's colour, but for its noise.
+    let observed = |time: f64| pictures(&body, |_| time);
+    // A room of the shirt's color, but for its noise.
     let dye = |pixels: &mut Vec<[u8; 3]>, empty: &[[u8; 3]]| {
         for (pixel, empty) in pixels.iter_mut().zip(empty) {
             if *pixel == *empty {
@@ -264,15 +266,15 @@ fn pictures_of_the_empty_scene_help_where_clothes_are_as_the_room() {
         }
     };
     let rooms: Vec<Vec<[u8; 3]>> = (0..CAMERAS).map(|camera| shoot(None, camera)).collect();
-    let ends = [false, true].map(|shown| {
+    let ends = [false, true].map(|with_depth| {
         let mut tracker = started(&body, Config::default());
-        for camera in (0..CAMERAS).filter(|_| shown) {
+        for camera in (0..CAMERAS).filter(|_| with_depth) {
             let mut room = rooms[camera].clone();
             dye(&mut room, &rooms[camera]);
             tracker.set_background(camera as u16, &[(ColorPixels::Color(&room), [200, 240])]).unwrap();
         }
         for frame in 0..FRAMES {
-            let mut all = seen(frame as f64);
+            let mut all = observed(frame as f64);
             all.iter_mut().zip(&rooms).for_each(|(pixels, room)| dye(pixels, room));
             let stamp = frame as f64 / RATE;
             let colors: Vec<ColorImage> = (0..CAMERAS).map(|camera| picture(&all[camera], camera, stamp)).collect();

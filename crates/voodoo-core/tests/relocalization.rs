@@ -12,9 +12,9 @@ const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124,
 /// The standing person moved and turned about its own axis.
 fn moved(body: &Body, shift: Vec3, turn: f64) -> Vec<Pose> {
     let standing = scene::standing(body);
-    let (centre, turn) = (standing[0].translation, Quat::from_axis_angle(Vec3::Z, turn));
+    let (center, turn) = (standing[0].translation, Quat::from_axis_angle(Vec3::Z, turn));
     let place =
-        |pose: &Pose| Pose::from_parts(centre + shift + turn * (pose.translation - centre), turn * pose.rotation);
+        |pose: &Pose| Pose::from_parts(center + shift + turn * (pose.translation - center), turn * pose.rotation);
     standing.iter().map(place).collect()
 }
 

@@ -42,12 +42,12 @@ fn loose(shapes: &[TaperedEllipticCylinder]) -> Body {
     Body::new("loose", shapes.iter().enumerate().map(limb).collect(), Vec::new()).expect("a valid body")
 }
 
-/// Every pixel agrees with the nearest exact hit: the same depth to a micrometre, and the limb unless two are level. Where
-/// one sees a limb and the other does not, the ray touches it: with the limb a micrometre fatter it hits, slimmer it misses.
+/// Every pixel agrees with the nearest exact hit: the same depth to a micrometer, and the limb unless two are level. Where
+/// one sees a limb and the other does not, the ray touches it: with the limb a micrometer fatter it hits, slimmer it misses.
 fn agrees_with_exact_rays(body: &Body, poses: &[Pose], view: &Viewpoint) -> usize {
     let mut image = Rendering::default();
     image.render(body, poses, view, None).expect("valid input");
-    let mut seen = 0;
+    let mut hits = 0;
     for pixel in 0..view.camera.pixels() {
         let direction = ray(view, pixel);
         let hit = |limb: usize, fatter: f64| {
@@ -66,7 +66,7 @@ fn agrees_with_exact_rays(body: &Body, poses: &[Pose], view: &Viewpoint) -> usiz
         let (depth, limb) = (f64::from(image.depth()[pixel]), image.limb()[pixel]);
         assert_eq!(limb == NO_LIMB, depth == 0.0);
         let depth = if limb == NO_LIMB { f64::INFINITY } else { depth };
-        seen += usize::from(limb != NO_LIMB);
+        hits += usize::from(limb != NO_LIMB);
         let close = |a: f64, b: f64| a == b || (a - b).abs() < 2e-6 * a.min(b).max(1.0);
         if close(depth, exact) {
             if limb != NO_LIMB {
@@ -82,7 +82,7 @@ fn agrees_with_exact_rays(body: &Body, poses: &[Pose], view: &Viewpoint) -> usiz
             "pixel {pixel} of {view:?}: {depth} of limb {limb}, exactly {exact}, between {fat} and {slim}; {body:?} {poses:?}"
         );
     }
-    seen
+    hits
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn agrees_with_the_exact_ray_of_every_limb() {
         }
     }
     // Any shape anywhere: beside, behind and around the camera too.
-    let mut seen = 0;
+    let mut hits = 0;
     for _ in 0..60 {
         let mut shapes: Vec<_> = (0..4).map(|_| random_shape(&mut random)).collect();
         shapes.extend(limb_like());
@@ -115,9 +115,9 @@ fn agrees_with_the_exact_ray_of_every_limb() {
             .iter()
             .map(|_| Pose::from_parts(random.direction() * random.within(0.0, 3.0), random.pose().rotation))
             .collect();
-        seen += agrees_with_exact_rays(&loose(&shapes), &poses, &camera(24, 20, 15.0));
+        hits += agrees_with_exact_rays(&loose(&shapes), &poses, &camera(24, 20, 15.0));
     }
-    assert!(seen > 2000, "{seen}");
+    assert!(hits > 2000, "{hits}");
 }
 
 #[test]

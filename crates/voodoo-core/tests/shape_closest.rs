@@ -22,7 +22,7 @@ fn check(shape: &TaperedEllipticCylinder, q: Vec3, grid: usize) {
     if distance > TOLERANCE {
         assert_eq!(found.signed_distance < 0.0, inside(shape, q), "{}", context());
     }
-    // Where a neighbour of the query has its foot elsewhere the point is not unique; otherwise it must be the same. The dense
+    // Where a neighbor of the query has its foot elsewhere the point is not unique; otherwise it must be the same. The dense
     // search knows the angle only to the square root of the rounding of the distance, hence 2 µm.
     let away = (q - point).normalize_or_zero();
     let unique = [away * -1e-4, Vec3::new(7e-5, 5e-5, -6e-5)]
@@ -178,7 +178,7 @@ fn approximate_distance_is_near_the_exact_one() {
         }
     }
     errors.sort_by(f64::total_cmp);
-    let at = |share: f64| errors[(share * (errors.len() - 1) as f64) as usize];
+    let at = |fraction: f64| errors[(fraction * (errors.len() - 1) as f64) as usize];
     println!("approximate distance: median {:.2e}, 95 % {:.2e}, max {:.2e} m", at(0.5), at(0.95), at(1.0));
     assert!(at(0.5) < 5e-4 && at(0.95) < 3e-3 && at(1.0) < 3e-2);
     for shape in hostile() {

@@ -1,50 +1,50 @@
 //! What hangs together in a depth image, and which of it may be a person.
 
-use crate::view::View;
+use crate::view::ThinnedImage;
 use nalgebra::{Matrix3, Vector3};
 use voodoo_core::math::{Vec3, widest};
 
-/// Neighbouring pixels hang together when their depths differ by less than this, metres, and so much of the depth.
+/// Neighboring pixels hang together when their depths differ by less than this, meters, and so much of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
 /// What is too large for a person is cut again with steps of this share of those before.
 const CUT_FINER: f32 = 0.5;
 /// How often.
 const CUTS: usize = 2;
-/// Surface of a person that a camera sees, square metres: from a head and shoulders to a wide coat.
+/// Surface of a person that a camera sees, square meters: from a head and shoulders to a wide coat.
 const AREA: [f64; 2] = [0.08, 1.7];
-/// Length of a person's box along its longest edge, metres.
+/// Length of a person's box along its longest edge, meters.
 const LENGTH: [f64; 2] = [0.45, 2.5];
-/// Parts smaller than this are noise, square metres.
-const LEAST_PART: f64 = 0.004;
-/// Parts of a person that something hides the link of are at most so far apart, metres.
+/// Parts smaller than this are noise, square meters.
+const LEAST_COMPONENT: f64 = 0.004;
+/// Parts of a person that something hides the link of are at most so far apart, meters.
 const GAP: f64 = 0.28;
-/// Standard deviation of a flat part's points across it, metres: walls and table tops are no people.
-const FLAT_PART: f64 = 0.022;
+/// Standard deviation of a flat part's points across it, meters: walls and table tops are no people.
+const FLAT_COMPONENT: f64 = 0.022;
 /// Points of a part that distances are taken from.
-const PART_SAMPLES: usize = 48;
+const COMPONENT_SAMPLES: usize = 48;
 /// Parts that are looked at, the largest first.
-const MOST_PARTS: usize = 40;
+const MOST_COMPONENTS: usize = 40;
 /// No label.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// What hangs together; camera frame, metres.
+/// What hangs together; camera frame, meters.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct Component {
     label: u32,
     area: f64,
     low: Vec3,
     high: Vec3,
-    samples: [Vec3; PART_SAMPLES],
+    samples: [Vec3; COMPONENT_SAMPLES],
     sampled: usize,
     /// Points so far, of which every so manyth was kept.
-    seen: usize,
+    added: usize,
     every: usize,
     flat: bool,
 }
 
-impl Part {
+impl Component {
     fn new(label: u32, area: f64) -> Self {
-        let samples = [Vec3::ZERO; PART_SAMPLES];
+        let samples = [Vec3::ZERO; COMPONENT_SAMPLES];
         Self {
             label,
             area,
@@ -52,7 +52,7 @@ impl Part {
             high: Vec3::NEG_INFINITY,
             samples,
             sampled: 0,
-            seen: 0,
+            added: 0,
             every: 1,
             flat: false,
         }
@@ -63,27 +63,27 @@ impl Part {
         self.low = self.low.min(point);
         self.high = self.high.max(point);
         // A power of two: no division for every pixel.
-        if self.seen & (self.every - 1) == 0 {
-            if self.sampled == PART_SAMPLES {
+        if self.added & (self.every - 1) == 0 {
+            if self.sampled == COMPONENT_SAMPLES {
                 // Half of those that are kept make room.
-                for number in 0..PART_SAMPLES / 2 {
+                for number in 0..COMPONENT_SAMPLES / 2 {
                     self.samples[number] = self.samples[2 * number];
                 }
-                (self.sampled, self.every) = (PART_SAMPLES / 2, 2 * self.every);
+                (self.sampled, self.every) = (COMPONENT_SAMPLES / 2, 2 * self.every);
             }
             self.samples[self.sampled] = point;
             self.sampled += 1;
         }
-        self.seen += 1;
+        self.added += 1;
     }
 }
 
 /// Parts that together may be a person.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub struct PersonCandidate {
     /// Labels of its parts.
     pub(crate) labels: Vec<u32>,
-    /// Surface seen, square metres.
+    /// Surface seen, square meters.
     pub area: f64,
     /// Corners of its box, camera frame.
     pub low: Vec3,
@@ -91,7 +91,7 @@ pub struct Candidate {
     pub high: Vec3,
 }
 
-impl Candidate {
+impl PersonCandidate {
     /// Distance of a point in the camera's frame to its box, and a little of that to the box's middle.
     pub(crate) fn distance(&self, point: Vec3) -> f64 {
         /// A place within several boxes belongs to the one whose middle is nearest.
@@ -106,7 +106,7 @@ impl Candidate {
     }
 
     /// Whether both have a part in common.
-    pub(crate) fn shares(&self, other: &Self) -> bool {
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
         self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
     }
 }
@@ -116,20 +116,20 @@ impl Candidate {
 pub(crate) struct Components {
     /// The label of every pixel: the index of another of its part, or of itself.
     pub(crate) labels: Vec<u32>,
-    parts: Vec<Part>,
+    parts: Vec<Component>,
     /// Every label once, ascending.
     distinct: Vec<u32>,
     /// Surface of the part with a label, at the label's place; what stands elsewhere says nothing.
     areas: Vec<f32>,
-    /// 1 for every pixel that is to be joined to its neighbours.
+    /// 1 for every pixel that is to be joined to its neighbors.
     again: Vec<u8>,
-    /// To which of its neighbours each pixel is joined, a bit for each.
+    /// To which of its neighbors each pixel is joined, a bit for each.
     linked: Vec<u8>,
 }
 
 impl Components {
     /// What may be a person, the likeliest sizes first.
-    pub(crate) fn find(&mut self, view: &View, candidates: &mut Vec<Candidate>) {
+    pub(crate) fn find(&mut self, view: &ThinnedImage, candidates: &mut Vec<PersonCandidate>) {
         self.labels.clear();
         self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
         self.again.clear();
@@ -152,7 +152,7 @@ impl Components {
     }
 
     /// Takes too large parts apart and joins their pixels again by smaller steps.
-    fn cut(&mut self, view: &View, finer: f32) {
+    fn cut(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { labels, areas, again, .. } = self;
         again.clear();
         let too_large = |label: &u32| *label != NONE && f64::from(areas[*label as usize]) > AREA[1];
@@ -165,8 +165,8 @@ impl Components {
         self.join(view, finer);
     }
 
-    /// Joins neighbours, and pixels with one between them, of those that are `again` to be joined.
-    fn join(&mut self, view: &View, finer: f32) {
+    /// Joins neighbors, and pixels with one between them, of those that are `again` to be joined.
+    fn join(&mut self, view: &ThinnedImage, finer: f32) {
         self.link(view, finer);
         let width = view.width;
         let mut before = NONE;
@@ -201,7 +201,7 @@ impl Components {
     }
 
     /// Which of the pixels to the left, above, two to the left and two above each pixel is near it, a bit for each.
-    fn link(&mut self, view: &View, finer: f32) {
+    fn link(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { linked, again, .. } = self;
         let width = view.width;
         linked.clear();
@@ -211,7 +211,7 @@ impl Components {
             || {
                 for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
                     let across = back < width;
-                    // Rows one by one: none has a neighbour in the one before it.
+                    // Rows one by one: none has a neighbor in the one before it.
                     for start in (0..view.depth.len()).step_by(width.max(1)) {
                         let from = if across { start + back } else { start };
                         let to = start + width;
@@ -223,8 +223,8 @@ impl Components {
                         let pairs = own.iter().zip(others).zip(again).zip(again_others);
                         for (linked, (((z, other), again), again_other)) in linked[from..to].iter_mut().zip(pairs) {
                             let near = (z - other).abs() < finer * (STEP[0] + STEP[1] * z.min(*other));
-                            let seen = (*z > 0.0) & (*other > 0.0);
-                            *linked |= (u8::from(near & seen) & again & again_other) << bit;
+                            let valid = (*z > 0.0) & (*other > 0.0);
+                            *linked |= (u8::from(near & valid) & again & again_other) << bit;
                         }
                     }
                 }
@@ -245,14 +245,14 @@ impl Components {
     }
 
     /// Surface of everything that hangs together.
-    fn measure(&mut self, view: &View) {
+    fn measure(&mut self, view: &ThinnedImage) {
         let Self { labels, areas, distinct, .. } = self;
         areas.resize(labels.len(), 0.0);
         for label in distinct {
             areas[*label as usize] = 0.0;
         }
         let area = view.pixel_area() as f32;
-        // Neighbours mostly share their label: their sum need not be written for each.
+        // Neighbors mostly share their label: their sum need not be written for each.
         let (mut last, mut sum) = (NONE, 0.0);
         for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
             if *label != last {
@@ -269,17 +269,17 @@ impl Components {
     }
 
     /// Sizes of the parts, the largest first.
-    fn sum_up(&mut self, view: &View) {
+    fn sum_up(&mut self, view: &ThinnedImage) {
         let Self { labels, parts, areas, distinct, .. } = self;
         parts.clear();
         for label in distinct.iter() {
             let area = f64::from(areas[*label as usize]);
-            if area > LEAST_PART {
-                parts.push(Part::new(*label, area));
+            if area > LEAST_COMPONENT {
+                parts.push(Component::new(*label, area));
             }
         }
         parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
-        parts.truncate(MOST_PARTS);
+        parts.truncate(MOST_COMPONENTS);
         // From here on what stands at a label's place is one more than its part's number.
         for label in distinct {
             areas[*label as usize] = 0.0;
@@ -298,12 +298,12 @@ impl Components {
     }
 
     /// Every part that may be a person by itself, and with the parts near it.
-    fn propose(&self, candidates: &mut Vec<Candidate>) {
+    fn propose(&self, candidates: &mut Vec<PersonCandidate>) {
         for (number, part) in self.parts.iter().enumerate() {
             if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
                 continue;
             }
-            let alone = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+            let alone = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
             let together = self.with_near_parts(number);
             for candidate in [alone, together] {
                 let fits = candidate.area > AREA[0] && candidate.area < AREA[1] && {
@@ -319,10 +319,10 @@ impl Components {
     }
 
     /// A part and those that lie near it, as long as all of it is no larger than a person.
-    fn with_near_parts(&self, seed: usize) -> Candidate {
+    fn with_near_parts(&self, seed: usize) -> PersonCandidate {
         let mut taken = vec![seed];
         let part = &self.parts[seed];
-        let mut whole = Candidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
+        let mut whole = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
         let mut next = 0;
         while next < taken.len() {
             let from = &self.parts[taken[next]];
@@ -346,7 +346,7 @@ impl Components {
 }
 
 /// Whether two parts come nearer to each other than a person's parts may be apart.
-fn near(a: &Part, b: &Part) -> bool {
+fn near(a: &Component, b: &Component) -> bool {
     let gap = (a.low - b.high).max(b.low - a.high).max(Vec3::ZERO).length();
     if gap > GAP {
         return false;
@@ -364,12 +364,12 @@ fn is_flat(points: &[Vec3]) -> bool {
         let from = Vector3::from((*point - mean).to_array());
         scatter += from * from.transpose() / count;
     }
-    scatter.symmetric_eigenvalues().min() < FLAT_PART * FLAT_PART
+    scatter.symmetric_eigenvalues().min() < FLAT_COMPONENT * FLAT_COMPONENT
 }
 
 /// How far the seen surface is from a standing person's, in powers of e.
-fn unlikely(candidate: &Candidate) -> f64 {
-    /// Surface of a standing person that a camera sees, square metres.
+fn unlikely(candidate: &PersonCandidate) -> f64 {
+    /// Surface of a standing person that a camera sees, square meters.
     const STANDING: f64 = 0.55;
     (candidate.area / STANDING).ln().abs()
 }
@@ -381,8 +381,8 @@ mod tests {
     use voodoo_core::Surroundings;
 
     /// What may be a person in an image of the unit tests' camera.
-    fn candidates(pixels: &[u16]) -> Vec<Candidate> {
-        let (mut view, mut found) = (View::default(), Vec::new());
+    fn candidates(pixels: &[u16]) -> Vec<PersonCandidate> {
+        let (mut view, mut found) = (ThinnedImage::default(), Vec::new());
         view.read(&image(pixels), &Surroundings::default());
         Components::default().find(&view, &mut found);
         found
@@ -402,7 +402,7 @@ mod tests {
     fn a_person_cut_in_two_by_something_before_it_is_one_candidate() {
         let (body, poses) = standing();
         let mut pixels = before_wall(&body, &poses);
-        // A rail at the height of the hips, a metre before the body.
+        // A rail at the height of the hips, a meter before the body.
         put_board(&mut pixels, Vec3::new(0.0, 0.03, 1.6), [1.5, 0.03]);
         let found = candidates(&pixels);
         let whole = found.iter().find(|candidate| candidate.labels.len() > 1);

@@ -43,15 +43,15 @@ impl Convolution {
     /// One of a file; it looks at maps of this `edge`.
     pub(crate) fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
         let layer = weights.layer(name, 4)?;
-        Ok(Self::of(&layer.weights, &layer.bias, layer.kernel, stride, edge))
+        Ok(Self::from_weights(&layer.weights, &layer.bias, layer.kernel, stride, edge))
     }
 
     /// Of `weights` (out, ky, kx, in) and biases.
-    fn of(weights: &[f32], bias: &[f32], kernel: usize, stride: usize, edge: usize) -> Self {
+    fn from_weights(weights: &[f32], bias: &[f32], kernel: usize, stride: usize, edge: usize) -> Self {
         let products = if kernel == KERNEL && stride == 1 && edge.is_multiple_of(2) {
-            Products::Tiled(Winograd::of(weights, bias))
+            Products::Tiled(Winograd::from_weights(weights, bias))
         } else {
-            Products::Whole(Panels::of(weights, bias))
+            Products::Whole(Panels::from_weights(weights, bias))
         };
         Self { products, kernel, stride, padding: usize::from(kernel > 1) }
     }
@@ -132,7 +132,7 @@ mod tests {
         {
             let map = Map { edge, channels, values: noise(edge * edge * channels, 0.3) };
             let weights = noise(outputs * kernel * kernel * channels, 7.1);
-            let layer = Convolution::of(&weights, &noise(outputs, 1.7), kernel, stride, edge);
+            let layer = Convolution::from_weights(&weights, &noise(outputs, 1.7), kernel, stride, edge);
             assert_eq!((layer.inputs(), layer.outputs(), layer.padding), (channels, outputs, padding));
             let (mut out, mut working) = (Map { values: vec![5.0; 3], ..Map::default() }, Working::default());
             layer.apply(&map, &mut out, &mut working, false);
@@ -147,8 +147,8 @@ mod tests {
                                 continue;
                             }
                             for channel in 0..channels {
-                                let seen = map.values[((y - padding) * edge + x - padding) * channels + channel];
-                                sum += seen * weights[((output * kernel + ky) * kernel + kx) * channels + channel];
+                                let value = map.values[((y - padding) * edge + x - padding) * channels + channel];
+                                sum += value * weights[((output * kernel + ky) * kernel + kx) * channels + channel];
                             }
                         }
                         let found = out.values[(row * out.edge + column) * outputs + output];

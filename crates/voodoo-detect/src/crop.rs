@@ -1,14 +1,14 @@
 //! The picture that the network sees of a candidate: 96 x 96 pixels about its middle, turned so that up is up.
 
-use crate::components::{Candidate, Components, NONE};
-use crate::view::View;
+use crate::components::{Components, NONE, PersonCandidate};
+use crate::view::ThinnedImage;
 use voodoo_core::math::Vec3;
 
 /// Pixels along an edge.
 pub const SIZE: usize = 96;
-/// Its width at the depth of the candidate's middle, metres.
+/// Its width at the depth of the candidate's middle, meters.
 pub const WIDTH: f64 = 2.6;
-/// Depth before and behind the middle that is told apart, metres.
+/// Depth before and behind the middle that is told apart, meters.
 pub const DEPTH: f64 = 1.2;
 
 /// A picture, and how to come back from it to the camera.
@@ -16,7 +16,7 @@ pub const DEPTH: f64 = 1.2;
 pub struct Crop {
     /// Row by row, for every pixel its depth behind the middle, by `DEPTH`, from -1 to 1, and 1 where the candidate is (else 0).
     pub pixels: Vec<[f32; 2]>,
-    /// Its middle: `(x/z, y/z)` in the turned camera, and the depth in metres.
+    /// Its middle: `(x/z, y/z)` in the turned camera, and the depth in meters.
     pub middle: [f64; 3],
     /// Angle by which the camera is turned about its optical axis for up to be up, radians.
     pub roll: f64,
@@ -24,7 +24,12 @@ pub struct Crop {
 
 impl Crop {
     /// The picture of a candidate; `up` in the camera's frame. `None` if it has no pixels.
-    pub(crate) fn of(view: &View, parts: &Components, candidate: &Candidate, up: Vec3) -> Option<Self> {
+    pub(crate) fn from_candidate(
+        view: &ThinnedImage,
+        parts: &Components,
+        candidate: &PersonCandidate,
+        up: Vec3,
+    ) -> Option<Self> {
         let roll = roll(up);
         let (sin, cos) = roll.sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
@@ -45,8 +50,8 @@ impl Crop {
             for column in 0..SIZE {
                 let x = middle[0] + (column as f32 - half) * pixel / z0;
                 let y = middle[1] + (row as f32 - half) * pixel / z0;
-                let seen = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
-                pixels.push(seen.map_or([1.0, 0.0], |index| {
+                let member_index = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
+                pixels.push(member_index.map_or([1.0, 0.0], |index| {
                     let behind = (view.depth[index] - z0) / DEPTH as f32;
                     [behind.clamp(-1.0, 1.0), 1.0]
                 }));
@@ -55,7 +60,7 @@ impl Crop {
         Some(Self { pixels, middle: middle.map(f64::from), roll })
     }
 
-    /// A place of the picture, metres from its middle to the right, down and behind, as a point in the camera's frame.
+    /// A place of the picture, meters from its middle to the right, down and behind, as a point in the camera's frame.
     pub fn to_camera(&self, place: Vec3) -> Vec3 {
         let [x0, y0, z0] = self.middle;
         let z = z0 + place.z;
@@ -100,17 +105,17 @@ mod tests {
             let crop = segmentation.crop(&candidate).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
             // Every pixel of the picture that shows the person, back in the camera, lies on a point that was seen.
-            let seen: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
+            let points: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
             let half = 0.5 * (SIZE as f64 - 1.0);
-            let mut shown = 0;
+            let mut inside = 0;
             for (index, [depth, mask]) in crop.pixels.iter().enumerate().filter(|(_, pixel)| pixel[1] > 0.0) {
                 let [column, row] = [index % SIZE, index / SIZE].map(|at| (at as f64 - half) * WIDTH / SIZE as f64);
                 let place = crop.to_camera(Vec3::new(column, row, DEPTH * f64::from(*depth)));
-                let nearest = seen.iter().map(|point| point.distance(place)).fold(f64::INFINITY, f64::min);
+                let nearest = points.iter().map(|point| point.distance(place)).fold(f64::INFINITY, f64::min);
                 assert!(nearest < 0.02 && *mask == 1.0, "{nearest}");
-                shown += 1;
+                inside += 1;
             }
-            assert!(shown > 300, "{shown}");
+            assert!(inside > 300, "{inside}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
 
-use crate::view::View;
+use crate::view::ThinnedImage;
 use voodoo_core::Ground;
 use voodoo_core::math::{LANES, Vec3};
 
@@ -8,30 +8,30 @@ use voodoo_core::math::{LANES, Vec3};
 const FLOOR_SAMPLES: usize = 1200;
 /// Planes that are tried.
 const TRIALS: usize = 96;
-/// A point is on the floor up to this distance from it, metres, and so much more by the square of its depth, 1/m.
+/// A point is on the floor up to this distance from it, meters, and so much more by the square of its depth, 1/m.
 const NEAR: [f64; 2] = [0.025, 0.003];
 /// A floor holds at least this share of the points.
-const LEAST_SHARE: f64 = 0.03;
+const LEAST_FRACTION: f64 = 0.03;
 /// A point below the floor speaks against it as much as so many on it speak for it: reflections are few.
 const BELOW: f64 = 4.0;
 /// The floor is tilted by at most this against the upwards direction that is assumed: cosine of 40 degrees.
 const LEAST_UPRIGHT: f64 = 0.766;
 
 /// The surface about a point is looked at over so much of the image's width.
-const NEIGHBOUR: f64 = 0.05;
+const NEIGHBOR: f64 = 0.05;
 /// The plane is fitted again to the points within this share of the distance that the trials allowed.
 const NEARER: [f64; 2] = [0.7, 0.5];
 
 /// Points in single precision, coordinate by coordinate, with how far from the floor each may be seen.
 #[derive(Debug, Default)]
-struct Lanes {
+struct PointLanes {
     x: Vec<f32>,
     y: Vec<f32>,
     z: Vec<f32>,
     near: Vec<f32>,
 }
 
-impl Lanes {
+impl PointLanes {
     fn clear(&mut self) {
         [&mut self.x, &mut self.y, &mut self.z, &mut self.near].into_iter().for_each(Vec::clear);
     }
@@ -63,15 +63,15 @@ impl Lanes {
 /// Working memory.
 #[derive(Debug, Default)]
 pub(crate) struct FloorFinder {
-    points: Lanes,
+    points: PointLanes,
     /// Those on surfaces that face upwards.
     level: Vec<Vec3>,
-    level_lanes: Lanes,
+    level_lanes: PointLanes,
 }
 
 impl FloorFinder {
     /// The floor in the camera's frame; `up` is the direction upwards about as it is known there.
-    pub(crate) fn find(&mut self, view: &View, up: Vec3) -> Option<Ground> {
+    pub(crate) fn find(&mut self, view: &ThinnedImage, up: Vec3) -> Option<Ground> {
         self.sample(view, up);
         let count = self.points.x.len();
         if self.level.len() < 20 {
@@ -94,17 +94,17 @@ impl FloorFinder {
             }
         }
         let (score, plane) = best?;
-        let fitted = |plane, share: &f64| self.refined(&plane, *share);
-        (score > LEAST_SHARE * count as f64).then(|| NEARER.iter().fold(plane, fitted))
+        let fitted = |plane, fraction: &f64| self.refined(&plane, *fraction);
+        (score > LEAST_FRACTION * count as f64).then(|| NEARER.iter().fold(plane, fitted))
     }
 
-    fn sample(&mut self, view: &View, up: Vec3) {
+    fn sample(&mut self, view: &ThinnedImage, up: Vec3) {
         self.points.clear();
         self.level.clear();
         self.level_lanes.clear();
-        let seen = view.depth.iter().filter(|z| **z > 0.0).count();
-        let step = (seen / FLOOR_SAMPLES).max(1);
-        let beside = ((NEIGHBOUR * view.width as f64) as usize).max(2);
+        let returns = view.depth.iter().filter(|z| **z > 0.0).count();
+        let step = (returns / FLOOR_SAMPLES).max(1);
+        let beside = ((NEIGHBOR * view.width as f64) as usize).max(2);
         for index in (0..view.depth.len()).filter(|index| view.depth[*index] > 0.0).step_by(step) {
             let point = view.point(index);
             self.points.push(point);
@@ -131,8 +131,8 @@ impl FloorFinder {
     }
 
     /// The plane through all level points near it, by least squares along its normal.
-    fn refined(&self, plane: &Ground, share: f64) -> Ground {
-        let near = |point: &Vec3| share * (NEAR[0] + NEAR[1] * point.z * point.z);
+    fn refined(&self, plane: &Ground, fraction: f64) -> Ground {
+        let near = |point: &Vec3| fraction * (NEAR[0] + NEAR[1] * point.z * point.z);
         let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
         let (mut count, mut mean) = (0.0, Vec3::ZERO);
         for point in self.level.iter().filter(on) {
@@ -189,7 +189,7 @@ mod tests {
     const FOCAL: f64 = 100.0;
 
     /// The floor found by a camera that looks down by `tilt` radians from 1.2 m above a floor, in a room that ends at 4.5 m.
-    fn found(tilt: f64, seen: impl Fn(Vec3) -> bool) -> Option<Ground> {
+    fn found(tilt: f64, is_visible: impl Fn(Vec3) -> bool) -> Option<Ground> {
         let (sin, cos) = tilt.sin_cos();
         let up = Vec3::new(0.0, -cos, -sin);
         let pixels: Vec<f32> = (0..EDGE * EDGE)
@@ -200,16 +200,16 @@ mod tests {
                 let wall = 4.5;
                 let floor = -1.2 / up.dot(ray);
                 let z = if floor > 0.0 && floor < wall { floor } else { wall };
-                if seen(z * ray) { (z + 0.01 * (index as f64 * 12.9898).sin()) as f32 } else { 0.0 }
+                if is_visible(z * ray) { (z + 0.01 * (index as f64 * 12.9898).sin()) as f32 } else { 0.0 }
             })
             .collect();
-        let mut view = View::default();
+        let mut view = ThinnedImage::default();
         let half = 0.5 * (EDGE as f64 - 1.0);
         let camera = Camera::pinhole(EDGE, EDGE, [FOCAL, FOCAL, half, half]).unwrap();
         let image = DepthImage {
             pixels: DepthPixels::F32(&pixels),
             camera: &camera,
-            metres_per_unit: 1.0,
+            meters_per_unit: 1.0,
             world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,

@@ -28,7 +28,7 @@ mod view;
 pub mod weights;
 mod winograd;
 
-pub use components::Candidate;
+pub use components::PersonCandidate;
 pub use names::{JOINTS, LENGTHS};
 
 use crop::Crop;
@@ -45,7 +45,7 @@ use weights::WeightsError;
 /// Log odds from which on a candidate is taken for a person.
 const PERSON: f32 = 0.0;
 /// Candidates of an image that the network looks at where everybody is asked for: costs time in proportion.
-const MOST_LOOKS: usize = 12;
+const MAX_EVALUATIONS: usize = 12;
 /// The standard deviation of a Laplace distribution is this many times its scale.
 const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
 
@@ -95,10 +95,10 @@ impl Detector {
         let at = |number: usize| &self.segmentation.candidates()[number];
         match query {
             DetectionQuery::All => {}
-            DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last(at(*number))),
+            DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last_rejection(at(*number))),
             DetectionQuery::New => {
-                order.retain(|number| !self.rejections.is_old(at(*number)));
-                order.sort_by_key(|number| self.rejections.last(at(*number)));
+                order.retain(|number| !self.rejections.is_rejected(at(*number)));
+                order.sort_by_key(|number| self.rejections.last_rejection(at(*number)));
             }
             DetectionQuery::Near(place) => {
                 let place = *camera_from_world * place;
@@ -144,20 +144,20 @@ impl Detect for Detector {
         let order = self.order(query, &image.world_from_sensor.inverse());
         let Self { memory, segmentation, found: numbers, nearest, rejections, .. } = self;
         let mut found: Vec<(usize, Detection)> = Vec::new();
-        let mut looks = 0;
+        let mut evaluations = 0;
         for number in order {
             let candidate = &segmentation.candidates()[number];
             let Some(crop) = segmentation.crop(candidate) else { continue };
-            let answer = network.look(&crop.pixels, memory);
-            looks += 1;
+            let answer = network.evaluate(&crop.pixels, memory);
+            evaluations += 1;
             if nearest.is_none() {
                 *nearest = Some((f64::from(answer.person), in_world(candidate, &image.world_from_sensor)));
             }
             if answer.person > PERSON {
                 found.push((number, detection(&answer, &crop, candidate, &image.world_from_sensor)));
             }
-            rejections.note(candidate, answer.person > PERSON);
-            if looks == MOST_LOOKS || query != DetectionQuery::All {
+            rejections.record(candidate, answer.person > PERSON);
+            if evaluations == MAX_EVALUATIONS || query != DetectionQuery::All {
                 break;
             }
         }
@@ -170,7 +170,7 @@ impl Detect for Detector {
         for (number, mut detection) in found {
             let candidate = &segmentation.candidates()[number];
             // Of candidates that share parts the surest stays.
-            if numbers.iter().any(|other| segmentation.candidates()[*other].shares(candidate)) {
+            if numbers.iter().any(|other| segmentation.candidates()[*other].overlaps(candidate)) {
                 continue;
             }
             detection.floor = floor;
@@ -188,13 +188,13 @@ impl Detect for Detector {
     fn reject(&mut self, index: usize) {
         let number = self.found.get(index);
         if let Some(candidate) = number.and_then(|number| self.segmentation.candidates().get(*number)) {
-            self.rejections.note(candidate, false);
+            self.rejections.record(candidate, false);
         }
     }
 }
 
 /// The box about a candidate's box.
-fn in_world(candidate: &Candidate, world_from_camera: &Pose) -> Aabb {
+fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
     let corners = [candidate.low, candidate.high];
     let corner = |number: usize| {
         let pick = |bit: usize, axis: usize| corners[(number >> bit) & 1][axis];
@@ -204,7 +204,7 @@ fn in_world(candidate: &Candidate, world_from_camera: &Pose) -> Aabb {
 }
 
 /// What the network reports, in the world.
-fn detection(answer: &Answer, crop: &Crop, candidate: &Candidate, world_from_camera: &Pose) -> Detection {
+fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_from_camera: &Pose) -> Detection {
     let joint = |((place, log_scale), visible): ((&[f32; 3], &f32), &f32)| {
         Some(DetectedJoint {
             position: *world_from_camera * crop.to_camera(Vec3::from_array(place.map(f64::from))),

@@ -53,12 +53,12 @@ impl Stage {
 
 /// A matrix and a bias.
 #[derive(Debug)]
-struct Linear(Panels);
+struct LinearLayer(Panels);
 
-impl Linear {
+impl LinearLayer {
     fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
         let layer = weights.layer(name, 2)?;
-        Ok(Self(Panels::of(&layer.weights, &layer.bias)))
+        Ok(Self(Panels::from_weights(&layer.weights, &layer.bias)))
     }
 
     fn apply(&self, values: &[f32]) -> Vec<f32> {
@@ -71,9 +71,9 @@ impl Linear {
 /// What the network says of a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answer {
-    /// Places of the joints: metres to the right, down and behind the picture's middle.
+    /// Places of the joints: meters to the right, down and behind the picture's middle.
     pub joints: Vec<[f32; 3]>,
-    /// Natural logarithm of the scale (metres) of their error (Laplace).
+    /// Natural logarithm of the scale (meters) of their error (Laplace).
     pub log_scale: Vec<f32>,
     /// Log odds that they are in the image.
     pub visible: Vec<f32>,
@@ -81,7 +81,7 @@ pub struct Answer {
     pub facing: f32,
     /// Log odds that it is a person.
     pub person: f32,
-    /// Natural logarithms of lengths, metres.
+    /// Natural logarithms of lengths, meters.
     pub log_lengths: Vec<f32>,
     /// Natural logarithms of the scale of their error.
     pub log_length_scale: Vec<f32>,
@@ -93,11 +93,11 @@ pub struct Network {
     top: [Convolution; 2],
     middle: Residual,
     head: Convolution,
-    hidden: Option<Linear>,
-    visible: Linear,
-    facing: Linear,
-    person: Linear,
-    sizes: Option<[Linear; 3]>,
+    hidden: Option<LinearLayer>,
+    visible: LinearLayer,
+    facing: LinearLayer,
+    person: LinearLayer,
+    sizes: Option<[LinearLayer; 3]>,
 }
 
 impl std::fmt::Debug for Network {
@@ -128,10 +128,10 @@ impl Network {
         ];
         let top =
             [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
-        let hidden = if weights.has("hidden.weight") { Some(Linear::take(weights, "hidden")?) } else { None };
+        let hidden = if weights.has("hidden.weight") { Some(LinearLayer::take(weights, "hidden")?) } else { None };
         let sizes = ["scale", "length", "length_scale"];
         let sizes = if weights.has("scale.weight") {
-            let [scale, length, length_scale] = sizes.map(|name| Linear::take(weights, name));
+            let [scale, length, length_scale] = sizes.map(|name| LinearLayer::take(weights, name));
             Some([scale?, length?, length_scale?])
         } else {
             None
@@ -139,9 +139,9 @@ impl Network {
         let network = Self {
             middle: Residual::take(weights, "mid", SIZE / 8)?,
             head: Convolution::take(weights, "head", 1, SIZE / 8)?,
-            visible: Linear::take(weights, "visible")?,
-            facing: Linear::take(weights, "facing")?,
-            person: Linear::take(weights, "person")?,
+            visible: LinearLayer::take(weights, "visible")?,
+            facing: LinearLayer::take(weights, "facing")?,
+            person: LinearLayer::take(weights, "person")?,
             stages,
             top,
             hidden,
@@ -186,7 +186,7 @@ impl Network {
             linear.extend([(scale, pooled, joints), (length, pooled, lengths), (length_scale, pooled, lengths)]);
         }
         for (layer, inputs, outputs) in linear {
-            let Linear(layer) = layer;
+            let LinearLayer(layer) = layer;
             if layer.inputs != inputs || layer.outputs != outputs {
                 let found = format!("{} and {}", layer.inputs, layer.outputs);
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
@@ -201,7 +201,7 @@ impl Network {
     }
 
     /// Looks at a picture, `SIZE * SIZE` pixels.
-    pub fn look(&self, picture: &[[f32; 2]], memory: &mut Memory) -> Answer {
+    pub fn evaluate(&self, picture: &[[f32; 2]], memory: &mut Memory) -> Answer {
         let Memory { maps, between, top, working } = memory;
         top.edge = SIZE;
         top.channels = 2;
@@ -249,7 +249,7 @@ impl Network {
     }
 }
 
-/// Scale of a joint's error where a network does not tell it, metres.
+/// Scale of a joint's error where a network does not tell it, meters.
 const UNKNOWN: f32 = 0.04;
 
 fn mean(map: &Map) -> Vec<f32> {
@@ -272,16 +272,16 @@ fn enlarge(map: &Map, skip: &Map, out: &mut Map) {
     }
 }
 
-/// Where the cells together put a joint, metres from the picture's middle.
+/// Where the cells together put a joint, meters from the picture's middle.
 fn place(map: &Map, joint: usize) -> [f32; 3] {
     let cell = (WIDTH / map.edge as f64) as f32;
     let half = 0.5 * (map.edge as f32 - 1.0);
-    let said = |pixel: usize| &map.values[pixel * map.channels + joint * A_JOINT..][..A_JOINT];
+    let cell_values = |pixel: usize| &map.values[pixel * map.channels + joint * A_JOINT..][..A_JOINT];
     let pixels = 0..map.edge * map.edge;
-    let most = pixels.clone().map(|pixel| said(pixel)[0]).fold(f32::NEG_INFINITY, f32::max);
+    let most = pixels.clone().map(|pixel| cell_values(pixel)[0]).fold(f32::NEG_INFINITY, f32::max);
     let (mut sum, mut place) = (0.0, [0.0; 3]);
     for pixel in pixels {
-        let [counts, right, down, behind] = said(pixel) else { continue };
+        let [counts, right, down, behind] = cell_values(pixel) else { continue };
         let weight = (counts - most).exp();
         let (row, column) = ((pixel / map.edge) as f32, (pixel % map.edge) as f32);
         sum += weight;

@@ -22,7 +22,7 @@ pub(crate) struct Panels {
 
 impl Panels {
     /// Of `weights` for every output, one output after the other, and its `bias`.
-    pub(crate) fn of(weights: &[f32], bias: &[f32]) -> Self {
+    pub(crate) fn from_weights(weights: &[f32], bias: &[f32]) -> Self {
         let outputs = bias.len();
         let inputs = weights.len().checked_div(outputs).unwrap_or(0);
         let groups = outputs.div_ceil(TOGETHER);
@@ -39,8 +39,8 @@ impl Panels {
         Self { inputs, outputs, weights: sorted, bias: sorted_bias }
     }
 
-    /// For each row of `seen`, `inputs` values, its products with the weights, and the biases: a row of `out`, `outputs` values.
-    pub(crate) fn apply(&self, seen: &[f32], out: &mut [f32]) {
+    /// For each row of `activations`, `inputs` values, its products with the weights, and the biases: a row of `out`, `outputs` values.
+    pub(crate) fn apply(&self, activations: &[f32], out: &mut [f32]) {
         if self.inputs == 0 || self.outputs == 0 {
             return;
         }
@@ -50,9 +50,9 @@ impl Panels {
             || {
                 for group in 0..self.bias.len() {
                     if whole {
-                        self.columns::<{ ROWS[0] }>(group, seen, out);
+                        self.columns::<{ ROWS[0] }>(group, activations, out);
                     } else {
-                        self.columns::<{ ROWS[1] }>(group, seen, out);
+                        self.columns::<{ ROWS[1] }>(group, activations, out);
                     }
                 }
             },
@@ -61,10 +61,10 @@ impl Panels {
 
     /// The products with the columns of a group, `MOST` rows together.
     #[inline(always)]
-    fn columns<const MOST: usize>(&self, group: usize, seen: &[f32], out: &mut [f32]) {
-        let (seen, out) = self.rows::<MOST>(group, seen, out);
-        let (seen, out) = self.rows::<FEW_ROWS>(group, seen, out);
-        self.rows::<1>(group, seen, out);
+    fn columns<const MOST: usize>(&self, group: usize, activations: &[f32], out: &mut [f32]) {
+        let (activations, out) = self.rows::<MOST>(group, activations, out);
+        let (activations, out) = self.rows::<FEW_ROWS>(group, activations, out);
+        self.rows::<1>(group, activations, out);
     }
 
     /// The same of so many rows together, as far as there are so many; what is left.
@@ -72,21 +72,23 @@ impl Panels {
     fn rows<'a, 'b, const COUNT: usize>(
         &self,
         group: usize,
-        seen: &'a [f32],
+        activations: &'a [f32],
         out: &'b mut [f32],
     ) -> (&'a [f32], &'b mut [f32]) {
         let column = group * TOGETHER;
         let width = TOGETHER.min(self.outputs - column);
         let panel = &self.weights[group * self.inputs..][..self.inputs];
-        let whole = seen.len() / (COUNT * self.inputs);
-        let (seen, seen_last) = seen.split_at(whole * COUNT * self.inputs);
+        let whole = activations.len() / (COUNT * self.inputs);
+        let (activations, activations_last) = activations.split_at(whole * COUNT * self.inputs);
         let (out, out_last) = out.split_at_mut(whole * COUNT * self.outputs);
-        for (rows, here) in seen.chunks_exact(COUNT * self.inputs).zip(out.chunks_exact_mut(COUNT * self.outputs)) {
+        for (rows, here) in
+            activations.chunks_exact(COUNT * self.inputs).zip(out.chunks_exact_mut(COUNT * self.outputs))
+        {
             let sums = product::<COUNT>(rows, panel, &self.bias[group]);
             let here = here.chunks_exact_mut(self.outputs);
             here.zip(&sums).for_each(|(row, sums)| store(&mut row[column..][..width], sums));
         }
-        (seen_last, out_last)
+        (activations_last, out_last)
     }
 }
 
@@ -142,12 +144,13 @@ mod tests {
         for (count, inputs, outputs) in [(1_usize, 5, 1), (9, 3, 32), (20, 7, 75)] {
             let weights: Vec<f32> = (0..inputs * outputs).map(number).collect();
             let bias: Vec<f32> = (0..outputs).map(|index| number(index + 100)).collect();
-            let seen: Vec<f32> = (0..count * inputs).map(|index| number(index + 1000)).collect();
+            let activations: Vec<f32> = (0..count * inputs).map(|index| number(index + 1000)).collect();
             let mut out = vec![f32::NAN; count * outputs];
-            Panels::of(&weights, &bias).apply(&seen, &mut out);
+            Panels::from_weights(&weights, &bias).apply(&activations, &mut out);
             for (index, found) in out.iter().enumerate() {
                 let (row, output) = (index / outputs, index % outputs);
-                let terms = (0..inputs).map(|input| seen[row * inputs + input] * weights[output * inputs + input]);
+                let terms =
+                    (0..inputs).map(|input| activations[row * inputs + input] * weights[output * inputs + input]);
                 let sum = bias[output] + terms.sum::<f32>();
                 assert!((found - sum).abs() < 1e-5, "{found} for {sum}");
             }

@@ -1,20 +1,20 @@
 //! What was looked at lately and is nobody: furniture stands still, and somebody who comes in shall not wait for it.
 
-use crate::components::Candidate;
+use crate::components::PersonCandidate;
 use voodoo_core::math::Vec3;
 
-/// What stands within this of a rejected place and shows as much surface, by this factor, is the same thing; metres.
+/// What stands within this of a rejected place and shows as much surface, by this factor, is the same thing; meters.
 const SAME_PLACE: f64 = 0.15;
 const SAME_AREA: f64 = 1.3;
 /// Things that are remembered, the last ones.
 const MOST_REJECTED: usize = 16;
 /// What is nobody is no news for so many images.
-const NO_NEWS: usize = 5;
+const REJECTED_IMAGES: usize = 5;
 
 /// Places in the camera's frame, the last one last.
 #[derive(Debug, Default)]
 pub(crate) struct Rejections {
-    looks: usize,
+    evaluations: usize,
     images: usize,
     places: Vec<Rejected>,
 }
@@ -23,7 +23,7 @@ pub(crate) struct Rejections {
 struct Rejected {
     middle: Vec3,
     area: f64,
-    look: usize,
+    evaluation: usize,
     image: usize,
 }
 
@@ -34,19 +34,19 @@ impl Rejections {
     }
 
     /// Whether a candidate was found to be nobody not long ago.
-    pub(crate) fn is_old(&self, candidate: &Candidate) -> bool {
-        self.places.iter().any(|place| self.images - place.image < NO_NEWS && place.is(candidate))
+    pub(crate) fn is_rejected(&self, candidate: &PersonCandidate) -> bool {
+        self.places.iter().any(|place| self.images - place.image < REJECTED_IMAGES && place.matches(candidate))
     }
 
     /// Number of the look at which a candidate was last found to be nobody; 0 for a new one.
-    pub(crate) fn last(&self, candidate: &Candidate) -> usize {
-        self.places.iter().filter(|place| place.is(candidate)).map(|place| place.look).max().unwrap_or(0)
+    pub(crate) fn last_rejection(&self, candidate: &PersonCandidate) -> usize {
+        self.places.iter().filter(|place| place.matches(candidate)).map(|place| place.evaluation).max().unwrap_or(0)
     }
 
     /// Notes a look.
-    pub(crate) fn note(&mut self, candidate: &Candidate, person: bool) {
-        self.looks += 1;
-        self.places.retain(|place| !place.is(candidate));
+    pub(crate) fn record(&mut self, candidate: &PersonCandidate, person: bool) {
+        self.evaluations += 1;
+        self.places.retain(|place| !place.matches(candidate));
         if !person {
             if self.places.len() == MOST_REJECTED {
                 self.places.remove(0);
@@ -54,7 +54,7 @@ impl Rejections {
             self.places.push(Rejected {
                 middle: candidate.middle(),
                 area: candidate.area,
-                look: self.looks,
+                evaluation: self.evaluations,
                 image: self.images,
             });
         }
@@ -62,7 +62,7 @@ impl Rejections {
 }
 
 impl Rejected {
-    fn is(&self, candidate: &Candidate) -> bool {
+    fn matches(&self, candidate: &PersonCandidate) -> bool {
         let ratio = candidate.area / self.area;
         self.middle.distance(candidate.middle()) < SAME_PLACE && ratio < SAME_AREA && ratio > 1.0 / SAME_AREA
     }

@@ -1,9 +1,9 @@
 //! From a depth image to pictures of what may be a person.
 
-use crate::components::{Candidate, Components, NONE};
+use crate::components::{Components, NONE, PersonCandidate};
 use crate::crop::Crop;
 use crate::floor::FloorFinder;
-use crate::view::View;
+use crate::view::ThinnedImage;
 use voodoo_core::Surroundings;
 use voodoo_core::math::Vec3;
 use voodoo_core::{DepthImage, Ground};
@@ -11,26 +11,26 @@ use voodoo_core::{DepthImage, Ground};
 /// Cuts depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]
 pub struct Segmentation {
-    view: View,
+    view: ThinnedImage,
     floor_finder: FloorFinder,
     parts: Components,
-    candidates: Vec<Candidate>,
+    candidates: Vec<PersonCandidate>,
     floor: Option<Ground>,
     up: Vec3,
 }
 
 impl Segmentation {
     /// Looks through an image; the candidates, those of a standing person's size first.
-    pub fn find(&mut self, image: &DepthImage, around: &Surroundings) -> &[Candidate] {
+    pub fn find(&mut self, image: &DepthImage, around: &Surroundings) -> &[PersonCandidate] {
         let camera_from_world = image.world_from_sensor.inverse();
         self.view.read(image, around);
-        let told = around.ground.map(|ground| {
+        let given = around.ground.map(|ground| {
             let normal = camera_from_world.rotation * ground.normal;
-            Ground { normal, ..ground.about(image.world_from_sensor.translation) }
+            Ground { normal, ..ground.relative_to(image.world_from_sensor.translation) }
         });
         // Where nobody told it, up is upwards in the image.
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
-        self.floor = told.or_else(|| self.floor_finder.find(&self.view, up));
+        self.floor = given.or_else(|| self.floor_finder.find(&self.view, up));
         self.up = self.floor.map_or(up, |floor| floor.normal);
         if let Some(floor) = &self.floor {
             self.view.remove_floor(floor);
@@ -40,7 +40,7 @@ impl Segmentation {
     }
 
     /// The candidates of the last image.
-    pub fn candidates(&self) -> &[Candidate] {
+    pub fn candidates(&self) -> &[PersonCandidate] {
         &self.candidates
     }
 
@@ -50,17 +50,17 @@ impl Segmentation {
     }
 
     /// Direction upwards in the last image, camera frame.
-    pub fn up(&self) -> Vec3 {
+    pub fn up_direction(&self) -> Vec3 {
         self.up
     }
 
     /// What the network sees of a candidate of the last image.
-    pub fn crop(&self, candidate: &Candidate) -> Option<Crop> {
-        Crop::of(&self.view, &self.parts, candidate, self.up)
+    pub fn crop(&self, candidate: &PersonCandidate) -> Option<Crop> {
+        Crop::from_candidate(&self.view, &self.parts, candidate, self.up)
     }
 
     /// Indices in the image of all pixels of a candidate, those between thinned ones, too.
-    pub fn mask(&self, candidate: &Candidate, into: &mut Vec<usize>) {
+    pub fn mask(&self, candidate: &PersonCandidate, into: &mut Vec<usize>) {
         into.clear();
         for (index, _) in self.pixels(candidate) {
             self.view.block(index, into);
@@ -68,7 +68,7 @@ impl Segmentation {
     }
 
     /// The pixels of a candidate: their indices in the image and points in the camera's frame. Large images are thinned out.
-    pub fn pixels<'a>(&'a self, candidate: &'a Candidate) -> impl Iterator<Item = (usize, Vec3)> + 'a {
+    pub fn pixels<'a>(&'a self, candidate: &'a PersonCandidate) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let of = |label: &u32| *label != NONE && candidate.labels.binary_search(label).is_ok();
         let indices = self.parts.labels.iter().enumerate().filter(move |(_, label)| of(label)).map(|(index, _)| index);
         indices.map(|index| (self.view.in_image(index), self.view.point(index)))

@@ -11,7 +11,7 @@ use voodoo_core::{Rendering, Viewpoint};
 /// The camera.
 static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [145.0, 145.0, 79.5, 61.5]).unwrap());
 
-/// Depth of the wall behind the body, millimetres.
+/// Depth of the wall behind the body, millimeters.
 const WALL: u16 = 4500;
 
 /// A human who stands 2.6 m before the camera and faces it.
@@ -24,7 +24,7 @@ pub(crate) fn standing() -> (Body, Vec<Pose>) {
     (body, poses)
 }
 
-/// Depth in millimetres, as the camera sees a posed body before a wall.
+/// Depth in millimeters, as the camera sees a posed body before a wall.
 pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
     let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
@@ -32,12 +32,12 @@ pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
 }
 
-/// Puts a board that faces the camera before what an image shows; half its width and height, metres.
-pub(crate) fn put_board(pixels: &mut [u16], centre: Vec3, [width, height]: [f64; 2]) {
+/// Puts a board that faces the camera before what an image shows; half its width and height, meters.
+pub(crate) fn put_board(pixels: &mut [u16], center: Vec3, [width, height]: [f64; 2]) {
     for (index, pixel) in pixels.iter_mut().enumerate() {
-        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| centre.z * ray);
-        let depth = (1000.0 * centre.z) as u16;
-        if (x - centre.x).abs() < width && (y - centre.y).abs() < height && (*pixel == 0 || depth < *pixel) {
+        let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| center.z * ray);
+        let depth = (1000.0 * center.z) as u16;
+        if (x - center.x).abs() < width && (y - center.y).abs() < height && (*pixel == 0 || depth < *pixel) {
             *pixel = depth;
         }
     }
@@ -48,7 +48,7 @@ pub(crate) fn image(pixels: &[u16]) -> DepthImage<'_> {
     DepthImage {
         pixels: DepthPixels::U16(pixels),
         camera: &CAMERA,
-        metres_per_unit: 0.001,
+        meters_per_unit: 0.001,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

@@ -1,4 +1,4 @@
-//! A depth image as the detector looks at it: thinned out, in metres, without what cannot be a person.
+//! A depth image as the detector looks at it: thinned out, in meters, without what cannot be a person.
 
 use voodoo_core::Camera;
 use voodoo_core::Surroundings;
@@ -7,19 +7,19 @@ use voodoo_core::{DepthImage, Ground};
 
 /// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
 const MOST_PIXELS: usize = 26_000;
-/// What lies less than this above the floor is left out, metres: feet would join the person to the floor.
+/// What lies less than this above the floor is left out, meters: feet would join the person to the floor.
 const FLOOR_CLEARANCE: f64 = 0.06;
-/// Depths between which persons are looked for, metres.
+/// Depths between which persons are looked for, meters.
 const RANGE: [f32; 2] = [0.4, 12.0];
 
 /// The thinned image. Points are in the camera's optical frame.
 #[derive(Debug, Default)]
-pub(crate) struct View {
+pub(crate) struct ThinnedImage {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// Every so manyth column and row of the image was kept.
     pub(crate) step: usize,
-    /// Depth, metres; 0: nothing, or nothing that may be a person.
+    /// Depth, meters; 0: nothing, or nothing that may be a person.
     pub(crate) depth: Vec<f32>,
     /// `(x/z, y/z)` of every pixel.
     pub(crate) slopes: Vec<[f32; 2]>,
@@ -28,7 +28,7 @@ pub(crate) struct View {
     camera: Option<Camera>,
 }
 
-impl View {
+impl ThinnedImage {
     /// Reads an image; what holds nobody is left out but for the floor.
     pub(crate) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
         let mut step = 1;
@@ -44,9 +44,9 @@ impl View {
             for column in (0..width).step_by(step) {
                 let index = row * width + column;
                 let slope = image.camera.pixel_ray(column, row).map(|value| value as f32);
-                let z = image.pixels.get(index) * image.metres_per_unit as f32;
-                let seen = z > RANGE[0] && z < RANGE[1] && !slope[0].is_nan();
-                let kept = seen && !around.explains(index, z);
+                let z = image.pixels.get(index) * image.meters_per_unit as f32;
+                let returned = z > RANGE[0] && z < RANGE[1] && !slope[0].is_nan();
+                let kept = returned && !around.explains(index, z);
                 self.depth.push(if kept { z } else { 0.0 });
                 self.slopes.push(slope);
             }
@@ -103,7 +103,7 @@ impl View {
         inside.then(|| row as usize * self.width + column as usize)
     }
 
-    /// Surface that a pixel covers at a depth of 1 m, square metres.
+    /// Surface that a pixel covers at a depth of 1 m, square meters.
     pub(crate) fn pixel_area(&self) -> f64 {
         let [fx, fy] = self.camera.as_ref().map_or([1.0; 2], Camera::focal);
         (self.step * self.step) as f64 / (fx * fy)

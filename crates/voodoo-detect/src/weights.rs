@@ -83,12 +83,12 @@ impl Weights {
 
     /// Shape and values of a tensor with so many edges.
     fn take(&mut self, name: &str, edges: usize) -> Result<(Vec<usize>, Vec<f32>), WeightsError> {
-        let wanted = || format!("{name} with {edges} edge(s)");
+        let expected_text = || format!("{name} with {edges} edge(s)");
         let Some((shape, values)) = self.tensors.remove(name) else {
-            return Err(WeightsError::new(wanted(), "none"));
+            return Err(WeightsError::new(expected_text(), "none"));
         };
         if shape.len() != edges || values.is_empty() || !values.iter().all(|value| value.is_finite()) {
-            return Err(WeightsError::new(wanted(), format!("{shape:?}, or values that are not finite")));
+            return Err(WeightsError::new(expected_text(), format!("{shape:?}, or values that are not finite")));
         }
         Ok((shape, values))
     }

@@ -10,13 +10,13 @@ use voodoo_core::math::widest;
 /// Edge of the kernel.
 pub(crate) const KERNEL: usize = 3;
 /// Edge of what is seen at once.
-const SEEN: usize = 4;
+const TILE: usize = 4;
 /// Edge of what that gives.
-const GIVEN: usize = SEEN + 1 - KERNEL;
+const OUTPUT_TILE: usize = TILE + 1 - KERNEL;
 /// Places of a transformed tile.
-const PLACES: usize = SEEN * SEEN;
+const PLACES: usize = TILE * TILE;
 /// Of these the one that all pixels of a tile get with weight one: the bias is added there.
-const EVERYWHERE: usize = SEEN + 1;
+const EVERYWHERE: usize = TILE + 1;
 
 /// A convolution with a kernel of 3 x 3 that keeps the map's even edge.
 #[derive(Debug)]
@@ -27,29 +27,30 @@ pub(crate) struct Winograd {
 /// Working memory: all tiles of the map, place by place, before and after the products.
 #[derive(Debug, Default)]
 pub(crate) struct Tiles {
-    seen: Vec<f32>,
-    given: Vec<f32>,
+    input_tiles: Vec<f32>,
+    output_tiles: Vec<f32>,
 }
 
 impl Winograd {
     /// Of `weights` (out, ky, kx, in) and biases.
-    pub(crate) fn of(weights: &[f32], bias: &[f32]) -> Self {
+    pub(crate) fn from_weights(weights: &[f32], bias: &[f32]) -> Self {
         let none = vec![0.0; bias.len()];
         let inputs = weights.len().checked_div(bias.len() * KERNEL * KERNEL).unwrap_or(0);
         let mut transformed = vec![Vec::new(); PLACES];
         for kernel in weights.chunks_exact((KERNEL * KERNEL * inputs).max(1)) {
             for input in 0..inputs {
                 let at = |ky: usize, kx: usize| kernel[(ky * KERNEL + kx) * inputs + input];
-                let columns: [[f32; SEEN]; KERNEL] =
+                let columns: [[f32; TILE]; KERNEL] =
                     std::array::from_fn(|kx| of_kernel([0, 1, 2].map(|ky| at(ky, kx))));
-                for row in 0..SEEN {
+                for row in 0..TILE {
                     let places = of_kernel(columns.map(|column| column[row]));
-                    (0..SEEN).for_each(|column| transformed[row * SEEN + column].push(places[column]));
+                    (0..TILE).for_each(|column| transformed[row * TILE + column].push(places[column]));
                 }
             }
         }
-        let panels =
-            |(place, weights): (usize, &Vec<f32>)| Panels::of(weights, if place == EVERYWHERE { bias } else { &none });
+        let panels = |(place, weights): (usize, &Vec<f32>)| {
+            Panels::from_weights(weights, if place == EVERYWHERE { bias } else { &none })
+        };
         Self { places: transformed.iter().enumerate().map(panels).collect() }
     }
 
@@ -64,29 +65,29 @@ impl Winograd {
     /// The map after it, of the same `edge`.
     pub(crate) fn apply(&self, map: &[f32], edge: usize, tiles: &mut Tiles, out: &mut [f32]) {
         let (inputs, outputs) = (self.inputs(), self.outputs());
-        let count = (edge / GIVEN) * (edge / GIVEN);
-        let Tiles { seen, given } = tiles;
-        seen.resize(PLACES * count * inputs, 0.0);
-        given.resize(PLACES * count * outputs, 0.0);
+        let count = (edge / OUTPUT_TILE) * (edge / OUTPUT_TILE);
+        let Tiles { input_tiles, output_tiles } = tiles;
+        input_tiles.resize(PLACES * count * inputs, 0.0);
+        output_tiles.resize(PLACES * count * outputs, 0.0);
         widest(
             #[inline(always)]
-            || look(map, edge, inputs, seen),
+            || transform_input(map, edge, inputs, input_tiles),
         );
         for (place, panels) in self.places.iter().enumerate() {
             panels.apply(
-                &seen[place * count * inputs..][..count * inputs],
-                &mut given[place * count * outputs..][..count * outputs],
+                &input_tiles[place * count * inputs..][..count * inputs],
+                &mut output_tiles[place * count * outputs..][..count * outputs],
             );
         }
         widest(
             #[inline(always)]
-            || give(given, edge, outputs, out),
+            || transform_output(output_tiles, edge, outputs, out),
         );
     }
 }
 
 /// Transforms a line of the kernel.
-fn of_kernel([a, b, c]: [f32; KERNEL]) -> [f32; SEEN] {
+fn of_kernel([a, b, c]: [f32; KERNEL]) -> [f32; TILE] {
     [a, 0.5 * (a + b + c), 0.5 * (a - b + c), c]
 }
 
@@ -97,13 +98,13 @@ type Values = [f32; CHANNELS];
 
 /// All transformed tiles of a map, with zeros around it.
 #[inline(always)]
-fn look(map: &[f32], edge: usize, channels: usize, seen: &mut [f32]) {
-    let across = edge / GIVEN;
+fn transform_input(map: &[f32], edge: usize, channels: usize, input_tiles: &mut [f32]) {
+    let across = edge / OUTPUT_TILE;
     let count = across * across;
     let (mut tile, mut half, mut whole) =
-        ([[[0.0; CHANNELS]; SEEN]; SEEN], [[[0.0; CHANNELS]; SEEN]; SEEN], [[[0.0; CHANNELS]; SEEN]; SEEN]);
+        ([[[0.0; CHANNELS]; TILE]; TILE], [[[0.0; CHANNELS]; TILE]; TILE], [[[0.0; CHANNELS]; TILE]; TILE]);
     for number in 0..count {
-        let (top, left) = (GIVEN * (number / across), GIVEN * (number % across));
+        let (top, left) = (OUTPUT_TILE * (number / across), OUTPUT_TILE * (number % across));
         for first in (0..channels).step_by(CHANNELS) {
             let here = CHANNELS.min(channels - first);
             for (row, line) in tile.iter_mut().enumerate() {
@@ -117,7 +118,7 @@ fn look(map: &[f32], edge: usize, channels: usize, seen: &mut [f32]) {
                     }
                 }
             }
-            for column in 0..SEEN {
+            for column in 0..TILE {
                 for lane in 0..CHANNELS {
                     let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row][column][lane]);
                     half[0][column][lane] = a - c;
@@ -136,7 +137,7 @@ fn look(map: &[f32], edge: usize, channels: usize, seen: &mut [f32]) {
                 }
             }
             for (place, values) in whole.as_flattened().iter().enumerate() {
-                store(&mut seen[(place * count + number) * channels + first..][..here], values);
+                store(&mut input_tiles[(place * count + number) * channels + first..][..here], values);
             }
         }
     }
@@ -144,21 +145,21 @@ fn look(map: &[f32], edge: usize, channels: usize, seen: &mut [f32]) {
 
 /// The map from all its tiles.
 #[inline(always)]
-fn give(given: &[f32], edge: usize, channels: usize, out: &mut [f32]) {
-    let across = edge / GIVEN;
+fn transform_output(output_tiles: &[f32], edge: usize, channels: usize, out: &mut [f32]) {
+    let across = edge / OUTPUT_TILE;
     let count = across * across;
     let (mut tile, mut half, mut whole) =
-        ([[0.0; CHANNELS]; PLACES], [[[0.0; CHANNELS]; SEEN]; GIVEN], [[0.0; CHANNELS]; GIVEN]);
+        ([[0.0; CHANNELS]; PLACES], [[[0.0; CHANNELS]; TILE]; OUTPUT_TILE], [[0.0; CHANNELS]; OUTPUT_TILE]);
     for number in 0..count {
-        let (top, left) = (GIVEN * (number / across), GIVEN * (number % across));
+        let (top, left) = (OUTPUT_TILE * (number / across), OUTPUT_TILE * (number % across));
         for first in (0..channels).step_by(CHANNELS) {
             let here = CHANNELS.min(channels - first);
             for (place, values) in tile.iter_mut().enumerate() {
-                load(values, &given[(place * count + number) * channels + first..][..here]);
+                load(values, &output_tiles[(place * count + number) * channels + first..][..here]);
             }
-            for column in 0..SEEN {
+            for column in 0..TILE {
                 for lane in 0..CHANNELS {
-                    let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row * SEEN + column][lane]);
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|row: usize| tile[row * TILE + column][lane]);
                     half[0][column][lane] = a + b + c;
                     half[1][column][lane] = b - c - d;
                 }

@@ -10,7 +10,7 @@ use counting::allocations_so_far;
 
 use voodoo_core::Frame;
 use voodoo_core::HumanModel;
-use voodoo_core::Options;
+use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Config, People};
 use voodoo_detect::Detector;
@@ -25,10 +25,10 @@ fn people_allocations() -> [usize; 2] {
         let shift = Vec3::new(0.3, aside, 0.0);
         let place = |pose: &Pose| Pose::from_parts(pose.translation + shift, pose.rotation);
         let poses: Vec<Pose> = scene::standing(&body).iter().map(place).collect();
-        let (seen, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
-        pixels.iter_mut().zip(seen).for_each(|(all, pixel)| *all = pixel.min(*all));
+        let (frame_pixels, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
+        pixels.iter_mut().zip(frame_pixels).for_each(|(all, pixel)| *all = pixel.min(*all));
     }
-    let people = People::new(body, Config::default(), Options::default()).unwrap();
+    let people = People::new(body, Config::default(), PeopleOptions::default()).unwrap();
     let mut people = people.with_detector(Box::new(Detector::new()));
     let mut counts = [0, 0];
     for index in 0..200 {
@@ -41,7 +41,7 @@ fn people_allocations() -> [usize; 2] {
             counts[1] += 1;
         }
     }
-    assert_eq!(people.there().count(), 2, "both are followed");
+    assert_eq!(people.present().count(), 2, "both are followed");
     counts
 }
 

@@ -25,13 +25,13 @@ fn vectors() -> BTreeMap<String, Vec<f32>> {
 }
 
 #[test]
-fn the_network_says_what_it_said_where_it_was_trained() {
+fn the_network_reports_what_it_reported_where_it_was_trained() {
     let (vectors, network) = (vectors(), Network::read(WEIGHTS).unwrap());
     let pictures: Vec<[f32; 2]> = vectors["pictures"].as_chunks().0.to_vec();
     let mut memory = Memory::default();
     for (number, picture) in pictures.chunks_exact(SIZE * SIZE).enumerate() {
-        let answer = network.look(picture, &mut memory);
-        let said = [
+        let answer = network.evaluate(picture, &mut memory);
+        let outputs = [
             ("joints", answer.joints.as_flattened().to_vec(), 0.002),
             ("visible", answer.visible, 0.02),
             ("facing", vec![answer.facing], 0.02),
@@ -40,10 +40,10 @@ fn the_network_says_what_it_said_where_it_was_trained() {
             ("length", answer.log_lengths, 0.002),
             ("length_scale", answer.log_length_scale, 0.01),
         ];
-        for (name, found, bound) in said {
-            let wanted = &vectors[name][number * found.len()..][..found.len()];
-            let worst = found.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            assert!(worst < bound, "{name} of picture {number}: {found:?} for {wanted:?}");
+        for (name, found, bound) in outputs {
+            let expected = &vectors[name][number * found.len()..][..found.len()];
+            let worst = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(worst < bound, "{name} of picture {number}: {found:?} for {expected:?}");
         }
     }
     assert!(vectors["person"][0] > 2.0 && vectors["person"][1] < -2.0, "{:?}", vectors["person"]);

@@ -4,7 +4,7 @@
 use crate::scene;
 use voodoo_core::Frame;
 use voodoo_core::HumanModel;
-use voodoo_core::Options;
+use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, People, Status};
 use voodoo_core::{ColorImage, ColorPixels};
@@ -12,7 +12,7 @@ use voodoo_detect::Detector;
 
 const CAMERA: scene::DepthCamera = scene::DepthCamera { width: 160, height: 124, focal: 120.0 };
 const RATE: f64 = 15.0;
-/// Distance of the nearer one's way from the camera, and by how much the other's is farther, metres.
+/// Distance of the nearer one's way from the camera, and by how much the other's is farther, meters.
 const WAYS: [f64; 2] = [2.2, 0.8];
 
 fn body(height: f64) -> Body {
@@ -49,18 +49,18 @@ fn crossing() -> (Vec<Vec<u16>>, Vec<[Vec3; 2]>) {
     (images, ways)
 }
 
-fn people(options: Options, threads: usize) -> People {
+fn people(options: PeopleOptions, threads: usize) -> People {
     let people =
         People::new(body(1.75), scene::with(Config::default(), |config| config.threads = threads), options).unwrap();
     people.with_detector(Box::new(Detector::new()))
 }
 
-fn show(people: &mut People, pixels: &[u16], frame: usize) -> Vec<(usize, Status, Vec3)> {
+fn feed(people: &mut People, pixels: &[u16], frame: usize) -> Vec<(usize, Status, Vec3)> {
     let images = [CAMERA.image(pixels)];
     let input = Frame::empty(frame as f64 / RATE).with_images(&images);
     people.step(&input, &[]).unwrap();
     let place = |tracker: &voodoo_core::Tracker| tracker.estimate().world_from_limb[0].translation;
-    people.there().map(|(id, tracker)| (id, tracker.estimate().status, place(tracker))).collect()
+    people.present().map(|(id, tracker)| (id, tracker.estimate().status, place(tracker))).collect()
 }
 
 /// Level distance of a root from a place of the floor.
@@ -71,11 +71,11 @@ fn off(root: Vec3, place: Vec3) -> f64 {
 #[test]
 fn two_who_cross_keep_their_numbers_and_the_hidden_one_is_not_dragged_along() {
     let (images, ways) = crossing();
-    let new = || people(Options::default(), 1);
+    let new = || people(PeopleOptions::default(), 1);
     let mut people = new();
     let mut last = Vec::new();
     for (frame, (pixels, [near, far])) in images.iter().zip(&ways).enumerate() {
-        last = show(&mut people, pixels, frame);
+        last = feed(&mut people, pixels, frame);
         for (id, status, root) in &last {
             let wrong = off(*root, *near).min(off(*root, *far));
             assert!(*status != Status::Tracking || wrong < 0.2, "frame {frame}: {id} is {wrong} m off");
@@ -88,7 +88,7 @@ fn two_who_cross_keep_their_numbers_and_the_hidden_one_is_not_dragged_along() {
     }
     // Who was nearer at the start is so at the end.
     let mut again = new();
-    let start = images[..8].iter().enumerate().map(|(frame, pixels)| show(&mut again, pixels, frame)).last().unwrap();
+    let start = images[..8].iter().enumerate().map(|(frame, pixels)| feed(&mut again, pixels, frame)).last().unwrap();
     for (id, _, root) in &start {
         let was_near = off(*root, ways[7][0]) < off(*root, ways[7][1]);
         let is = last.iter().find(|(other, ..)| other == id).map(|(_, _, root)| off(*root, near) < off(*root, far));
@@ -100,11 +100,11 @@ fn two_who_cross_keep_their_numbers_and_the_hidden_one_is_not_dragged_along() {
 fn bits_are_the_same_on_any_number_of_threads() {
     let (images, _) = crossing();
     let run = |threads| {
-        let mut people = people(Options::default(), threads);
+        let mut people = people(PeopleOptions::default(), threads);
         let mut all = Vec::new();
         for (frame, pixels) in images.iter().take(16).enumerate() {
-            show(&mut people, pixels, frame);
-            all.extend(people.there().map(|(id, tracker)| (id, scene::bits(tracker.estimate()))));
+            feed(&mut people, pixels, frame);
+            all.extend(people.present().map(|(id, tracker)| (id, scene::bits(tracker.estimate()))));
         }
         all
     };
@@ -116,9 +116,9 @@ fn bits_are_the_same_on_any_number_of_threads() {
 #[test]
 fn a_refused_frame_changes_nothing() {
     let (images, _) = crossing();
-    let mut people = people(Options::default(), 1);
+    let mut people = people(PeopleOptions::default(), 1);
     for (frame, pixels) in images.iter().take(6).enumerate() {
-        show(&mut people, pixels, frame);
+        feed(&mut people, pixels, frame);
     }
     let before = format!("{people:?}");
     let (pictures, none) = ([CAMERA.image(&images[6])], [CAMERA.image(&[])]);
@@ -141,7 +141,7 @@ fn a_refused_frame_changes_nothing() {
 }
 
 /// Numbers of those who are there while somebody comes, is away for `away` seconds, and somebody of `heights[1]` comes.
-fn numbers(heights: [f64; 2], away: f64, options: Options) -> [Vec<usize>; 3] {
+fn numbers(heights: [f64; 2], away: f64, options: PeopleOptions) -> [Vec<usize>; 3] {
     let mut noise = scene::Noise(9);
     let mut people = people(options, 1);
     let place = Vec3::new(2.4, 0.2, 0.0);
@@ -149,10 +149,10 @@ fn numbers(heights: [f64; 2], away: f64, options: Options) -> [Vec<usize>; 3] {
     let mut frame = 0;
     let mut run = |pixels: &mut dyn FnMut() -> Vec<u16>, frames: usize| {
         for _ in 0..frames {
-            show(&mut people, &pixels(), frame);
+            feed(&mut people, &pixels(), frame);
             frame += 1;
         }
-        people.there().map(|(id, _)| id).collect::<Vec<_>>()
+        people.present().map(|(id, _)| id).collect::<Vec<_>>()
     };
     run(&mut || empty.clone(), 3);
     let [first, second] = heights.map(body);
@@ -164,7 +164,7 @@ fn numbers(heights: [f64; 2], away: f64, options: Options) -> [Vec<usize>; 3] {
 
 #[test]
 fn who_comes_back_has_the_number_again_and_who_is_taller_or_forgotten_has_a_new_one() {
-    let any = Options::default;
+    let any = PeopleOptions::default;
     assert_eq!(numbers([1.72, 1.72], 3.0, any()), [vec![1], vec![], vec![1]]);
     assert_eq!(numbers([1.60, 1.88], 3.0, any()), [vec![1], vec![], vec![2]]);
     assert_eq!(
@@ -176,11 +176,11 @@ fn who_comes_back_has_the_number_again_and_who_is_taller_or_forgotten_has_a_new_
 #[test]
 fn only_some_are_followed() {
     let (images, _) = crossing();
-    let there = |options: Options| {
+    let there = |options: PeopleOptions| {
         let mut people = people(options, 1);
-        images.iter().take(8).enumerate().map(|(frame, pixels)| show(&mut people, pixels, frame)).last().unwrap()
+        images.iter().take(8).enumerate().map(|(frame, pixels)| feed(&mut people, pixels, frame)).last().unwrap()
     };
-    let any = Options::default;
+    let any = PeopleOptions::default;
     let nearest = there(scene::with(any(), |options| {
         options.limit = Some(1);
         options.nearest = true;

@@ -20,14 +20,14 @@ fn a_tracker_without_a_pose_searches_and_refuses_every_frame_of_a_body_that_the_
     let sites = body.sites().iter().filter(|site| site.name != "l_hand").cloned().collect();
     let unknown = Body::new("unknown", body.limbs().to_vec(), sites).unwrap();
     let mut tracker = crate::tracker(unknown, Config::default()).unwrap();
-    assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialised);
+    assert_eq!(tracker.step(&Frame::empty(0.0)).unwrap_err(), TrackError::NotInitialized);
 }
 
 #[test]
 fn a_person_is_found_without_a_start_and_so_are_joints_lengths_and_pixels() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let poses = scene::standing(&body);
-    let (pixels, seen) = CAMERA.shoot(&body, &poses, 0.005, &mut scene::Noise(3));
+    let (pixels, observed) = CAMERA.shoot(&body, &poses, 0.005, &mut scene::Noise(3));
     let image = CAMERA.image(&pixels);
     let mut detector = Detector::new();
     let found = detector.detect(&image, &Surroundings::default(), DetectionQuery::All).unwrap();
@@ -38,7 +38,7 @@ fn a_person_is_found_without_a_start_and_so_are_joints_lengths_and_pixels() {
         let off = joint.unwrap().position.distance(body.site_position(&poses, site));
         assert!(off < 0.15, "{name} is {off} m off");
     }
-    assert!((person.pixels.len() as f64 / seen as f64 - 1.0).abs() < 0.2, "{} of {seen}", person.pixels.len());
+    assert!((person.pixels.len() as f64 / observed as f64 - 1.0).abs() < 0.2, "{} of {observed}", person.pixels.len());
     assert!(detector.nearest().is_some_and(|(odds, _)| odds == person.person));
     // The same in a tracker.
     let mut tracker = crate::tracker(body.clone(), Config::default()).unwrap();

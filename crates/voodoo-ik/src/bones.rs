@@ -1,7 +1,7 @@
 //! The segments that stand for a chain in the images, joint to joint (J10 eq. 6), and the trunk they cannot be in.
 
 use super::image::Bone;
-use super::model::Model;
+use super::model::ChainModel;
 use super::trunk::{Carrier, Trunk};
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
@@ -12,24 +12,24 @@ const FREE_OF_TRUNK: f64 = 0.5;
 /// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
 /// farthest site, else its distal end. A root limb without a joint has none. Radius: the smaller semi-axes
 /// times `margin`, since a limb is at least as wide as they are, however it is turned about itself; with 0 the criterion is J10's.
-pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Bone> {
+pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
     let mut segments = Vec::new();
-    for (index, part) in model.parts().iter().enumerate() {
-        let limb = &body.limbs()[part.limb];
+    for (index, link) in model.links().iter().enumerate() {
+        let limb = &body.limbs()[link.limb];
         let Some((_, joint)) = &limb.parent else { continue };
         let start = joint.limb_from_joint.translation;
         let shape = &limb.shape;
         let radius = [margin * shape.a0().min(shape.b0()), margin * shape.a1().min(shape.b1())];
-        let children = model.parts().iter().filter(|child| child.parent == Some(index));
+        let children = model.links().iter().filter(|child| child.parent == Some(index));
         let mut ends: Vec<Vec3> = children.map(|child| child.parent_from_joint.translation).collect();
         if ends.is_empty() {
-            let sites = body.sites().iter().filter(|site| site.limb == part.limb).map(|site| site.position);
+            let sites = body.sites().iter().filter(|site| site.limb == link.limb).map(|site| site.position);
             let farthest = sites.max_by(|a, b| (*a - start).length().total_cmp(&(*b - start).length()));
             ends.push(farthest.filter(|end| (*end - start).length() > 1e-6).unwrap_or(Vec3::Z * shape.length()));
         }
         let parent = limb.parent.as_ref().map_or(0, |(parent, _)| *parent);
         // Limbs start in the trunk that carries them; those of the trunk itself are in it.
-        let apart = if branches(body, part.limb) {
+        let apart = if branches(body, link.limb) {
             1.0
         } else if branches(body, parent) {
             FREE_OF_TRUNK
@@ -42,12 +42,12 @@ pub fn bones(body: &Body, model: &Model, margin: f64) -> Vec<Bone> {
 }
 
 /// The limbs of the chain, and its base, from which several others branch: the trunk.
-pub fn trunk(body: &Body, model: &Model) -> Vec<Trunk> {
+pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
     let mut found = Vec::new();
     let base =
-        model.parts().first().and_then(|part| body.limbs()[part.limb].parent.as_ref().map(|(parent, _)| *parent));
-    let parts = model.parts().iter().enumerate().map(|(index, part)| (Carrier::Part(index), part.limb));
-    for (carrier, limb) in base.map(|limb| (Carrier::Base, limb)).into_iter().chain(parts) {
+        model.links().first().and_then(|link| body.limbs()[link.limb].parent.as_ref().map(|(parent, _)| *parent));
+    let links = model.links().iter().enumerate().map(|(index, link)| (Carrier::Link(index), link.limb));
+    for (carrier, limb) in base.map(|limb| (Carrier::Base, limb)).into_iter().chain(links) {
         if branches(body, limb) {
             found.push(Trunk::new(&body.limbs()[limb].shape, carrier));
         }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::model::{Kinematics, Model};
+use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::Vec3;
 
 /// Where a point shall be.
@@ -47,7 +47,7 @@ impl Aim {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     /// Index of the part.
-    pub part: usize,
+    pub link: usize,
     /// The point in the limb's frame.
     pub point: Vec3,
     /// Where it shall be.
@@ -61,7 +61,7 @@ pub struct Goal {
 impl Goal {
     /// The residual at a pose of the chain, see [`Aim::residual`].
     pub fn residual(&self, at: &Kinematics) -> Vec3 {
-        self.aim.residual(at.poses[self.part].transform_point(self.point))
+        self.aim.residual(at.poses[self.link].transform_point(self.point))
     }
 }
 
@@ -71,17 +71,23 @@ pub fn level_cost(goals: &[Goal], at: &Kinematics) -> f64 {
 }
 
 /// Residuals and Jacobian (row-major, three rows a goal) of the goals, both times the roots of the weights.
-pub fn level_rows(model: &Model, goals: &[Goal], at: &Kinematics, jacobian: &mut Vec<f64>, residual: &mut Vec<f64>) {
+pub fn level_rows(
+    model: &ChainModel,
+    goals: &[Goal],
+    at: &Kinematics,
+    jacobian: &mut Vec<f64>,
+    residual: &mut Vec<f64>,
+) {
     let n = model.freedoms();
     jacobian.clear();
     jacobian.resize(3 * goals.len() * n, 0.0);
     residual.clear();
     for (index, goal) in goals.iter().enumerate() {
-        let x = at.poses[goal.part].transform_point(goal.point);
+        let x = at.poses[goal.link].transform_point(goal.point);
         let root = goal.weight.sqrt();
         residual.extend((root * goal.aim.residual(x)).to_array());
         let rows = &mut jacobian[3 * index * n..3 * (index + 1) * n];
-        for &mover in model.movers(goal.part) {
+        for &mover in model.movers(goal.link) {
             let column = &at.columns[mover];
             let d = root * goal.aim.derivative(column.omega.cross(x) + column.v);
             rows[mover] = d.x;

@@ -1,8 +1,8 @@
 //! The image criterion (J10 eq. 5-8): how far the projected limbs lie outside the silhouettes.
 
-use super::model::{Kinematics, Model};
+use super::model::{ChainModel, Kinematics};
 use super::trunk::{Carrier, Trunk};
-use super::view::{NEAREST, View};
+use super::view::{NEAREST, SilhouetteView};
 use voodoo_core::math::{Mat3, Vec3};
 
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
@@ -13,7 +13,7 @@ pub const SAMPLES: usize = 8;
 pub struct Bone {
     /// Part and point in its frame of both ends.
     pub ends: [(usize, Vec3); 2],
-    /// How deep inside it shall lie at both ends, and in proportion between: the limb's radius, metres; 0 is J10's criterion.
+    /// How deep inside it shall lie at both ends, and in proportion between: the limb's radius, meters; 0 is J10's criterion.
     pub radius: [f64; 2],
     /// From which share of its length on it lies outside of the trunk; 1: it need not.
     pub apart: f64,
@@ -21,11 +21,11 @@ pub struct Bone {
 
 /// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less
 /// what the border is uncertain by or, where the silhouette is about as thin as the limb, half the silhouette's width less half
-/// of that. Views with depths add how far the bone's flesh lies before what they see, see [`View::depth`].
+/// of that. Views with depths add how far the bone's flesh lies before what they see, see [`SilhouetteView::depth`].
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
-    pub views: &'a [View<'a>],
+    pub views: &'a [SilhouetteView<'a>],
     /// The bones.
     pub segments: &'a [Bone],
     /// Up to how many radii the silhouette is the limb itself, in whose middle the bone shall lie; 0: nowhere.
@@ -40,7 +40,7 @@ impl Criterion<'_> {
     pub fn reach(&self, at: &Kinematics) -> f64 {
         let mut sum = 0.0;
         for segment in self.segments {
-            let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
+            let ends = segment.ends.map(|(link, point)| at.poses[link].transform_point(point));
             for view in self.views {
                 let z = view.camera_from_world.transform_point(0.5 * (ends[0] + ends[1])).z;
                 sum += view.camera.focal()[0] * (ends[1] - ends[0]).length() / z.max(NEAREST);
@@ -51,16 +51,16 @@ impl Criterion<'_> {
     }
 
     /// The criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples no camera sees count zero.
-    pub fn evaluate(&self, model: &Model, at: &Kinematics, gradient: &mut [f64]) -> f64 {
+    pub fn evaluate(&self, model: &ChainModel, at: &Kinematics, gradient: &mut [f64]) -> f64 {
         gradient.fill(0.0);
         let count = self.views.len() * self.segments.len() * SAMPLES;
         if count == 0 {
             return 0.0;
         }
-        let share = 1.0 / count as f64;
+        let fraction = 1.0 / count as f64;
         let mut h = 0.0;
         for segment in self.segments {
-            let ends = segment.ends.map(|(part, point)| at.poses[part].transform_point(point));
+            let ends = segment.ends.map(|(link, point)| at.poses[link].transform_point(point));
             // Derivatives of h by the world positions of both ends.
             let mut forces = [Vec3::ZERO; 2];
             h += self.within(model, at, segment, &ends, &mut forces, gradient);
@@ -68,38 +68,38 @@ impl Criterion<'_> {
                 let (a, b) =
                     (view.camera_from_world.transform_point(ends[0]), view.camera_from_world.transform_point(ends[1]));
                 let mut slopes = [Vec3::ZERO; 2];
-                let mut seen = false;
+                let mut any_view = false;
                 for t in places() {
                     let radius = segment.radius[0] + t * (segment.radius[1] - segment.radius[0]);
                     let (value, slope) = view.outside(a + t * (b - a), radius, self.thin);
                     if value > 0.0 {
-                        seen = true;
+                        any_view = true;
                         h += value;
                         slopes[0] += (1.0 - t) * slope;
                         slopes[1] += t * slope;
                     }
                 }
-                if !seen {
+                if !any_view {
                     continue;
                 }
                 let world_from_camera = Mat3::from_quat(view.camera_from_world.rotation).transpose();
                 forces[0] += world_from_camera * slopes[0];
                 forces[1] += world_from_camera * slopes[1];
             }
-            for ((part, _), (x, force)) in segment.ends.iter().zip(ends.iter().zip(forces)) {
+            for ((link, _), (x, force)) in segment.ends.iter().zip(ends.iter().zip(forces)) {
                 if force != Vec3::ZERO {
-                    pull(model, at, *part, *x, share * force, gradient);
+                    add_force(model, at, *link, *x, fraction * force, gradient);
                 }
             }
         }
-        share * h
+        fraction * h
     }
 
     /// How deep the samples of a segment lie in the trunk, in pixels of every view, and the derivative by both ends; that by
     /// the trunk's own motion goes into `gradient`.
     fn within(
         &self,
-        model: &Model,
+        model: &ChainModel,
         at: &Kinematics,
         segment: &Bone,
         ends: &[Vec3; 2],
@@ -110,7 +110,7 @@ impl Criterion<'_> {
         if segment.apart >= 1.0 || segment.radius == [0.0; 2] {
             return sum;
         }
-        let share = 1.0 / (self.views.len() * self.segments.len() * SAMPLES) as f64;
+        let fraction = 1.0 / (self.views.len() * self.segments.len() * SAMPLES) as f64;
         for trunk in self.trunk {
             let pose = trunk.pose(at);
             let [a, b] = ends.map(|end| pose.inverse_transform_point(end));
@@ -132,8 +132,8 @@ impl Criterion<'_> {
                     let force = scale * (slope - depth / z * nearer);
                     forces[0] += (1.0 - t) * force;
                     forces[1] += t * force;
-                    if let Carrier::Part(part) = trunk.carrier {
-                        pull(model, at, part, x, -share * scale * slope, gradient);
+                    if let Carrier::Link(link) = trunk.carrier {
+                        add_force(model, at, link, x, -fraction * scale * slope, gradient);
                     }
                 }
             }
@@ -143,9 +143,9 @@ impl Criterion<'_> {
 }
 
 /// Adds the derivative by all unknowns that move a part: a force on it at a world position.
-fn pull(model: &Model, at: &Kinematics, part: usize, x: Vec3, force: Vec3, gradient: &mut [f64]) {
+fn add_force(model: &ChainModel, at: &Kinematics, link: usize, x: Vec3, force: Vec3, gradient: &mut [f64]) {
     let moment = x.cross(force);
-    for &mover in model.movers(part) {
+    for &mover in model.movers(link) {
         let column = &at.columns[mover];
         gradient[mover] += column.omega.dot(moment) + column.v.dot(force);
     }

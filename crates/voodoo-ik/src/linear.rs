@@ -24,7 +24,7 @@ impl Taken {
 
     /// Leaves of `row` only what lies in the null space.
     pub(crate) fn project(&self, row: &mut [f64]) {
-        orthogonalise(&self.rows, row);
+        orthogonalize(&self.rows, row);
     }
 
     /// Takes the directions of the rows of a matrix.
@@ -48,7 +48,7 @@ impl Taken {
     fn close(&mut self, least: f64) -> bool {
         let start = self.rows.len() - self.n;
         let (taken, new) = self.rows.split_at_mut(start);
-        orthogonalise(taken, new);
+        orthogonalize(taken, new);
         let length = dot(new, new).sqrt();
         if length > least && start < self.n * self.n {
             new.iter_mut().for_each(|value| *value /= length);
@@ -60,7 +60,7 @@ impl Taken {
 }
 
 /// Gram-Schmidt, twice: once leaves an error of the size of the cancellation.
-fn orthogonalise(basis: &[f64], row: &mut [f64]) {
+fn orthogonalize(basis: &[f64], row: &mut [f64]) {
     for _ in 0..2 {
         for q in basis.chunks_exact(row.len()) {
             let along = dot(q, row);

@@ -31,7 +31,7 @@ pub enum Turn {
 
 /// One limb of the chain.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct Link {
     /// Index of the limb in the body.
     pub limb: usize,
     /// Part it hangs on; `None`: the base.
@@ -48,8 +48,8 @@ pub struct Part {
 
 /// The chain: what stays constant while it moves.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Model {
-    parts: Vec<Part>,
+pub struct ChainModel {
+    links: Vec<Link>,
     names: Vec<String>,
     limits: Vec<[f64; 2]>,
     /// Of every part, the unknowns that move it, and where they start in that list.
@@ -76,7 +76,7 @@ pub struct Kinematics {
     pub columns: Vec<Column>,
 }
 
-impl Model {
+impl ChainModel {
     /// The chain of the chosen limbs of a body (all when `limbs` is empty). They must hang together: each but the first on
     /// another one.
     pub fn new(body: &Body, limbs: &[usize], root: Root) -> Result<Self, BodyError> {
@@ -84,7 +84,7 @@ impl Model {
         let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
         chosen.sort_unstable();
         chosen.dedup();
-        let mut model = Self { parts: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
+        let mut model = Self { links: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
         for limb in chosen {
             let Some(description) = body.limbs().get(limb) else {
                 return Err(value("limbs", "indices of limbs", limb.to_string()));
@@ -102,8 +102,8 @@ impl Model {
         root: Root,
     ) -> Result<(), BodyError> {
         let start = self.names.len();
-        let parent = joint.and_then(|(index, _)| self.parts.iter().position(|part| part.limb == *index));
-        if parent.is_none() && !self.parts.is_empty() {
+        let parent = joint.and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
+        if parent.is_none() && !self.links.is_empty() {
             return Err(value(
                 "limbs",
                 "limbs that hang together, parents included",
@@ -111,8 +111,8 @@ impl Model {
             ));
         }
         let free = [f64::NEG_INFINITY, f64::INFINITY];
-        let first = self.parts.is_empty();
-        let mut part = Part {
+        let first = self.links.is_empty();
+        let mut link = Link {
             limb,
             parent,
             parent_from_joint: Pose::IDENTITY,
@@ -122,21 +122,21 @@ impl Model {
         };
         match joint {
             _ if first && root == Root::Free => {
-                part.turn = Turn::Free;
+                link.turn = Turn::Free;
                 self.names.extend(["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("root_{axis}")));
                 self.limits.extend([free; 6]);
             }
             None => {}
             Some((_, joint)) => {
-                part.parent_from_joint = joint.parent_from_joint;
-                part.joint_from_limb = joint.limb_from_joint.inverse();
+                link.parent_from_joint = joint.parent_from_joint;
+                link.joint_from_limb = joint.limb_from_joint.inverse();
                 if joint.kind() == JointKind::Hinge {
                     let axis = hinge_axis(joint);
-                    part.turn = Turn::Hinge(axis);
+                    link.turn = Turn::Hinge(axis);
                     self.names.push(format!("{}_flexion", joint.name));
                     self.limits.push(joint.limits.map_or(free, |limits| limits[usize::from(axis == Vec3::Y)]));
                 } else {
-                    part.turn = Turn::Ball;
+                    link.turn = Turn::Ball;
                     self.names.extend(["rx", "ry", "rz"].map(|axis| format!("{}_{axis}", joint.name)));
                     self.limits.extend(joint.limits.unwrap_or([free; 3]));
                 }
@@ -145,13 +145,13 @@ impl Model {
         let mut movers = parent.map_or_else(Vec::new, |parent| self.movers[parent].clone());
         movers.extend(start..self.names.len());
         self.movers.push(movers);
-        self.parts.push(part);
+        self.links.push(link);
         Ok(())
     }
 
     /// The limbs, parents first.
-    pub fn parts(&self) -> &[Part] {
-        &self.parts
+    pub fn links(&self) -> &[Link] {
+        &self.links
     }
 
     /// Names of the unknowns: `root_x` ... `root_rz`, `NAME_flexion` of a hinge, `NAME_rx`, `NAME_ry`, `NAME_rz` otherwise.
@@ -170,13 +170,13 @@ impl Model {
     }
 
     /// The unknowns that move a part.
-    pub fn movers(&self, part: usize) -> &[usize] {
-        &self.movers[part]
+    pub fn movers(&self, link: usize) -> &[usize] {
+        &self.movers[link]
     }
 
     /// The part that is a limb of the body.
-    pub fn part_of(&self, limb: usize) -> Option<usize> {
-        self.parts.iter().position(|part| part.limb == limb)
+    pub fn link_of(&self, limb: usize) -> Option<usize> {
+        self.links.iter().position(|link| link.limb == limb)
     }
 
     /// Forward kinematics and its derivative (R07 eq. 10): poses of all parts and the screw of every unknown.
@@ -185,33 +185,33 @@ impl Model {
         *base = *world_from_base;
         poses.clear();
         columns.clear();
-        for part in &self.parts {
-            let world_from_parent = part.parent.map_or(*world_from_base, |parent| poses[parent]);
-            let joint = world_from_parent * part.parent_from_joint;
-            let value = &angles[part.start..];
-            let pose = match part.turn {
-                Turn::Rigid => joint * part.joint_from_limb,
+        for link in &self.links {
+            let world_from_parent = link.parent.map_or(*world_from_base, |parent| poses[parent]);
+            let joint = world_from_parent * link.parent_from_joint;
+            let value = &angles[link.start..];
+            let pose = match link.turn {
+                Turn::Rigid => joint * link.joint_from_limb,
                 Turn::Hinge(axis) => {
                     let (sine, cosine) = (0.5 * value[0]).sin_cos();
                     let rotation =
                         voodoo_core::math::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
                     let omega = joint.rotation * axis;
                     columns.push(Column { omega, v: joint.translation.cross(omega) });
-                    Pose::from_parts(joint.translation, joint.rotation * rotation) * part.joint_from_limb
+                    Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
                 }
                 Turn::Ball => {
                     let rotation = ball(Vec3::new(value[0], value[1], value[2]), &joint, columns);
-                    Pose::from_parts(joint.translation, joint.rotation * rotation) * part.joint_from_limb
+                    Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
                 }
                 Turn::Free => {
                     let axes = Mat3::from_quat(joint.rotation);
                     for v in [axes.x_axis, axes.y_axis, axes.z_axis] {
                         columns.push(Column { omega: Vec3::ZERO, v });
                     }
-                    let centre = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
-                    let joint = Pose::from_parts(centre, joint.rotation);
+                    let center = joint.translation + joint.rotation * Vec3::new(value[0], value[1], value[2]);
+                    let joint = Pose::from_parts(center, joint.rotation);
                     let rotation = ball(Vec3::new(value[3], value[4], value[5]), &joint, columns);
-                    Pose::from_parts(centre, joint.rotation * rotation)
+                    Pose::from_parts(center, joint.rotation * rotation)
                 }
             };
             poses.push(pose);
@@ -219,11 +219,11 @@ impl Model {
     }
 
     /// Brings rotation vectors without limits back to at most pi, so that they stay away from the singularity at 2 pi.
-    pub fn normalise(&self, angles: &mut [f64]) {
-        for part in &self.parts {
-            let start = match part.turn {
-                Turn::Ball => part.start,
-                Turn::Free => part.start + 3,
+    pub fn normalize(&self, angles: &mut [f64]) {
+        for link in &self.links {
+            let start = match link.turn {
+                Turn::Ball => link.start,
+                Turn::Free => link.start + 3,
                 _ => continue,
             };
             if self.limits[start..start + 3].iter().any(|[low, high]| low.is_finite() || high.is_finite()) {
@@ -240,7 +240,7 @@ impl Model {
     }
 }
 
-/// Rotation of a ball joint; pushes its three columns, `J_left(v) e_i` about the joint's centre.
+/// Rotation of a ball joint; pushes its three columns, `J_left(v) e_i` about the joint's center.
 fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> voodoo_core::math::Quat {
     let (rotation, b, c) = turn(v);
     let axes = Mat3::from_quat(joint.rotation);

@@ -1,25 +1,25 @@
 //! Poses of limbs that are not quite joined (K07's elastic joints) as angles of the chain.
 
 use super::goal::{Aim, Goal};
-use super::model::{Model, Turn};
-use super::solver::{Options, Solver};
+use super::model::{ChainModel, Turn};
+use super::solver::{IkSolver, SolverOptions};
 use super::twist::rotation_vector;
 use voodoo_core::kinematics::joint_turn;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Joint};
 
-/// Lever of a limb's turns about its axis against its position, metres: about the radius of an arm.
+/// Lever of a limb's turns about its axis against its position, meters: about the radius of an arm.
 const GIRTH: f64 = 0.05;
 
 /// Angles as the joints of `poses` (one a limb of the body, world) stand; gaps are not looked at. Within the limits.
-pub fn read(body: &Body, model: &Model, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
+pub fn read(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
     angles.clear();
     angles.resize(model.freedoms(), 0.0);
-    for part in model.parts() {
-        let joint: Option<&(usize, Joint)> = body.limbs()[part.limb].parent.as_ref();
-        let world_from_limb = &poses[part.limb];
-        let value = &mut angles[part.start..];
-        match (part.turn, joint) {
+    for link in model.links() {
+        let joint: Option<&(usize, Joint)> = body.limbs()[link.limb].parent.as_ref();
+        let world_from_limb = &poses[link.limb];
+        let value = &mut angles[link.start..];
+        match (link.turn, joint) {
             (Turn::Free, _) => {
                 let pose = world_from_base.inv_mul(world_from_limb);
                 value[..3].copy_from_slice(&pose.translation.to_array());
@@ -41,16 +41,16 @@ pub fn read(body: &Body, model: &Model, world_from_base: &Pose, poses: &[Pose], 
 }
 
 /// The angles of the closed chain that is nearest to `poses`: least squares over both ends and the girth of every limb.
-pub fn project(body: &Body, model: &Model, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
+pub fn project(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
     read(body, model, world_from_base, poses, angles);
-    let mut goals = Vec::with_capacity(4 * model.parts().len());
-    for (index, part) in model.parts().iter().enumerate() {
-        let end = Vec3::Z * body.limbs()[part.limb].shape.length();
+    let mut goals = Vec::with_capacity(4 * model.links().len());
+    for (index, link) in model.links().iter().enumerate() {
+        let end = Vec3::Z * body.limbs()[link.limb].shape.length();
         for point in [Vec3::ZERO, end, GIRTH * Vec3::X, GIRTH * Vec3::Y] {
-            let aim = Aim::Position(poses[part.limb].transform_point(point));
-            goals.push(Goal { part: index, point, aim, weight: 1.0, level: 0 });
+            let aim = Aim::Position(poses[link.limb].transform_point(point));
+            goals.push(Goal { link: index, point, aim, weight: 1.0, level: 0 });
         }
     }
-    let options = Options { steps: 20, tolerance: 1e-9, still: 1e-8, ..Options::default() };
-    Solver::default().solve(model, world_from_base, &goals, None, &options, angles);
+    let options = SolverOptions { steps: 20, tolerance: 1e-9, still: 1e-8, ..SolverOptions::default() };
+    IkSolver::default().solve(model, world_from_base, &goals, None, &options, angles);
 }

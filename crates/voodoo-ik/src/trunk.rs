@@ -14,7 +14,7 @@ pub enum Carrier {
     /// It is the base of the chain.
     Base,
     /// It is a part of the chain.
-    Part(usize),
+    Link(usize),
     /// It is no part of the chain and has this pose in the world.
     World(Pose),
 }
@@ -24,7 +24,7 @@ pub enum Carrier {
 pub struct Trunk {
     /// What carries it.
     pub carrier: Carrier,
-    /// Length, metres.
+    /// Length, meters.
     pub length: f64,
     /// Semi-axes along x at both ends.
     pub a: [f64; 2],
@@ -42,12 +42,12 @@ impl Trunk {
     pub(super) fn pose(&self, at: &Kinematics) -> Pose {
         match self.carrier {
             Carrier::Base => at.base,
-            Carrier::Part(part) => at.poses[part],
+            Carrier::Link(link) => at.poses[link],
             Carrier::World(pose) => pose,
         }
     }
 
-    /// How deep a point with flesh of a radius around it lies inside, metres (about: by the level of the ellipse), and the
+    /// How deep a point with flesh of a radius around it lies inside, meters (about: by the level of the ellipse), and the
     /// derivative by the point, in the trunk's frame.
     pub(super) fn depth(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
         let t = x.z / self.length;

@@ -3,7 +3,7 @@
 use voodoo_core::Camera;
 use voodoo_core::math::{Pose, Vec3};
 
-/// Points nearer to the camera plane than this, or behind it, are not seen; metres.
+/// Points nearer to the camera plane than this, or behind it, are not seen; meters.
 pub(super) const NEAREST: f64 = 0.05;
 /// Four depths that differ by more than this share do not belong to one surface.
 const EDGE: f64 = 0.03;
@@ -15,11 +15,11 @@ const MOST_RADII: f64 = 2.0;
 
 /// One calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct SilhouetteView<'a> {
     /// Of every pixel, row by row, at least 2 x 2: its distance and, inside, the radius of the largest disc within the silhouette
-    /// that covers it, pixels: half its local width. Radii of zero: no bone is centred. Together, since they are looked up together.
+    /// that covers it, pixels: half its local width. Radii of zero: no bone is centerd. Together, since they are looked up together.
     pub pixels: &'a [[f32; 2]],
-    /// Of every pixel the depth seen along the optical axis, metres, zero where there is none; or none at all. A bone lies its radius
+    /// Of every pixel the depth seen along the optical axis, meters, zero where there is none; or none at all. A bone lies its radius
     /// behind what is seen, or farther; where the silhouette is the limb itself, no farther.
     pub depth: &'a [f32],
     /// How far its border may be from where it should be, pixels: that much less deep is deep enough. The middle between two
@@ -31,7 +31,7 @@ pub struct View<'a> {
     pub camera_from_world: Pose,
 }
 
-impl View<'_> {
+impl SilhouetteView<'_> {
     /// `max(distance + depth, 0)` of a point in the optical frame and how far it lies before what is seen, both pixels, and the
     /// derivative by that point.
     pub(super) fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
@@ -50,12 +50,12 @@ impl View<'_> {
         // The derivative of the depth by the distance from the camera plane.
         let mut closer = if depth > 0.0 { projected } else { 0.0 };
         let middle = 0.5 * self.border;
-        let mut itself = false;
+        let mut own_surface = false;
         // No place is deeper than half the width: what is too deep to be thin need not be looked at.
         if distance < 0.0 && -distance <= thin * projected {
             let [half, su, sv] = half.at(&at);
-            itself = half > 0.0 && half <= thin * projected;
-            if itself && half - middle > depth {
+            own_surface = half > 0.0 && half <= thin * projected;
+            if own_surface && half - middle > depth {
                 depth = half - middle;
                 (du, dv, closer) = (du + su, dv + sv, 0.0);
             }
@@ -68,7 +68,7 @@ impl View<'_> {
             value = 0.0;
         }
         if !self.depth.is_empty() && radius > 0.0 {
-            let (before, by) = self.before(&at, x, radius, itself);
+            let (before, by) = self.depth_violation(&at, x, radius, own_surface);
             value += before;
             slope += by;
         }
@@ -76,8 +76,8 @@ impl View<'_> {
     }
 
     /// How far the flesh around a point lies before what is seen there, or behind it if what is seen is the limb itself, pixels
-    /// (metres as they would appear across the line of sight), and the derivative by the point.
-    fn before(&self, at: &Place, x: Vec3, radius: f64, itself: bool) -> (f64, Vec3) {
+    /// (meters as they would appear across the line of sight), and the derivative by the point.
+    fn depth_violation(&self, at: &PixelPlace, x: Vec3, radius: f64, own_surface: bool) -> (f64, Vec3) {
         let nothing = (0.0, Vec3::ZERO);
         let Some(corners) = at.corners(self.depth, self.camera.width()) else { return nothing };
         let corners = corners.map(f64::from);
@@ -85,10 +85,10 @@ impl View<'_> {
         if at.beyond != [0.0; 2] || !(least > NEAREST && most < (1.0 + EDGE) * least) {
             return nothing;
         }
-        let [seen, du, dv] = Corners(corners).at(at);
-        let (before, behind) = (seen + LEAST_RADII * radius - x.z, x.z - seen - MOST_RADII * radius);
+        let [observed, du, dv] = Corners(corners).at(at);
+        let (before, behind) = (observed + LEAST_RADII * radius - x.z, x.z - observed - MOST_RADII * radius);
         let (gap, sign) = if before > 0.0 { (before, 1.0) } else { (behind, -1.0) };
-        if sign < 0.0 && !itself {
+        if sign < 0.0 && !own_surface {
             return nothing;
         }
         let [fx, fy] = self.camera.focal();
@@ -103,20 +103,20 @@ impl View<'_> {
     }
 
     /// The four pixels around a place; outside of the picture those of its border.
-    fn locate(&self, [u, v]: [f64; 2]) -> Option<Place> {
+    fn locate(&self, [u, v]: [f64; 2]) -> Option<PixelPlace> {
         let (width, height) = (self.camera.width(), self.camera.height());
         let (right, bottom) = ((width - 1) as f64, (height - 1) as f64);
         let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
         let column = (x as usize).min(width - 2);
         let row = (y as usize).min(height - 2);
         let place =
-            Place { start: row * width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
+            PixelPlace { start: row * width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
         (place.start + width + 2 <= self.pixels.len()).then_some(place)
     }
 }
 
 /// A place between four pixels, and how far beyond the picture it lies.
-struct Place {
+struct PixelPlace {
     start: usize,
     s: f64,
     t: f64,
@@ -126,7 +126,7 @@ struct Place {
 /// The values of those four pixels: upper row, lower row.
 struct Corners([f64; 4]);
 
-impl Place {
+impl PixelPlace {
     fn corners<T: Copy>(&self, image: &[T], width: usize) -> Option<[T; 4]> {
         let (upper, lower) =
             (image.get(self.start..self.start + 2)?, image.get(self.start + width..self.start + width + 2)?);
@@ -143,7 +143,7 @@ impl Place {
 impl Corners {
     /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
     /// picture is background.
-    fn at(&self, place: &Place) -> [f64; 3] {
+    fn at(&self, place: &PixelPlace) -> [f64; 3] {
         let (s, t) = (place.s, place.t);
         let [d00, d01, d10, d11] = self.0;
         let (first, second) = (d00 + s * (d01 - d00), d10 + s * (d11 - d10));

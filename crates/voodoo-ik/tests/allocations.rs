@@ -8,7 +8,7 @@ use counting::allocations_so_far;
 use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
-use voodoo_ik::{Aim, Criterion, Goal, Model, Options, Rest, Root, Solver, View, bones, trunk};
+use voodoo_ik::{Aim, ChainModel, Criterion, Goal, IkSolver, Rest, Root, SilhouetteView, SolverOptions, bones, trunk};
 
 const WARM_UP: usize = 26;
 const COUNTED: usize = 60;
@@ -16,7 +16,7 @@ const COUNTED: usize = 60;
 /// Allocations of a warm solver with two levels, limits, an image and a rest posture, for targets and starts it has not seen.
 fn allocations() -> usize {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
-    let model = Model::new(&body, &[], Root::Free).unwrap();
+    let model = ChainModel::new(&body, &[], Root::Free).unwrap();
     let pixels: Vec<[f32; 2]> = (0..160 * 120)
         .map(|i| ((i % 160) as f32 - 70.0).hypot((i / 160) as f32 - 60.0) - 9.0)
         .map(|distance| [distance, if distance < 0.0 { 9.0 } else { 0.0 }])
@@ -24,11 +24,11 @@ fn allocations() -> usize {
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
     let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
-    let view = View { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
+    let view = SilhouetteView { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
     let segments = bones(&body, &model, 1.0);
     let trunk = trunk(&body, &model);
     let criterion = Criterion { views: &[view], segments: &segments, thin: 1.7, trunk: &trunk };
-    let mut solver = Solver::with_rest((6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect());
+    let mut solver = IkSolver::with_rest((6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect());
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {
         let by = 0.02 * index as f64;
@@ -36,11 +36,11 @@ fn allocations() -> usize {
             let site = &body.sites()[body.site_index(name).unwrap()];
             // Some in reach, some not.
             let aim = Aim::Position(Vec3::new(by, 0.3 - by, 0.2 + 0.5 * by));
-            Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
+            Goal { link: model.link_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
         });
         let mut angles = vec![0.1; model.freedoms()];
         let before = allocations_so_far();
-        solver.solve(&model, &Pose::IDENTITY, &goals, Some(&criterion), &Options::default(), &mut angles);
+        solver.solve(&model, &Pose::IDENTITY, &goals, Some(&criterion), &SolverOptions::default(), &mut angles);
         if index >= WARM_UP {
             count += allocations_so_far() - before;
         }

@@ -8,30 +8,30 @@ use voodoo_core::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Root, Solver, Trunk, View, bones, level_rows, log,
-    project, trunk,
+    Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Root, SilhouetteView, SolverOptions, Trunk,
+    bones, level_rows, log, project, trunk,
 };
 
 fn human() -> Body {
     Body::human(1.75, HumanModel::Full).unwrap()
 }
 
-fn arm() -> (Body, Model) {
+fn arm() -> (Body, ChainModel) {
     let body = Body::human(1.75, HumanModel::Papers).unwrap();
     let limbs = ["l_upperarm", "l_forearm"].map(|name| body.limb_index(name).unwrap());
-    let model = Model::new(&body, &limbs, Root::Fixed).unwrap();
+    let model = ChainModel::new(&body, &limbs, Root::Fixed).unwrap();
     (body, model)
 }
 
-fn goal(body: &Body, model: &Model, site: &str, aim: Aim, level: usize) -> Goal {
+fn goal(body: &Body, model: &ChainModel, site: &str, aim: Aim, level: usize) -> Goal {
     let site = &body.sites()[body.site_index(site).unwrap()];
-    Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
+    Goal { link: model.link_of(site.limb).unwrap(), point: site.position, aim, weight: 1.0, level }
 }
 
-fn position(model: &Model, goal: &Goal, angles: &[f64]) -> Vec3 {
+fn position(model: &ChainModel, goal: &Goal, angles: &[f64]) -> Vec3 {
     let mut at = Kinematics::default();
     model.place(&Pose::IDENTITY, angles, &mut at);
-    at.poses[goal.part].transform_point(goal.point)
+    at.poses[goal.link].transform_point(goal.point)
 }
 
 fn close(a: Vec3, b: Vec3, within: f64) -> bool {
@@ -43,9 +43,9 @@ fn values(count: usize, size: f64) -> impl Strategy<Value = Vec<f64>> {
 }
 
 /// Signed distance to a disc, as a picture.
-fn disc(width: usize, height: usize, centre: [f64; 2], radius: f64) -> Vec<f32> {
+fn disc(width: usize, height: usize, center: [f64; 2], radius: f64) -> Vec<f32> {
     (0..width * height)
-        .map(|i| ((i % width) as f64 - centre[0]).hypot((i / width) as f64 - centre[1]) as f32 - radius as f32)
+        .map(|i| ((i % width) as f64 - center[0]).hypot((i / width) as f64 - center[1]) as f32 - radius as f32)
         .collect()
 }
 
@@ -67,7 +67,7 @@ proptest! {
     #[test]
     fn jacobian_is_the_derivative(angles in values(64, 1.2), site in 0..20_usize, kind in any::<bool>()) {
         let body = human();
-        let model = Model::new(&body, &[], Root::Free).unwrap();
+        let model = ChainModel::new(&body, &[], Root::Free).unwrap();
         let angles = &angles[..model.freedoms()];
         let site = &body.sites()[site % body.sites().len()];
         let aim = if kind {
@@ -75,7 +75,7 @@ proptest! {
         } else {
             Aim::Position(Vec3::new(0.1, 0.2, 0.3))
         };
-        let goal = Goal { part: model.part_of(site.limb).unwrap(), point: site.position, aim, weight: 2.0, level: 0 };
+        let goal = Goal { link: model.link_of(site.limb).unwrap(), point: site.position, aim, weight: 2.0, level: 0 };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut rows, mut residual) = (Kinematics::default(), Vec::new(), Vec::new());
             model.place(&Pose::IDENTITY, angles, &mut at);
@@ -100,7 +100,7 @@ proptest! {
     #[test]
     fn criterion_gradient_is_the_derivative(angles in values(64, 0.6), radius in 0.0..0.06_f64, thin in 0.0..4.0_f64) {
         let body = human();
-        let model = Model::new(&body, &[], Root::Free).unwrap();
+        let model = ChainModel::new(&body, &[], Root::Free).unwrap();
         let mut angles = angles[..model.freedoms()].to_vec();
         angles[2] += 0.2;
         let image = disc(160, 120, [60.0, 50.0], 12.0);
@@ -112,8 +112,8 @@ proptest! {
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
         let camera = Camera::pinhole(160, 120, [140.0, 150.0, 79.5, 59.5]).unwrap();
-        let view = View { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
-        let deep = View { depth: &depth, ..view };
+        let view = SilhouetteView { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
+        let deep = SilhouetteView { depth: &depth, ..view };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
         let mut trunk = trunk(&body, &model);
@@ -151,7 +151,7 @@ proptest! {
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
         let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
-        let view = View { pixels: &image, depth: &[], border: 1.0, camera: &camera, camera_from_world };
+        let view = SilhouetteView { pixels: &image, depth: &[], border: 1.0, camera: &camera, camera_from_world };
         // One short bone beside the shoulder, moved into the trunk by its base.
         let segment = Bone { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
         let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };
@@ -199,15 +199,15 @@ proptest! {
     #[test]
     fn lower_levels_never_disturb_higher_ones(start in values(6, 0.4), hand in values(3, 0.9), elbow in values(3, 0.9)) {
         let (body, model) = arm();
-        let shoulder = model.parts()[0].parent_from_joint.translation;
-        let mut options = Options::default();
+        let shoulder = model.links()[0].parent_from_joint.translation;
+        let mut options = SolverOptions::default();
         (options.steps, options.tolerance, options.still) = (400, 1e-12, 1e-12);
         let top = goal(&body, &model, "l_hand", Aim::Position(shoulder + Vec3::new(hand[0], hand[1], hand[2])), 0);
         let low = goal(&body, &model, "l_elbow", Aim::Position(shoulder + Vec3::new(elbow[0], elbow[1], elbow[2])), 1);
         let third = goal(&body, &model, "l_wrist", Aim::Position(Vec3::ZERO), 2);
         let residual = |goals: &[Goal]| {
             let mut angles = start[..model.freedoms()].to_vec();
-            Solver::default().solve(&model, &Pose::IDENTITY, goals, None, &options, &mut angles);
+            IkSolver::default().solve(&model, &Pose::IDENTITY, goals, None, &options, &mut angles);
             for (angle, [least, greatest]) in angles.iter().zip(model.limits()) {
                 prop_assert!(*least <= *angle && *angle <= *greatest);
             }
@@ -221,14 +221,14 @@ proptest! {
     #[test]
     fn projection_finds_the_angles_again(angles in values(64, 0.5)) {
         let body = human();
-        let model = Model::new(&body, &[], Root::Free).unwrap();
-        let wanted: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();
+        let model = ChainModel::new(&body, &[], Root::Free).unwrap();
+        let expected: Vec<f64> = angles[..model.freedoms()].iter().zip(model.limits()).map(|(a, [l, h])| a.clamp(*l, *h)).collect();
         let mut at = Kinematics::default();
-        model.place(&Pose::IDENTITY, &wanted, &mut at);
+        model.place(&Pose::IDENTITY, &expected, &mut at);
         let mut found = Vec::new();
         project(&body, &model, &Pose::IDENTITY, &at.poses, &mut found);
-        for (found, wanted) in found.iter().zip(&wanted) {
-            prop_assert!((found - wanted).abs() < 1e-9);
+        for (found, expected) in found.iter().zip(&expected) {
+            prop_assert!((found - expected).abs() < 1e-9);
         }
     }
 }

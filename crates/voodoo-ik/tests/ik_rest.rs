@@ -6,25 +6,26 @@ use voodoo_core::HumanModel;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, Camera};
 use voodoo_ik::{
-    Aim, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, View, bones, level_cost, level_rows, trunk,
+    Aim, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SilhouetteView, SolverOptions, bones,
+    level_cost, level_rows, trunk,
 };
 
-fn long() -> Options {
-    let mut options = Options::default();
+fn long() -> SolverOptions {
+    let mut options = SolverOptions::default();
     (options.steps, options.tolerance, options.still) = (400, 1e-12, 1e-9);
     options
 }
 
 struct Arm {
     body: Body,
-    model: Model,
+    model: ChainModel,
 }
 
 impl Arm {
     fn new(human: HumanModel, limbs: &[&str]) -> Self {
         let body = Body::human(1.75, human).unwrap();
         let limbs: Vec<usize> = limbs.iter().map(|name| body.limb_index(name).unwrap()).collect();
-        let model = Model::new(&body, &limbs, Root::Fixed).unwrap();
+        let model = ChainModel::new(&body, &limbs, Root::Fixed).unwrap();
         Self { body, model }
     }
 
@@ -51,15 +52,15 @@ impl Arm {
     /// A goal for a site where it is at some angles, and farther by `beyond`.
     fn goal(&self, site: &str, angles: &[f64], beyond: Vec3, level: usize) -> Goal {
         let site = &self.body.sites()[self.body.site_index(site).unwrap()];
-        let part = self.model.part_of(site.limb).unwrap();
-        let aim = Aim::Position(self.place(angles).poses[part].transform_point(site.position) + beyond);
-        Goal { part, point: site.position, aim, weight: 1.0, level }
+        let link = self.model.link_of(site.limb).unwrap();
+        let aim = Aim::Position(self.place(angles).poses[link].transform_point(site.position) + beyond);
+        Goal { link, point: site.position, aim, weight: 1.0, level }
     }
 
     fn solve(&self, goals: &[Goal], criterion: Option<&Criterion>, start: &[f64], rest: Vec<Rest>) -> Vec<f64> {
         let mut angles = start.to_vec();
         let report =
-            Solver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &long(), &mut angles);
+            IkSolver::with_rest(rest).solve(&self.model, &Pose::IDENTITY, goals, criterion, &long(), &mut angles);
         let h = criterion.map_or(0.0, |criterion| self.h(criterion, &angles));
         assert!((report.h - h).abs() < 1e-9, "{} {h}", report.h);
         for (angle, [low, high]) in angles.iter().zip(self.model.limits()) {
@@ -93,12 +94,12 @@ fn half(at: f64, slope: f64) -> Vec<[f32; 2]> {
         .collect()
 }
 
-fn view(pixels: &[[f32; 2]]) -> View<'_> {
+fn view(pixels: &[[f32; 2]]) -> SilhouetteView<'_> {
     // Optical frame: z towards -x of the world, 3 m away.
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
     let camera = Box::leak(Box::new(Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap()));
-    View { pixels, depth: &[], border: 1.0, camera, camera_from_world }
+    SilhouetteView { pixels, depth: &[], border: 1.0, camera, camera_from_world }
 }
 
 proptest! {
@@ -172,11 +173,11 @@ proptest! {
         let start = arm.within(&start[..arm.model.freedoms()]);
         let mut rest = rest_at(&rest[..arm.model.freedoms()]);
         rest.truncate(drawn);
-        let mut wanted = start.clone();
-        rest.iter().for_each(|rest| wanted[rest.unknown] = rest.angle);
+        let mut expected = start.clone();
+        rest.iter().for_each(|rest| expected[rest.unknown] = rest.angle);
         let found = arm.solve(&[], None, &start, rest);
-        for (found, wanted) in found.iter().zip(arm.within(&wanted)) {
-            prop_assert!((found - wanted).abs() < 1e-12);
+        for (found, expected) in found.iter().zip(arm.within(&expected)) {
+            prop_assert!((found - expected).abs() < 1e-12);
         }
     }
 }

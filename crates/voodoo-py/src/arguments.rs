@@ -15,7 +15,7 @@ macro_rules! arguments {
     };
 }
 
-arguments!(number, f64: stamp weight bias offset metres_per_unit);
+arguments!(number, f64: stamp weight bias offset meters_per_unit);
 arguments!(dimension, f64: length a0 b0 a1 b1);
 arguments!(word, String: site);
 
@@ -25,7 +25,7 @@ fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
 
 fn dimension(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     value.extract().map_err(|_| {
-        let text = wrong_argument(value.py(), name, "metres", value).value(value.py()).to_string();
+        let text = wrong_argument(value.py(), name, "meters", value).value(value.py()).to_string();
         exception(value.py(), "BodyError", text)
     })
 }

@@ -84,8 +84,8 @@ pub(crate) fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, 
     if array.is_c_contiguous() && value.getattr("flags")?.getattr("aligned")?.is_truthy()? {
         return Ok(value.clone());
     }
-    let (py, wanted) = (value.py(), ["C", "A", "E"]);
-    py.import("numpy")?.call_method1("require", (value, py.None(), wanted))
+    let (py, expected) = (value.py(), ["C", "A", "E"]);
+    py.import("numpy")?.call_method1("require", (value, py.None(), expected))
 }
 
 /// Rows of three numbers.

@@ -18,9 +18,9 @@ pub(crate) enum Rotation {
 }
 
 /// Position and rotation of a joint's ellipse.
-type Frame = ([f64; 3], Rotation);
+type JointFrame = ([f64; 3], Rotation);
 /// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion
-pub(crate) type JointParts = (String, Frame, Frame, [f64; 2], f64, Option<[[f64; 2]; 3]>, f64);
+pub(crate) type JointParts = (String, JointFrame, JointFrame, [f64; 2], f64, Option<[[f64; 2]; 3]>, f64);
 /// name, parent, shape, joint, match_caps
 type LimbParts = (String, Option<String>, PyShape, Option<JointParts>, [bool; 2]);
 /// name, limb, position
@@ -31,7 +31,7 @@ type SiteParts = (String, String, [f64; 3]);
 #[derive(Clone, PartialEq)]
 pub struct PyBody(pub Body);
 
-fn pose((position, rotation): Frame) -> Pose {
+fn pose((position, rotation): JointFrame) -> Pose {
     let rotation = match rotation {
         Rotation::Vector(vector) => Quat::from_scaled_axis(Vec3::from_array(vector)),
         Rotation::Quaternion(quaternion) => Quat::from_array(quaternion),
@@ -39,11 +39,11 @@ fn pose((position, rotation): Frame) -> Pose {
     Pose::from_parts(Vec3::from_array(position), rotation)
 }
 
-fn readable(pose: &Pose) -> Frame {
+fn readable(pose: &Pose) -> JointFrame {
     (pose.translation.to_array(), Rotation::Vector(pose.rotation.to_scaled_axis().to_array()))
 }
 
-fn exact(pose: &Pose) -> Frame {
+fn exact(pose: &Pose) -> JointFrame {
     (pose.translation.to_array(), Rotation::Quaternion(pose.rotation.to_array()))
 }
 
@@ -133,7 +133,7 @@ impl PyBody {
 }
 
 impl PyBody {
-    fn parts_with(&self, frame: fn(&Pose) -> Frame) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
+    fn parts_with(&self, frame: fn(&Pose) -> JointFrame) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
         let limbs = self.0.limbs();
         let limb_parts = limbs
             .iter()

@@ -1,11 +1,11 @@
-//! What a depth camera sees of the body in the picture of a colour camera beside it.
+//! What a depth camera sees of the body in the picture of a color camera beside it.
 
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::DepthPixels;
-use voodoo_sensors::body_view::{Beside, BodyView, Matrix, StillDepth};
+use voodoo_sensors::body_view::{BodyView, DepthBesideColor, Matrix, StillDepth};
 
 use crate::arrays::contiguous;
 use crate::camera::camera_of;
@@ -103,14 +103,14 @@ impl PyStillDepth {
 
 #[doc = stub!("body_view")]
 #[pyfunction]
-#[pyo3(signature = (depth, camera, joints, *, metres_per_unit, world_from_depth, color_from_depth, color_camera, beyond, reach, step, margin, scene))]
+#[pyo3(signature = (depth, camera, joints, *, meters_per_unit, world_from_depth, color_from_depth, color_camera, beyond, reach, step, margin, scene))]
 #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn body_view<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
     camera: &Bound<'py, PyAny>,
     joints: PyReadonlyArray2<'py, f64>,
-    metres_per_unit: f64,
+    meters_per_unit: f64,
     world_from_depth: PyReadonlyArray2<'py, f64>,
     color_from_depth: PyReadonlyArray2<'py, f64>,
     color_camera: &Bound<'py, PyAny>,
@@ -122,18 +122,18 @@ pub(crate) fn body_view<'py>(
 ) -> PyResult<PyBodyView> {
     let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype uint16 or float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?;
-    let (units, metres) = (array.cast::<PyArray2<u16>>(), array.cast::<PyArray2<f32>>());
-    let (units, metres) = (units.ok().map(|array| array.readonly()), metres.ok().map(|array| array.readonly()));
-    let image = match (&units, &metres) {
+    let (units, meters) = (array.cast::<PyArray2<u16>>(), array.cast::<PyArray2<f32>>());
+    let (units, meters) = (units.ok().map(|array| array.readonly()), meters.ok().map(|array| array.readonly()));
+    let image = match (&units, &meters) {
         (Some(units), _) => DepthPixels::U16(units.as_slice()?),
-        (_, Some(metres)) => DepthPixels::F32(metres.as_slice()?),
+        (_, Some(meters)) => DepthPixels::F32(meters.as_slice()?),
         _ => return Err(wrong()),
     };
     columns(py, "joints", &joints, 3)?;
     let (camera, color_camera) = (camera_of(camera)?, camera_of(color_camera)?);
-    let beside = Beside {
+    let beside = DepthBesideColor {
         image,
-        metres_per_unit,
+        meters_per_unit,
         camera: &camera,
         world_from_depth: rows_of("world_from_depth", &world_from_depth)?,
         color_from_depth: rows_of("color_from_depth", &color_from_depth)?,
@@ -142,10 +142,10 @@ pub(crate) fn body_view<'py>(
         joints: joints.as_slice()?.as_chunks().0,
     };
     let scene = scene.as_mut().map(|scene| &mut scene.0);
-    let found = py.detach(|| beside.nearby(scene));
+    let found = py.detach(|| beside.points_near_body(scene));
     let nearby = found.map_err(|error| error.into_py(py))?;
     let pixels = nearby.projected(&color_camera);
-    let beyond: PyReadonlyArray2<'py, bool> = beyond.call1((beside.away(),))?.extract()?;
+    let beyond: PyReadonlyArray2<'py, bool> = beyond.call1((beside.body_depth(),))?.extract()?;
     let (size, mask) = ([beyond.dims()[0], beyond.dims()[1]], beyond.as_slice()?);
     let view = py.detach(|| nearby.view(pixels, mask, reach, size)).map_err(|error| error.into_py(py))?;
     Ok(PyBodyView(Arc::new(view)))

@@ -34,22 +34,22 @@ enum BorrowedPixels<'py> {
 pub(crate) struct ImageData {
     pub pixels: DepthArray,
     pub camera: Arc<Camera>,
-    pub metres_per_unit: f64,
+    pub meters_per_unit: f64,
     pub world_from_sensor: Pose,
     pub weight: f64,
     pub source: u16,
 }
 
-/// A picture as it came: colour or grey.
+/// A picture as it came: color or gray.
 pub enum ColorArray {
     Color(Py<PyArray3<u8>>),
-    Grey(Py<PyArray2<u8>>),
+    Gray(Py<PyArray2<u8>>),
 }
 
 /// A borrow of a [`ColorArray`].
 pub enum ColorPixelView<'py> {
     Color(PyReadonlyArray3<'py, u8>),
-    Grey(PyReadonlyArray2<'py, u8>),
+    Gray(PyReadonlyArray2<'py, u8>),
 }
 
 pub struct ColorData {
@@ -75,13 +75,13 @@ impl ColorArray {
             return (shape[2] == 3).then(|| (Self::Color(array.clone().unbind()), [shape[0], shape[1]]));
         }
         let array = array.cast::<PyArray2<u8>>().ok()?;
-        Some((Self::Grey(array.clone().unbind()), [array.shape()[0], array.shape()[1]]))
+        Some((Self::Gray(array.clone().unbind()), [array.shape()[0], array.shape()[1]]))
     }
 
     pub fn view<'py>(&self, py: Python<'py>) -> ColorPixelView<'py> {
         match self {
             Self::Color(array) => ColorPixelView::Color(array.bind(py).readonly()),
-            Self::Grey(array) => ColorPixelView::Grey(array.bind(py).readonly()),
+            Self::Gray(array) => ColorPixelView::Gray(array.bind(py).readonly()),
         }
     }
 }
@@ -90,7 +90,7 @@ impl ColorPixelView<'_> {
     pub fn pixels(&self) -> PyResult<ColorPixels<'_>> {
         Ok(match self {
             Self::Color(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
-            Self::Grey(view) => ColorPixels::Grey(view.as_slice()?),
+            Self::Gray(view) => ColorPixels::Gray(view.as_slice()?),
         })
     }
 }
@@ -131,7 +131,7 @@ pub struct Borrowed<'py> {
 struct ImageView<'py> {
     pixels: BorrowedPixels<'py>,
     camera: Arc<Camera>,
-    metres_per_unit: f64,
+    meters_per_unit: f64,
     world_from_sensor: Pose,
     weight: f64,
     source: u16,
@@ -161,8 +161,8 @@ impl Borrowed<'_> {
                     BorrowedPixels::U16(view) => DepthPixels::U16(view.as_slice()?),
                     BorrowedPixels::F32(view) => DepthPixels::F32(view.as_slice()?),
                 };
-                let ImageView { ref camera, metres_per_unit, world_from_sensor, weight, source, .. } = *image;
-                Ok(DepthImage { pixels, camera, metres_per_unit, world_from_sensor, weight, source })
+                let ImageView { ref camera, meters_per_unit, world_from_sensor, weight, source, .. } = *image;
+                Ok(DepthImage { pixels, camera, meters_per_unit, world_from_sensor, weight, source })
             })
             .collect()
     }
@@ -203,7 +203,7 @@ impl Held<'_> {
                 ImageView {
                     pixels,
                     camera: Arc::clone(&image.camera),
-                    metres_per_unit: image.metres_per_unit,
+                    meters_per_unit: image.meters_per_unit,
                     world_from_sensor: image.world_from_sensor,
                     weight: image.weight,
                     source: image.source,

@@ -8,11 +8,11 @@ use voodoo_core::{RawValue, Value};
 use crate::errors::{IntoPy, exception};
 
 /// One row an entry: name, documentation, unit, default, (least, greatest) or None, words to choose from.
-type Row<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Option<(f64, f64)>, Vec<&'static str>);
+type FieldRow<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Option<(f64, f64)>, Vec<&'static str>);
 
 #[doc = stub!("config_fields")]
 #[pyfunction]
-pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<Row<'_>>> {
+pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<FieldRow<'_>>> {
     Config::default()
         .fields()
         .into_iter()

@@ -257,7 +257,7 @@ pub(crate) fn person_candidates<'py>(
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
         camera: &camera,
-        metres_per_unit: 1.0,
+        meters_per_unit: 1.0,
         world_from_sensor: Pose::IDENTITY,
         weight: 1.0,
         source: 0,

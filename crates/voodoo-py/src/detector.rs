@@ -15,30 +15,30 @@ use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery,
 use crate::arrays::{contiguous, matrix, vector};
 use crate::errors::{exception, wrong_argument};
 
-/// Standard deviation of a joint that a detector does not give one for, metres.
+/// Standard deviation of a joint that a detector does not give one for, meters.
 const SIGMA: f64 = 0.05;
 /// Probabilities are this far from 0 and 1 at least: their log odds are finite.
 const LEAST: f64 = 1e-7;
 
 /// What a caller wants as a detector: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
-pub(crate) fn detector(wanted: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
-    let py = wanted.py();
-    if wanted.is_none() {
+pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
+    let py = given.py();
+    if given.is_none() {
         return Ok(None);
     }
-    if wanted.cast::<PyString>().is_ok_and(|word| word == "shipped") {
+    if given.cast::<PyString>().is_ok_and(|word| word == "shipped") {
         return Ok(shipped());
     }
     #[cfg(feature = "detect")]
-    if let Ok(detector) = wanted.cast::<crate::detect::PyDetector>() {
+    if let Ok(detector) = given.cast::<crate::detect::PyDetector>() {
         return Ok(Some(detector.try_borrow()?.0.fresh()));
     }
-    if wanted.hasattr("joints")? && wanted.hasattr("detect")? {
-        return Ok(Some(Box::new(PythonDetector::new(wanted)?)));
+    if given.hasattr("joints")? && given.hasattr("detect")? {
+        return Ok(Some(Box::new(PythonDetector::new(given)?)));
     }
     let text = format!(
         "detector: expected \"shipped\", None, a voodoo.Detector, or an object with joints and detect(image), found {}",
-        wanted.repr()?
+        given.repr()?
     );
     Err(exception(py, "ConfigError", text))
 }
@@ -253,7 +253,7 @@ fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>>
 /// The attribute `floor`: normal and offset, or None.
 fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
     let Some(found) = person.getattr_opt("floor")?.filter(|found| !found.is_none()) else { return Ok(None) };
-    let wrong = |_| wrong_argument(person.py(), "floor", "a unit normal and an offset in metres", &found);
+    let wrong = |_| wrong_argument(person.py(), "floor", "a unit normal and an offset in meters", &found);
     let (normal, offset): (Bound<'_, PyAny>, f64) = found.extract().map_err(wrong)?;
     let normal: Vec3 = vector("floor[0]", &normal)?;
     Ok(normal.try_normalize().map(|normal| Ground { normal, offset }))
@@ -269,5 +269,5 @@ fn pixels(person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Vec<usize>>
         wrong_argument(person.py(), "mask", &expected, &found)
     })?;
     let view = array.readonly();
-    Ok(view.as_slice()?.iter().enumerate().filter(|(_, shown)| **shown).map(|(index, _)| index).collect())
+    Ok(view.as_slice()?.iter().enumerate().filter(|(_, visible)| **visible).map(|(index, _)| index).collect())
 }

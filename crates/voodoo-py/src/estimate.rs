@@ -25,7 +25,7 @@ pub struct Names {
 }
 
 impl Names {
-    pub fn of(body: &Body) -> Self {
+    pub fn from_body(body: &Body) -> Self {
         Self::new(
             body.limbs().iter().map(|limb| limb.name.clone()).collect(),
             body.sites().iter().map(|site| site.name.clone()).collect(),
@@ -76,7 +76,7 @@ type Head = (f64, String, f64, usize);
 /// Of limbs, sites, joints and sources.
 type AllNames = (Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
 /// Status and poses (position, quaternion) of limbs, sites, points and residuals of limbs, gaps of joints, reports of sources.
-type Found = (
+type PoseParts = (
     Vec<String>,
     Vec<([f64; 3], [f64; 4])>,
     Vec<[f64; 3]>,
@@ -87,18 +87,18 @@ type Found = (
 );
 
 /// Covariances of sites (nine numbers each), limbs (36) and joints (nine); standard deviations of lengths and girths.
-type Spread = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
+type SpreadParts = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
 
 /// All of an estimate.
-type Kept = (Head, AllNames, Found, Spread);
+type Kept = (Head, AllNames, PoseParts, SpreadParts);
 
-fn spread_of(found: &Covariances) -> Spread {
+fn spread_of(found: &Covariances) -> SpreadParts {
     let flat = |all: &[Mat3]| all.iter().flat_map(Mat3::to_cols_array).collect();
     let limbs = found.limbs.iter().flatten().flatten().copied().collect();
     (flat(&found.sites), limbs, flat(&found.turns), found.lengths.clone(), found.girths.clone())
 }
 
-fn covariances((sites, limbs, turns, lengths, girths): Spread) -> Covariances {
+fn covariances((sites, limbs, turns, lengths, girths): SpreadParts) -> Covariances {
     let matrices = |flat: &[f64]| flat.as_chunks::<9>().0.iter().map(Mat3::from_cols_array).collect();
     let limb = |flat: &[f64; 36]| std::array::from_fn(|row| std::array::from_fn(|column| flat[6 * row + column]));
     Covariances {
@@ -117,8 +117,8 @@ pub(crate) fn _estimate(
     py: Python<'_>,
     head: Head,
     names: AllNames,
-    found: Found,
-    spread: Option<Spread>,
+    found: PoseParts,
+    spread: Option<SpreadParts>,
 ) -> PyResult<PyEstimate> {
     let wrong = |word: &str| exception(py, "MeasurementError", format!("estimate: found the unknown status {word:?}"));
     let (stamp, status, mean_squared_distance, steps) = head;

@@ -40,7 +40,7 @@ impl PyFrame {
         Held { clouds: &[], images: &self.images, sites: &[], ground: self.ground }.borrow_for(py, body)
     }
 
-    /// Borrows the colour pictures.
+    /// Borrows the color pictures.
     pub fn color_views<'py>(&self, py: Python<'py>) -> Vec<ColorView<'py, '_>> {
         self.colors.iter().map(|data| data.view(py)).collect()
     }
@@ -87,12 +87,12 @@ impl PyFrame {
     }
 
     #[doc = stub!("Frame.add_depth")]
-    #[pyo3(signature = (image, *, camera, metres_per_unit=0.001, world_from_sensor=None, weight=1.0, source="depth"))]
+    #[pyo3(signature = (image, *, camera, meters_per_unit=0.001, world_from_sensor=None, weight=1.0, source="depth"))]
     fn add_depth(
         &mut self,
         image: &Bound<'_, PyAny>,
         camera: &Bound<'_, PyAny>,
-        #[pyo3(from_py_with = arguments::metres_per_unit)] metres_per_unit: f64,
+        #[pyo3(from_py_with = arguments::meters_per_unit)] meters_per_unit: f64,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
@@ -130,7 +130,7 @@ impl PyFrame {
         let data = ImageData {
             pixels,
             camera,
-            metres_per_unit,
+            meters_per_unit,
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             weight,
             source: self.source(source),
@@ -226,7 +226,7 @@ impl PyFrame {
             if sigma > 0.0 && sigma.is_finite() {
                 return Ok((reference_sigma / sigma).powi(2).min(max_weight));
             }
-            Err(exception(py, "MeasurementError", format!("sigma: expected finite metres > 0, found {sigma}")))
+            Err(exception(py, "MeasurementError", format!("sigma: expected finite meters > 0, found {sigma}")))
         };
         let trusted = rays.iter().map(|ray| &ray.0).filter(|ray| ray.trust >= min_trust);
         let mut count = 0;

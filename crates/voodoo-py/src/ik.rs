@@ -5,7 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
-use voodoo_ik::{self, Aim, Bone, Carrier, Criterion, Goal, Kinematics, Model, Options, Rest, Root, Solver, Trunk};
+use voodoo_ik::{
+    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SolverOptions, Trunk,
+};
 
 use crate::arrays::{frozen, limb_poses, pose};
 use crate::body::PyBody;
@@ -26,16 +28,16 @@ type OptionParts = (usize, f64, f64, f64, f64, f64);
 #[pyclass(name = "Chain", module = "voodoo._core", frozen)]
 pub struct PyChain {
     body: Body,
-    model: Model,
+    model: ChainModel,
 }
 
 /// A solver that draws the angles of these indices to these values, below all else.
-fn resting(rest: &[(usize, f64)]) -> Solver {
-    Solver::with_rest(rest.iter().map(|&(unknown, angle)| Rest { unknown, angle }).collect())
+fn resting(rest: &[(usize, f64)]) -> IkSolver {
+    IkSolver::with_rest(rest.iter().map(|&(unknown, angle)| Rest { unknown, angle }).collect())
 }
 
-fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> Options {
-    let mut options = Options::default();
+fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> SolverOptions {
+    let mut options = SolverOptions::default();
     (options.steps, options.tolerance, options.still) = (steps, tolerance, still);
     (options.gain, options.caution, options.largest_turn) = (gain, caution, largest_turn);
     options
@@ -45,7 +47,7 @@ impl PyChain {
     fn site(&self, py: Python<'_>, name: &str) -> PyResult<(usize, Vec3)> {
         let index = self.body.site_index(name).map_err(|error| error.into_py(py))?;
         let site = &self.body.sites()[index];
-        self.model.part_of(site.limb).map(|part| (part, site.position)).ok_or_else(|| {
+        self.model.link_of(site.limb).map(|link| (link, site.position)).ok_or_else(|| {
             let known = self.site_names().join(", ");
             exception(py, "BodyError", format!("site: expected one on the chain ({known}), found {name:?}"))
         })
@@ -55,10 +57,10 @@ impl PyChain {
         parts
             .iter()
             .map(|(site, kind, v, weight, level)| {
-                let (part, point) = self.site(py, site)?;
+                let (link, point) = self.site(py, site)?;
                 let (first, second) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]));
                 let aim = if kind == "line" { Aim::Line { n: first, m: second } } else { Aim::Position(first) };
-                Ok(Goal { part, point, aim, weight: *weight, level: *level })
+                Ok(Goal { link, point, aim, weight: *weight, level: *level })
             })
             .collect()
     }
@@ -84,7 +86,7 @@ impl PyChain {
         let mut found = voodoo_ik::trunk(&self.body, &self.model);
         for (name, world_from_limb) in others {
             let limb = self.body.limb_index(name).map_err(|error| error.into_py(py))?;
-            if self.model.part_of(limb).is_some() {
+            if self.model.link_of(limb).is_some() {
                 let message = format!("others: expected limbs that are not on the chain, found {name:?}");
                 return Err(exception(py, "BodyError", message));
             }
@@ -113,11 +115,11 @@ impl PyChain {
         Ok(at)
     }
 
-    fn site_parts(&self) -> impl Iterator<Item = (&str, usize, Vec3)> {
+    fn site_links(&self) -> impl Iterator<Item = (&str, usize, Vec3)> {
         self.body
             .sites()
             .iter()
-            .filter_map(|site| self.model.part_of(site.limb).map(|part| (site.name.as_str(), part, site.position)))
+            .filter_map(|site| self.model.link_of(site.limb).map(|link| (site.name.as_str(), link, site.position)))
     }
 }
 
@@ -135,7 +137,7 @@ impl PyChain {
             .collect::<Result<Vec<_>, _>>()
             .map_err(|error| error.into_py(py))?;
         let root = if free_root { Root::Free } else { Root::Fixed };
-        let model = Model::new(&body.0, &indices, root).map_err(|error| error.into_py(py))?;
+        let model = ChainModel::new(&body.0, &indices, root).map_err(|error| error.into_py(py))?;
         Ok(Self { body: body.0.clone(), model })
     }
 
@@ -151,12 +153,12 @@ impl PyChain {
 
     #[getter]
     fn limb_names(&self) -> Vec<String> {
-        self.model.parts().iter().map(|part| self.body.limbs()[part.limb].name.clone()).collect()
+        self.model.links().iter().map(|link| self.body.limbs()[link.limb].name.clone()).collect()
     }
 
     #[getter]
     fn site_names(&self) -> Vec<String> {
-        self.site_parts().map(|(name, _, _)| name.to_owned()).collect()
+        self.site_links().map(|(name, _, _)| name.to_owned()).collect()
     }
 
     /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
@@ -165,7 +167,7 @@ impl PyChain {
         let at = self.place(py, base, &angles)?;
         let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let sites: Vec<f64> =
-            self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
+            self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
         let counts = (at.poses.len(), sites.len() / 3);
         Ok((frozen(py, poses, &[counts.0, 4, 4])?, frozen(py, sites, &[counts.1, 3])?))
     }
@@ -174,8 +176,8 @@ impl PyChain {
     fn jacobian<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>, site: &str) -> PyResult<Array<'py>> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let (part, point) = self.site(py, site)?;
-        let goal = Goal { part, point, aim: Aim::Position(Vec3::ZERO), weight: 1.0, level: 0 };
+        let (link, point) = self.site(py, site)?;
+        let goal = Goal { link, point, aim: Aim::Position(Vec3::ZERO), weight: 1.0, level: 0 };
         let (mut rows, mut residual) = (Vec::new(), Vec::new());
         voodoo_ik::level_rows(&self.model, &[goal], &at, &mut rows, &mut residual);
         frozen(py, rows, &[3, self.model.freedoms()])
@@ -194,7 +196,7 @@ impl PyChain {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
         let segments = self.bones(py, segments, depth.0)?;
-        let views: Vec<voodoo_ik::View> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
         let trunk = self.trunk(py, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
@@ -244,7 +246,7 @@ impl PyChain {
         let mut ordered = goals.clone();
         ordered.sort_by_key(|goal| goal.level);
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<voodoo_ik::View> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
         let trunk = self.trunk(py, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let mut solver = resting(&rest);
@@ -254,7 +256,7 @@ impl PyChain {
         let residuals = PyTuple::new(py, residuals.collect::<Vec<_>>())?;
         let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let sites: Vec<f64> =
-            self.site_parts().flat_map(|(_, part, x)| at.poses[part].transform_point(x).to_array()).collect();
+            self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
         let (limbs, points, n) = (at.poses.len(), sites.len() / 3, angles.len());
         Ok((
             frozen(py, angles, &[n])?,
@@ -286,16 +288,16 @@ impl PyChain {
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<voodoo_ik::View> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
         let trunk = voodoo_ik::trunk(&self.body, &self.model);
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let (count, n) = (starts.shape()[0], self.model.freedoms());
         let mut angles = starts.as_slice()?.to_vec();
         let positions = positions.as_slice()?;
-        let sites: Vec<(usize, Vec3)> = self.site_parts().map(|(_, part, x)| (part, x)).collect();
+        let sites: Vec<(usize, Vec3)> = self.site_links().map(|(_, link, x)| (link, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let [mut h, mut steps, mut tried, mut looked, mut converged] = [const { Vec::new() }; 5];
+        let [mut h, mut steps, mut tried, mut compared, mut converged] = [const { Vec::new() }; 5];
         py.detach(|| {
             let mut solver = resting(&rest);
             let width = 3 * goals.len();
@@ -307,11 +309,11 @@ impl PyChain {
                 let row = &mut angles[index * n..(index + 1) * n];
                 let report = solver.solve(&self.model, &base, &goals, Some(&criterion), &how, row);
                 let at = solver.kinematics();
-                points.extend(sites.iter().flat_map(|(part, x)| at.poses[*part].transform_point(*x).to_array()));
+                points.extend(sites.iter().flat_map(|(link, x)| at.poses[*link].transform_point(*x).to_array()));
                 h.push(report.h);
                 steps.push(report.steps as f64);
                 tried.push(report.tried as f64);
-                looked.push(report.looked as f64);
+                compared.push(report.compared as f64);
                 converged.push(f64::from(u8::from(report.converged)));
             }
         });
@@ -321,7 +323,7 @@ impl PyChain {
             frozen(py, h, &[count])?,
             frozen(py, steps, &[count])?,
             frozen(py, tried, &[count])?,
-            frozen(py, looked, &[count])?,
+            frozen(py, compared, &[count])?,
             frozen(py, converged, &[count])?,
         ))
     }

@@ -53,8 +53,8 @@ impl PyView {
 }
 
 impl PyView {
-    pub(crate) fn view(&self) -> voodoo_ik::View<'_> {
-        voodoo_ik::View {
+    pub(crate) fn view(&self) -> voodoo_ik::SilhouetteView<'_> {
+        voodoo_ik::SilhouetteView {
             pixels: &self.pixels,
             depth: &self.depth,
             border: self.border,

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::math::{CostTable, Vec3};
 use voodoo_sensors::eye::Eye;
-use voodoo_sensors::keypoints::{Part, Sensor, Sighting, Told, nearest_person};
+use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
 use crate::arrays::{PointArray, rows};
 use crate::body_view::rows_of;
@@ -14,28 +14,28 @@ use crate::people::TrackedBody;
 use crate::sites::{PySiteGate, PySiteRay, places_of};
 use crate::skin::before;
 
-type Seen = ((f64, f64), f64);
+type PixelRow = ((f64, f64), f64);
 /// Site, number and share of each keypoint, spread, and how far it lies behind the surface.
-type Shares = (String, Vec<(usize, f64)>, f64, f64);
+type KeypointRow = (String, Vec<(usize, f64)>, f64, f64);
 type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
 
 #[doc = stub!("KeypointLayout")]
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
-pub struct PyKeypointLayout(Vec<Part>);
+pub struct PyKeypointLayout(Vec<SiteKeypoints>);
 
 #[pymethods]
 impl PyKeypointLayout {
     #[new]
-    fn new(parts: Vec<Shares>) -> Self {
-        let part = |(site, shares, spread, behind)| Part { site, shares, spread, behind };
-        Self(parts.into_iter().map(part).collect())
+    fn new(layout: Vec<KeypointRow>) -> Self {
+        let part = |(site, weights, spread, behind)| SiteKeypoints { site, weights, spread, behind };
+        Self(layout.into_iter().map(part).collect())
     }
 
     /// Pixel and confidence of each part; none where it is not seen.
-    fn pixels(&self, keypoints: PyReadonlyArray2<'_, f64>, least: f64) -> PyResult<Vec<Option<Seen>>> {
+    fn pixels(&self, keypoints: PyReadonlyArray2<'_, f64>, least: f64) -> PyResult<Vec<Option<PixelRow>>> {
         let keypoints = rows("keypoints", &keypoints)?;
-        let seen = self.0.iter().map(|part| part.pixel(keypoints, least));
-        Ok(seen.map(|seen| seen.map(|seen| ((seen.pixel[0], seen.pixel[1]), seen.confidence))).collect())
+        let found = self.0.iter().map(|part| part.pixel(keypoints, least));
+        Ok(found.map(|found| found.map(|found| ((found.pixel[0], found.pixel[1]), found.confidence))).collect())
     }
 
     /// Number of the person nearest to where the parts are expected.
@@ -79,20 +79,21 @@ impl PyKeypointLayout {
         let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
-        let seen: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
-        let pixels: Vec<[f64; 2]> = seen.iter().map(|seen| seen.map_or([f64::NAN; 2], |seen| seen.pixel)).collect();
+        let found: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
+        let pixels: Vec<[f64; 2]> =
+            found.iter().map(|found| found.map_or([f64::NAN; 2], |found| found.pixel)).collect();
         let flat = pixels.iter().map(|pixel| eye.undistorted(*pixel));
         let (places, mut gate) = (self.places(predicted)?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for ((part, seen), (flat, place)) in self.0.iter().zip(seen).zip(flat.zip(places)) {
-            let Some(seen) = seen else {
+        for ((part, found), (flat, place)) in self.0.iter().zip(found).zip(flat.zip(places)) {
+            let Some(found) = found else {
                 unseen.push(part.site.clone());
                 continue;
             };
             let Some(expected) = place.filter(|_| only.as_ref().is_none_or(|only| only.contains(&part.site))) else {
                 continue;
             };
-            let pixel = (seen.pixel[0], seen.pixel[1]);
+            let pixel = (found.pixel[0], found.pixel[1]);
             let surface: Option<f64> = match surface {
                 Some(surface) => surface.call1((pixel,))?.extract()?,
                 None => None,
@@ -101,13 +102,13 @@ impl PyKeypointLayout {
                 Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
                 None => None,
             };
-            let sighting = Sighting { seen, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
-            match part.told(&sighting, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
-                Told::Ray(ray) => rays.push(PySiteRay(ray)),
-                Told::Place(place, sigma) => {
+            let observation = SiteObservation { pixel: found, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
+            match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
+                SiteMeasurement::Ray(ray) => rays.push(PySiteRay(ray)),
+                SiteMeasurement::Place(place, sigma) => {
                     points.push((part.site.clone(), PyArray1::from_slice(py, &place.to_array()), sigma));
                 }
-                Told::Dropped => dropped.push(part.site.clone()),
+                SiteMeasurement::Dropped => dropped.push(part.site.clone()),
             }
         }
         Ok((rays, points, unseen, dropped))

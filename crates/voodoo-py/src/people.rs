@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Options;
+use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::{Cloud, PositionRelation, RayRelation};
 use voodoo_core::{Frame, People, Tracker};
@@ -40,7 +40,7 @@ impl TrackedBody<'_> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
             Self::Person(people, id) => {
-                let found = people.people.there().find(|(there, _)| there == id);
+                let found = people.people.present().find(|(there, _)| there == id);
                 let missing = || {
                     let text = format!("person: expected one of those who are there, found {id}");
                     exception(people.py(), "BodyError", text)
@@ -65,14 +65,14 @@ impl PyPeople {
         region: Option<([f64; 3], [f64; 3])>,
     ) -> PyResult<Self> {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
-        let mut options = Options::default();
+        let mut options = PeopleOptions::default();
         (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
         let mut people =
             People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
         if let Some(found) = self::detector(detector)? {
             people = people.with_detector(found);
         }
-        let names = Arc::new(Names::of(people.prototype()));
+        let names = Arc::new(Names::from_body(people.prototype()));
         Ok(Self { people, names, detector_failures: 0 })
     }
 
@@ -99,15 +99,17 @@ impl PyPeople {
             .with_excluded(&frame.excluded);
         // A person's own measurements come after what all have in common; their sources are numbered on.
         let owned = own.iter().map(|(_, frame)| frame.borrow_for(py, body)).collect::<PyResult<Vec<_>>>()?;
-        let parts =
-            owned.iter().map(|own| Parts::of(&input, own, frame.sources.len() as u16)).collect::<PyResult<Vec<_>>>()?;
+        let parts = owned
+            .iter()
+            .map(|own| Parts::new(&input, own, frame.sources.len() as u16))
+            .collect::<PyResult<Vec<_>>>()?;
         let frames: Vec<(usize, Frame)> =
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
         py.detach(|| people.step(&input, &frames)).map_err(|error| error.into_py(py))?;
         self.detector_failures += usize::from(people.detector_error().is_some());
         warn_of_detector(py, self.people.detector_error())?;
-        let found = self.people.there().map(|(id, tracker)| {
+        let found = self.people.present().map(|(id, tracker)| {
             let (estimate, names) = (tracker.estimate().clone(), self.names.clone());
             let own = own.iter().filter(|(of, _)| *of == id).flat_map(|(_, own)| &own.sources);
             let sources = frame.sources.iter().chain(own).cloned().collect();
@@ -127,25 +129,25 @@ impl PyPeople {
         self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
     }
 
-    /// Whether colour pictures would tell something in the next frame.
-    fn wants_colors(&self) -> bool {
-        self.people.wants_colors()
+    /// Whether color pictures would tell something in the next frame.
+    fn needs_colors(&self) -> bool {
+        self.people.needs_colors()
     }
 
     /// Follows these numbers alone; None: everybody.
     fn only(&mut self, ids: Option<Vec<usize>>) {
-        self.people.only(ids);
+        self.people.restrict_to(ids);
     }
 
     /// The last estimate of a person who is there.
     fn estimate(&self, id: usize) -> Option<PyEstimate> {
-        let (_, tracker) = self.people.there().find(|(there, _)| *there == id)?;
+        let (_, tracker) = self.people.present().find(|(there, _)| *there == id)?;
         Some(PyEstimate { estimate: tracker.estimate().clone(), names: self.names.clone(), sources: Vec::new() })
     }
 
     /// The body of a person who is there, in their sizes.
     fn body(&self, id: usize) -> Option<PyBody> {
-        self.people.there().find(|(there, _)| *there == id).map(|(_, tracker)| PyBody(tracker.body().clone()))
+        self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| PyBody(tracker.body().clone()))
     }
 }
 
@@ -158,10 +160,11 @@ struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     /// `first` is the number of the first source of the person's own.
-    fn of(all: &Frame<'a>, own: &'a Borrowed<'_>, first: u16) -> PyResult<Self> {
+    fn new(all: &Frame<'a>, own: &'a Borrowed<'_>, first: u16) -> PyResult<Self> {
         let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
-        let positions = own.positions.iter().map(|seen| PositionRelation { source: seen.source + first, ..*seen });
-        let rays = own.rays.iter().map(|seen| RayRelation { source: seen.source + first, ..*seen });
+        let positions =
+            own.positions.iter().map(|relation| PositionRelation { source: relation.source + first, ..*relation });
+        let rays = own.rays.iter().map(|relation| RayRelation { source: relation.source + first, ..*relation });
         Ok(Self {
             clouds: all.clouds.iter().copied().chain(clouds).collect(),
             positions: all.positions.iter().copied().chain(positions).collect(),

@@ -23,7 +23,7 @@ pub(crate) struct PyClosestPoints {
     region: Py<PyAny>,
 }
 
-type Array<'py> = Bound<'py, PyArray1<f64>>;
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 #[pymethods]
 impl PyShape {
@@ -75,10 +75,10 @@ impl PyShape {
         &self,
         py: Python<'py>,
         point: &Bound<'py, PyAny>,
-    ) -> PyResult<(Array<'py>, Array<'py>, f64)> {
+    ) -> PyResult<(Vector<'py>, Vector<'py>, f64)> {
         let query = vector("point", point)?;
         if !query.is_finite() {
-            return Err(crate::errors::wrong_argument(py, "point", "finite metres", point));
+            return Err(crate::errors::wrong_argument(py, "point", "finite meters", point));
         }
         let found = self.0.closest_point(query);
         let array = |v: [f64; 3]| PyArray1::from_slice(py, &v);
@@ -107,7 +107,7 @@ impl PyShape {
             (batch, bad)
         });
         if let Some(row) = bad {
-            let found = format!("points: expected finite metres, found {:?} in row {row}", slice.get(row).to_array());
+            let found = format!("points: expected finite meters, found {:?} in row {row}", slice.get(row).to_array());
             return Err(crate::errors::exception(py, "MeasurementError", found));
         }
         let interleave = |points: &Points| -> PyResult<Py<PyAny>> {

@@ -1,4 +1,4 @@
-//! The skin cue of one camera: what is learnt, and what is followed.
+//! The skin cue of one camera: what is learned, and what is followed.
 
 use std::sync::Arc;
 
@@ -7,10 +7,10 @@ use pyo3::prelude::*;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::chroma::{CHROMA_BINS, LUMA_BINS};
 use voodoo_sensors::eye::Eye;
-use voodoo_sensors::skin::candidates::Candidate;
+use voodoo_sensors::skin::candidates::SkinCandidate;
 use voodoo_sensors::skin::cue::{SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::rules::Expected;
-use voodoo_sensors::skin::teacher::{Pace, Shown, Teacher};
+use voodoo_sensors::skin::teacher::{Pace, Teacher, VisibleSite};
 
 use crate::arrays::rows;
 use crate::body_view::{PyBodyView, rows_of};
@@ -20,20 +20,20 @@ use crate::people::TrackedBody;
 use crate::sites::places_of;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
-type Place = ((f64, f64), i32, usize, bool);
+type CandidatePlace = ((f64, f64), i32, usize, bool);
 type Ray<'py> = (usize, Row<'py>, Row<'py>, Option<Row<'py>>, f64);
-type Names = (Option<usize>, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>);
+type BlobRow = (Option<usize>, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>);
 
-fn told(candidate: &Candidate) -> Place {
+fn row_of(candidate: &SkinCandidate) -> CandidatePlace {
     let [u, v] = candidate.pixel;
     ((u, v), candidate.region, candidate.area, candidate.hand)
 }
 
 /// Places before a camera, and their pixels.
-type Before = (Vec<[f64; 3]>, Vec<[f64; 2]>);
+type PlacesInFront = (Vec<[f64; 3]>, Vec<[f64; 2]>);
 
-/// Places of the world before a camera, metres, and their columns and rows; NaN behind it, and where its lens shows nothing.
-pub(crate) fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> Before {
+/// Places of the world before a camera, meters, and their columns and rows; NaN behind it, and where its lens shows nothing.
+pub(crate) fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> PlacesInFront {
     let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
     let pixels = inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect();
     (inside, pixels)
@@ -61,8 +61,8 @@ impl PySkinTeacher {
     }
 
     #[getter]
-    fn learnt(&self) -> u32 {
-        self.0.learnt
+    fn learned(&self) -> u32 {
+        self.0.learned
     }
 
     #[getter]
@@ -71,7 +71,7 @@ impl PySkinTeacher {
         Ok(PyArray1::from_slice(py, &self.0.colors.skin).reshape(shape)?.into_any())
     }
 
-    /// Learns colours and background from a picture.
+    /// Learns colors and background from a picture.
     #[pyo3(signature = (cue, image, places, *, world_from_sensor, camera, half_life, every, settled))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn learn<'py>(
@@ -90,12 +90,17 @@ impl PySkinTeacher {
         let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = rows("places", &places)?.iter().map(|place| Vec3::from_array(*place));
         let (inside, pixels) = before(&eye, places);
-        let shown = |(site, (place, pixel)): (usize, (&[f64; 3], &[f64; 2]))| {
-            let seen = place[2] > 0.1 && pixel.iter().all(|value| value.is_finite());
+        let visible_site = |(site, (place, pixel)): (usize, (&[f64; 3], &[f64; 2]))| {
+            let in_front = place[2] > 0.1 && pixel.iter().all(|value| value.is_finite());
             let found = cue.cue.assigned.iter().any(|(other, _)| *other == site);
-            seen.then_some(Shown { pixel: *pixel, depth: place[2], head: cue.cue.settings.is_head(site), found })
+            in_front.then_some(VisibleSite {
+                pixel: *pixel,
+                depth: place[2],
+                head: cue.cue.settings.is_head(site),
+                found,
+            })
         };
-        let sites: Vec<Shown> = inside.iter().zip(&pixels).enumerate().filter_map(shown).collect();
+        let sites: Vec<VisibleSite> = inside.iter().zip(&pixels).enumerate().filter_map(visible_site).collect();
         let image = image.as_ref().map(image_of).transpose()?;
         let pace = Pace { focal: eye.focal(), half_life, every, settled };
         py.detach(|| self.0.learn(&cue.cue.picture, image, &sites, &pace));
@@ -149,8 +154,8 @@ impl PySkinCue {
     }
 
     #[getter]
-    fn candidates(&self) -> Vec<Place> {
-        self.cue.candidates.iter().map(told).collect()
+    fn candidates(&self) -> Vec<CandidatePlace> {
+        self.cue.candidates.iter().map(row_of).collect()
     }
 
     #[getter]
@@ -160,12 +165,12 @@ impl PySkinCue {
 
     /// Of all regions that are followed: site, pictures, stamp, velocity, how far from each site and how long in doubt.
     #[getter]
-    fn followed(&self) -> Vec<Names> {
+    fn followed(&self) -> Vec<BlobRow> {
         let blobs = self.cue.blobs.items.iter();
         blobs
             .map(|blob| {
                 let velocity = blob.velocity.to_array().to_vec();
-                (blob.label, blob.count, blob.stamp, velocity, blob.far.clone(), blob.doubt.clone())
+                (blob.label, blob.count, blob.stamp, velocity, blob.far.clone(), blob.mismatch.clone())
             })
             .collect()
     }
@@ -231,8 +236,8 @@ impl PySkinCue {
         let cue = &mut self.cue;
         let found = py.detach(|| cue.observe(&input)).map_err(|error| error.into_py(py))?;
         let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
-        let told = found.iter();
-        Ok(told
+        let rows = found.iter();
+        Ok(rows
             .map(|site| (site.site, row(site.origin), row(site.direction), site.place.map(row), site.depth))
             .collect())
     }

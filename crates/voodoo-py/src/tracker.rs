@@ -27,7 +27,7 @@ pub struct PyTracker {
     pub tracker: Tracker,
     names: Arc<Names>,
     sources: Vec<String>,
-    /// Names of the cameras of colour pictures, in the order of their numbers.
+    /// Names of the cameras of color pictures, in the order of their numbers.
     cameras: Vec<String>,
     /// Steps in which the detector failed.
     detector_failures: usize,
@@ -43,7 +43,7 @@ pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResul
     joints.iter().map(place).collect()
 }
 
-/// Length of body between each of some places (N, 3) and a camera's focal point, metres.
+/// Length of body between each of some places (N, 3) and a camera's focal point, meters.
 #[pyfunction]
 pub(crate) fn body_before<'py>(
     tracker: TrackedBody<'py>,
@@ -65,7 +65,7 @@ impl PyTracker {
         }
     }
 
-    /// Number of the camera of colour pictures with this name.
+    /// Number of the camera of color pictures with this name.
     fn camera(&mut self, name: &str) -> u16 {
         let known = self.cameras.iter().position(|known| known == name);
         let number = known.unwrap_or_else(|| {
@@ -95,7 +95,7 @@ impl PyTracker {
     }
 
     fn body_changed(&mut self) {
-        self.names = Arc::new(Names::of(self.tracker.body()));
+        self.names = Arc::new(Names::from_body(self.tracker.body()));
     }
 }
 
@@ -107,7 +107,7 @@ impl PyTracker {
         if let Some(found) = self::detector(detector)? {
             tracker = tracker.with_detector(found);
         }
-        let names = Arc::new(Names::of(tracker.body()));
+        let names = Arc::new(Names::from_body(tracker.body()));
         Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new(), detector_failures: 0 })
     }
 
@@ -209,7 +209,7 @@ impl PyTracker {
         Ok(likely)
     }
 
-    /// Learns the body's colours in a frame's pictures at some poses.
+    /// Learns the body's colors in a frame's pictures at some poses.
     #[pyo3(signature = (frame, poses=None))]
     fn _learn_colors<'py>(
         &mut self,
@@ -240,7 +240,7 @@ impl PyTracker {
         PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// Signed distance of world points `(N, 3)` to the posed body, metres, negative inside.
+    /// Signed distance of world points `(N, 3)` to the posed body, meters, negative inside.
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
@@ -249,7 +249,7 @@ impl PyTracker {
         Ok(PyArray1::from_vec(py, distances))
     }
 
-    /// Signed distances `(limbs, N)` of world points `(N, 3)` to every limb of the posed body, metres, negative inside.
+    /// Signed distances `(limbs, N)` of world points `(N, 3)` to every limb of the posed body, meters, negative inside.
     fn limb_distances<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);

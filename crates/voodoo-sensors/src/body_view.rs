@@ -1,4 +1,4 @@
-//! What a depth camera sees of the body, in the picture of a colour camera beside it; and what may be the still scene.
+//! What a depth camera sees of the body, in the picture of a color camera beside it; and what may be the still scene.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -19,7 +19,7 @@ const STAYS_PICTURES: usize = 6;
 /// A 4x4 transform, row by row.
 pub type Matrix = [[f64; 4]; 4];
 
-/// What a depth camera saw of the body, in the picture of a colour camera beside it.
+/// What a depth camera saw of the body, in the picture of a color camera beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyView {
     /// Rows and columns of the picture.
@@ -28,7 +28,7 @@ pub struct BodyView {
     pub mask: Vec<bool>,
     /// Columns and rows of the points in the picture.
     pub pixels: Vec<[f64; 2]>,
-    /// Theirs along the colour camera's optical axis, metres.
+    /// Theirs along the color camera's optical axis, meters.
     pub depths: Vec<f64>,
     /// Of every point whether nothing behind it was ever seen there: it may be the scene. None: not known.
     pub still: Option<Vec<bool>>,
@@ -44,7 +44,7 @@ impl BodyView {
 }
 
 /// Of every pixel that is looked at whether it shows what may be the scene, and whether something before what was seen there once.
-pub type Standing = (Vec<bool>, Vec<bool>);
+pub type StillMasks = (Vec<bool>, Vec<bool>);
 
 /// What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind which
 /// nothing was ever seen. A table's edge does not become a hand.
@@ -76,20 +76,20 @@ impl StillDepth {
         image
     }
 
-    /// Takes up an image, metres, 0 = no return, of so many rows and columns; a camera that has moved starts anew.
+    /// Takes up an image, meters, 0 = no return, of so many rows and columns; a camera that has moved starts anew.
     ///
     /// Of every pixel whether it shows what may be the scene, and whether something before what was seen there once; none as long
     /// as too little was seen. Nothing is told of pixels outside some rows and columns.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the image is not of that size.
-    pub fn see(
+    pub fn update(
         &mut self,
         z: Vec<f32>,
         size: [usize; 2],
         pose: &Matrix,
         within: [Range<usize>; 2],
-    ) -> Result<Option<Standing>, TrackError> {
+    ) -> Result<Option<StillMasks>, TrackError> {
         let entries = self.pose.as_flattened().iter().zip(pose.as_flattened());
         let moved = entries.into_iter().any(|(before, now)| !((before - now).abs() <= CAMERA_STANDS));
         if self.farthest.is_empty() || moved || self.size != size || self.farthest.len() != z.len() {
@@ -115,39 +115,39 @@ impl StillDepth {
     }
 }
 
-/// A depth camera beside a colour camera, and where the body is expected.
+/// A depth camera beside a color camera, and where the body is expected.
 #[derive(Clone, Copy, Debug)]
-pub struct Beside<'a> {
+pub struct DepthBesideColor<'a> {
     /// Depths, row by row.
     pub image: DepthPixels<'a>,
-    /// Metres each of their units is.
-    pub metres_per_unit: f64,
+    /// Meters each of their units is.
+    pub meters_per_unit: f64,
     /// The depth camera.
     pub camera: &'a Camera,
     /// Its pose.
     pub world_from_depth: Matrix,
-    /// From its frame to the colour camera's.
+    /// From its frame to the color camera's.
     pub color_from_depth: Matrix,
     /// Every step-th row and column is used.
     pub step: usize,
-    /// Enlargement of the box around the body, metres.
+    /// Enlargement of the box around the body, meters.
     pub margin: f64,
-    /// Places of the body in the world, metres.
+    /// Places of the body in the world, meters.
     pub joints: &'a [[f64; 3]],
 }
 
-/// The points of a depth image near the body, in the frame of a colour camera.
+/// The points of a depth image near the body, in the frame of a color camera.
 #[derive(Clone, Debug)]
 pub struct Nearby {
-    /// Metres.
+    /// Meters.
     pub points: Vec<[f64; 3]>,
     still: Option<Vec<bool>>,
     moved: Option<Vec<bool>>,
 }
 
-impl Beside<'_> {
-    /// How far the body is along the depth camera's optical axis, metres: the median of its places.
-    pub fn away(&self) -> f64 {
+impl DepthBesideColor<'_> {
+    /// How far the body is along the depth camera's optical axis, meters: the median of its places.
+    pub fn body_depth(&self) -> f64 {
         let mut depths: Vec<f64> = self.joints.iter().map(|place| self.in_depth(*place)[2]).collect();
         depths.sort_unstable_by(f64::total_cmp);
         let upper = depths.len() / 2;
@@ -162,7 +162,7 @@ impl Beside<'_> {
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub fn nearby(&self, scene: Option<&mut StillDepth>) -> Result<Nearby, TrackError> {
+    pub fn points_near_body(&self, scene: Option<&mut StillDepth>) -> Result<Nearby, TrackError> {
         let (whole, step) = ([self.camera.height(), self.camera.width()], self.step.max(1));
         let size = whole.map(|size| size.div_ceil(step));
         if self.camera.pixels() != self.image.len() {
@@ -172,12 +172,12 @@ impl Beside<'_> {
         let (low, high) = self.bounds();
         let [rows, columns] = self.window(low, high).map(|span| span.start.div_ceil(step)..span.end.div_ceil(step));
         let mut scene = scene;
-        let depth = self.metres(scene.as_mut().map_or_else(Vec::new, |scene| scene.image()));
+        let depth = self.meters(scene.as_mut().map_or_else(Vec::new, |scene| scene.image()));
         let within = [rows.clone(), columns.clone()];
         let window = Window { depth: &depth, size, camera: self.camera, step, rows, columns };
         let (points, pixels) = window.within(low, high, &self.world_from_depth, &self.color_from_depth)?;
         let standing = match scene {
-            Some(scene) => scene.see(depth, size, &self.world_from_depth, within)?,
+            Some(scene) => scene.update(depth, size, &self.world_from_depth, within)?,
             None => None,
         };
         let at = |marks: Vec<bool>| pixels.iter().map(|index| marks[*index as usize]).collect();
@@ -185,21 +185,21 @@ impl Beside<'_> {
         Ok(Nearby { points, still, moved })
     }
 
-    /// Every step-th row and column, metres, into memory.
-    fn metres(&self, mut metres: Vec<f32>) -> Vec<f32> {
-        let (scale, width, step) = (self.metres_per_unit as f32, self.camera.width(), self.step.max(1));
+    /// Every step-th row and column, meters, into memory.
+    fn meters(&self, mut meters: Vec<f32>) -> Vec<f32> {
+        let (scale, width, step) = (self.meters_per_unit as f32, self.camera.width(), self.step.max(1));
         fn every<T: Copy>(pixels: &[T], width: usize, step: usize) -> impl Iterator<Item = T> {
             pixels.chunks(width).step_by(step).flat_map(move |row| row.iter().step_by(step)).copied()
         }
         match (self.image, step) {
-            (DepthPixels::U16(pixels), 1) => metres.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
+            (DepthPixels::U16(pixels), 1) => meters.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
             (DepthPixels::U16(pixels), _) => {
-                metres.extend(every(pixels, width, step).map(|pixel| f32::from(pixel) * scale));
+                meters.extend(every(pixels, width, step).map(|pixel| f32::from(pixel) * scale));
             }
-            (DepthPixels::F32(pixels), 1) => metres.extend(pixels.iter().map(|pixel| pixel * scale)),
-            (DepthPixels::F32(pixels), _) => metres.extend(every(pixels, width, step).map(|pixel| pixel * scale)),
+            (DepthPixels::F32(pixels), 1) => meters.extend(pixels.iter().map(|pixel| pixel * scale)),
+            (DepthPixels::F32(pixels), _) => meters.extend(every(pixels, width, step).map(|pixel| pixel * scale)),
         }
-        metres
+        meters
     }
 
     fn in_depth(&self, place: [f64; 3]) -> [f64; 3] {
@@ -229,8 +229,8 @@ impl Beside<'_> {
 impl Nearby {
     /// Columns and rows of the points in the picture of the color camera; NaN where it does not see them.
     pub fn projected(&self, camera: &Camera) -> Vec<[f64; 2]> {
-        let seen = |point: &[f64; 3]| camera.project(Vec3::from_array(*point)).unwrap_or([f64::NAN; 2]);
-        self.points.iter().map(seen).collect()
+        let in_camera = |point: &[f64; 3]| camera.project(Vec3::from_array(*point)).unwrap_or([f64::NAN; 2]);
+        self.points.iter().map(in_camera).collect()
     }
 
     /// Where the points are in a picture of `[height, width]`, at some places (column, row); the gaps between the depth pixels are
@@ -246,7 +246,7 @@ impl Nearby {
         size: [usize; 2],
     ) -> Result<BodyView, TrackError> {
         let projected = ProjectedPoints::new(&pixels, &self.points, self.moved.as_deref(), size)?;
-        let (mask, before) = projected.shown(beyond, reach, size)?;
+        let (mask, before) = projected.visible_mask(beyond, reach, size)?;
         let inside = |index: &isize| *index as usize;
         let depths = projected.inside.iter().map(|index| self.points[inside(index)][2]).collect();
         let still = self.still.map(|still| projected.inside.iter().map(|index| still[inside(index)]).collect());
@@ -267,7 +267,7 @@ mod tests {
         let mut scene = StillDepth::default();
         for count in 0..9 {
             let twin = scene.twin();
-            let found = scene.see(vec![3.0; 12], [3, 4], &LEVEL, [0..3, 0..4]).unwrap();
+            let found = scene.update(vec![3.0; 12], [3, 4], &LEVEL, [0..3, 0..4]).unwrap();
             assert_eq!(found.is_some(), count >= STAYS_PICTURES, "{count}");
             assert_eq!(twin.last.len(), count.min(STAYS_PICTURES));
         }
@@ -275,11 +275,11 @@ mod tests {
         let mut hand = vec![3.0; 12];
         hand[5] = 2.0;
         hand[11] = f32::NAN;
-        let (still, before) = scene.see(hand, [3, 4], &LEVEL, [0..3, 0..4]).unwrap().unwrap();
+        let (still, before) = scene.update(hand, [3, 4], &LEVEL, [0..3, 0..4]).unwrap().unwrap();
         assert_eq!((still[5], before[5], still[0]), (false, true, true));
         assert!(scene.farthest[11].is_nan() && *twin.farthest == [3.0; 12]);
         let moved = [[1.0, 0.0, 0.0, 0.01], LEVEL[1], LEVEL[2], LEVEL[3]];
-        assert!(scene.see(vec![3.0; 12], [3, 4], &moved, [0..3, 0..4]).unwrap().is_none());
+        assert!(scene.update(vec![3.0; 12], [3, 4], &moved, [0..3, 0..4]).unwrap().is_none());
     }
 
     #[test]
@@ -289,13 +289,13 @@ mod tests {
             ([60, 80], |index: usize| (20..30).contains(&(index / 80)) && (30..40).contains(&(index % 80)));
         let mut found = None;
         for step in 0..20_u32 {
-            // Of three hundredths of a metre to either side, another in every pixel and picture.
+            // Of three hundredths of a meter to either side, another in every pixel and picture.
             let noise =
                 |index: usize| (step * 4800 + index as u32).wrapping_mul(2_654_435_761) as f32 / u32::MAX as f32;
             let depth = |index: usize| {
                 if step >= 8 && hand(index) { 2.5 } else { 3.0 + 0.06 * (noise(index) - 0.5) }
             };
-            found = scene.see((0..4800).map(depth).collect(), size, &LEVEL, [0..60, 0..80]).unwrap();
+            found = scene.update((0..4800).map(depth).collect(), size, &LEVEL, [0..60, 0..80]).unwrap();
             assert_eq!(found.is_some(), step as usize >= STAYS_PICTURES);
         }
         let (still, before) = found.unwrap();
@@ -311,13 +311,13 @@ mod tests {
     }
 
     #[test]
-    fn the_body_is_looked_for_in_its_box_alone() {
+    fn the_body_is_searched_for_in_its_box_alone() {
         let mut image = vec![4000_u16; 24 * 16];
         (6..10).for_each(|row| image[row * 24 + 8..row * 24 + 12].fill(2000));
         let camera = Camera::pinhole(24, 16, [20.0, 20.0, 11.5, 7.5]).unwrap();
-        let beside = Beside {
+        let beside = DepthBesideColor {
             image: DepthPixels::U16(&image),
-            metres_per_unit: 0.001,
+            meters_per_unit: 0.001,
             camera: &camera,
             world_from_depth: LEVEL,
             color_from_depth: LEVEL,
@@ -325,16 +325,16 @@ mod tests {
             margin: 0.3,
             joints: &[[-0.2, 0.0, 1.9], [-0.1, 0.1, 2.0], [-0.1, 0.1, 2.2]],
         };
-        assert_eq!(beside.away(), 2.0);
-        let nearby = beside.nearby(None).unwrap();
+        assert_eq!(beside.body_depth(), 2.0);
+        let nearby = beside.points_near_body(None).unwrap();
         assert_eq!(nearby.points.len(), 16);
         let pixels = nearby.projected(&camera);
         let view = nearby.view(pixels, &vec![false; 24 * 16], 1, [16, 24]).unwrap();
         assert_eq!(view.mask.iter().filter(|pixel| **pixel).count(), 36);
         assert!((view.depths[0] - 2.0).abs() < 1e-6 && view.mask[5 * 24 + 7] && !view.mask[4 * 24 + 7]);
-        let coarse = Beside { step: 2, ..beside };
-        assert_eq!(coarse.nearby(None).unwrap().points.len(), 4);
+        let coarse = DepthBesideColor { step: 2, ..beside };
+        assert_eq!(coarse.points_near_body(None).unwrap().points.len(), 4);
         let narrow = Camera::pinhole(23, 16, [20.0, 20.0, 11.5, 7.5]).unwrap();
-        assert!(Beside { camera: &narrow, ..beside }.nearby(None).is_err());
+        assert!(DepthBesideColor { camera: &narrow, ..beside }.points_near_body(None).is_err());
     }
 }

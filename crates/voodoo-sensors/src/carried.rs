@@ -6,19 +6,19 @@ use voodoo_core::TrackError;
 use voodoo_core::Tracker;
 use voodoo_core::math::matrix;
 
-/// Points farther than this from every limb are the scene's and stay, metres.
+/// Points farther than this from every limb are the scene's and stay, meters.
 const NEAR: f64 = 0.20;
-/// A limb that is faster has jumped, metres a second; its points stay.
+/// A limb that is faster has jumped, meters a second; its points stay.
 const FASTEST_LIMB: f64 = 8.0;
 /// Points go on for so long at most, seconds...
 const LONGEST: f64 = 0.1;
 /// ... and those of no longer ago than this stay.
 const SAME_TIME: f64 = 1e-3;
-/// No limb is longer, metres: what is farther from all their origins is on none.
+/// No limb is longer, meters: what is farther from all their origins is on none.
 const LONGEST_LIMB: f64 = 1.0;
 
 /// Where points that a sensor measured `elapsed` seconds before the tracker's next frame are at its time, in the sensor's frame (without
-/// its pose: the world), metres: those on a limb go on with it, the others stay. None where nothing moves.
+/// its pose: the world), meters: those on a limb go on with it, the others stay. None where nothing moves.
 ///
 /// # Errors
 /// [`TrackError`] when points near the body are not finite.
@@ -36,7 +36,7 @@ pub fn carried(
         interval: motion.interval,
         elapsed: elapsed.clamp(-LONGEST, LONGEST),
         near: NEAR,
-        share: tracker.config().prediction,
+        fraction: tracker.config().prediction,
         max_speed: FASTEST_LIMB,
     };
     let mut moved: Vec<[f64; 3]> = (0..points.len()).map(|index| points.get(index).to_array()).collect();
@@ -51,7 +51,7 @@ pub fn carried(
     Ok(Some(moved))
 }
 
-/// Places of the world of points in a sensor's frame, metres.
+/// Places of the world of points in a sensor's frame, meters.
 fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
     for point in points {
         let [x, y, z] = *point;
@@ -79,11 +79,11 @@ struct Carrying<'a> {
     interval: f64,
     /// For so long points go on, seconds.
     elapsed: f64,
-    /// Points farther than this from every limb are the scene's and stay, metres.
+    /// Points farther than this from every limb are the scene's and stay, meters.
     near: f64,
     /// Of the limbs' velocity that is believed.
-    share: f64,
-    /// A limb that is faster has jumped, metres a second; its points stay.
+    fraction: f64,
+    /// A limb that is faster has jumped, meters a second; its points stay.
     max_speed: f64,
 }
 
@@ -100,7 +100,7 @@ impl Carrying<'_> {
         points.iter().enumerate().filter(|(_, place)| within(place)).map(|(index, _)| index).collect()
     }
 
-    /// Moves those points that may be on a limb, by their distances from each limb, limb by limb, metres.
+    /// Moves those points that may be on a limb, by their distances from each limb, limb by limb, meters.
     fn carry(&self, points: &mut [[f64; 3]], around: &[usize], away: &[f32]) {
         let count = around.len();
         if self.poses.len() != self.before.len() || away.len() != count * self.poses.len() {
@@ -124,7 +124,7 @@ impl Carrying<'_> {
                 row[0] * place[0] + row[1] * place[1] + row[2] * place[2] + row[3]
             });
             let speed = velocity.iter().map(|value| value * value).sum::<f64>().sqrt();
-            if speed < self.max_speed * self.share {
+            if speed < self.max_speed * self.fraction {
                 points[index] = [0, 1, 2].map(|axis| place[axis] + self.elapsed * velocity[axis]);
             }
         }
@@ -141,9 +141,9 @@ impl Carrying<'_> {
             let shift = now[row][3] - (0..3).map(|column| turned[column] * then[column][3]).sum::<f64>();
             for column in 0..3 {
                 let still = f64::from(u8::from(row == column));
-                change[row][column] = (turned[column] - still) / self.interval * self.share;
+                change[row][column] = (turned[column] - still) / self.interval * self.fraction;
             }
-            change[row][3] = shift / self.interval * self.share;
+            change[row][3] = shift / self.interval * self.fraction;
         }
         change
     }
@@ -166,7 +166,7 @@ mod tests {
             interval: 0.1,
             elapsed: 0.05,
             near: 0.2,
-            share: 1.0,
+            fraction: 1.0,
             max_speed: 8.0,
         };
         let points = [[0.1, 1.0, 0.0], [0.0, 0.2, 0.0], [5.0, 5.0, 5.0]];

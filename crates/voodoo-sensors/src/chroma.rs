@@ -1,4 +1,4 @@
-//! Colours of a picture as numbers of histogram bins, chroma and coarse luma: what skin is told by.
+//! Colors of a picture as numbers of histogram bins, chroma and coarse luma: what skin is told by.
 
 use crate::masks::PIXEL_BLOCK;
 use voodoo_core::TrackError;
@@ -42,13 +42,13 @@ fn bin_of([b, g, r]: [i32; 3]) -> u16 {
     let rounded = |sum: i32| (sum + (1 << 13)) >> 14;
     // Of eight bits as it is: for a compiler that knows it a product of two short numbers, which is faster, will do.
     let luma = rounded(1868 * b + 9617 * g + 4899 * r) & 255;
-    let chroma = |difference: i32, share: i32| rounded(difference * share + (128 << 14)).clamp(0, 255);
+    let chroma = |difference: i32, weight: i32| rounded(difference * weight + (128 << 14)).clamp(0, 255);
     let (cr, cb) = (chroma(r - luma, 11682), chroma(b - luma, 9241));
     let bin = ((cr >> 2) << 9 | (cb >> 2) << 3 | luma >> 5) as u16;
     if luma < DARKEST { bin | DARK } else { bin }
 }
 
-/// Whether a pixel is light enough to have a colour and its bin is one of a `table`'s.
+/// Whether a pixel is light enough to have a color and its bin is one of a `table`'s.
 #[inline(always)]
 pub fn is_among(bin: u16, table: &[bool; BINS]) -> bool {
     table[usize::from(bin & !DARK)] & (bin & DARK == 0)
@@ -63,7 +63,7 @@ pub fn find_among(bins: &[u16], table: &[bool], found: &mut Vec<u8>) -> Result<(
     let Ok(table): Result<&[bool; BINS], _> = table.try_into() else {
         return Err(TrackError::measurement("table", "a mark for each of 32768 bins", count.to_string()));
     };
-    let within = Chroma::of(table);
+    let within = Chroma::new(table);
     found.clear();
     found.resize(bins.len(), 0);
     widest(
@@ -86,7 +86,7 @@ struct Chroma {
 }
 
 impl Chroma {
-    fn of(table: &[bool; BINS]) -> Self {
+    fn new(table: &[bool; BINS]) -> Self {
         let mut found = Self { cr: [u16::MAX, 0], cb: [u16::MAX, 0] };
         for (column, luma) in table.as_chunks::<LUMA_BINS>().0.iter().enumerate() {
             if luma.iter().fold(false, |any, marked| any | marked) {
@@ -115,7 +115,7 @@ impl Chroma {
 /// Counts pixels of two kinds by their bins; its memory is kept.
 #[derive(Clone, Debug, Default)]
 pub struct Counter {
-    /// Of the one kind and of the other; neighbours are alike: two tables of each in turns, so that no count waits for the last.
+    /// Of the one kind and of the other; neighbors are alike: two tables of each in turns, so that no count waits for the last.
     tables: [Vec<[u32; 2]>; 2],
 }
 
@@ -132,10 +132,10 @@ impl Counter {
     }
 
     /// Tells of each bin how many pixels of the one kind and of the other it has, and forgets them.
-    pub fn take(&mut self, mut tell: impl FnMut(usize, [u32; 2])) {
+    pub fn take(&mut self, mut visit: impl FnMut(usize, [u32; 2])) {
         let [even, odd] = &mut self.tables;
         for (bin, (even, odd)) in even.iter_mut().zip(odd).enumerate() {
-            tell(bin, [0, 1].map(|kind| std::mem::take(&mut even[kind]) + std::mem::take(&mut odd[kind])));
+            visit(bin, [0, 1].map(|kind| std::mem::take(&mut even[kind]) + std::mem::take(&mut odd[kind])));
         }
     }
 }
@@ -175,15 +175,16 @@ mod tests {
     }
 
     #[test]
-    fn a_bin_is_that_of_the_colour_by_its_definition() {
+    fn a_bin_is_that_of_the_color_by_its_definition() {
         let mut dark = 0;
         for n in 0..50_000_u32 {
-            let colour = [n.wrapping_mul(2_654_435_761) >> 24, n * 7 % 256, n * 131 % 256].map(|value| value as u8);
-            let [bin] = bins(&[colour])[..] else { panic!("one pixel, one bin") };
-            let (place, [cr, cb, luma]) = (usize::from(bin & !DARK), defined(colour));
-            for (found, wanted, width) in [(place >> 9, cr, 4.0), (place >> 3 & 63, cb, 4.0), (place & 7, luma, 32.0)] {
+            let color = [n.wrapping_mul(2_654_435_761) >> 24, n * 7 % 256, n * 131 % 256].map(|value| value as u8);
+            let [bin] = bins(&[color])[..] else { panic!("one pixel, one bin") };
+            let (place, [cr, cb, luma]) = (usize::from(bin & !DARK), defined(color));
+            for (found, expected, width) in [(place >> 9, cr, 4.0), (place >> 3 & 63, cb, 4.0), (place & 7, luma, 32.0)]
+            {
                 let middle = (found as f64 + 0.5) * width - 0.5;
-                assert!((wanted.clamp(0.0, 255.0) - middle).abs() < 0.5 * width + 1.1, "{colour:?}: {found}");
+                assert!((expected.clamp(0.0, 255.0) - middle).abs() < 0.5 * width + 1.1, "{color:?}: {found}");
             }
             assert!((bin & DARK != 0) == (luma < 29.5) || (luma - 29.5).abs() < 0.6);
             dark += usize::from(bin & DARK != 0);
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_found_and_counted_but_dark_ones_only_counted() {
+    fn colors_are_found_and_counted_but_dark_ones_only_counted() {
         let picture = [[10, 10, 200], [0, 0, 20], [200, 10, 10], [10, 10, 200]];
         let found = bins(&picture);
         let mut table = vec![false; BINS];

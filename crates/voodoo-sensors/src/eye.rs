@@ -20,7 +20,7 @@ impl Eye<'_> {
         (fx * fy).sqrt()
     }
 
-    /// Focal point in the world, metres.
+    /// Focal point in the world, meters.
     pub fn origin(&self) -> Vec3 {
         self.column(3)
     }
@@ -34,7 +34,7 @@ impl Eye<'_> {
         Vec3::from_array([0, 1, 2].map(|row| self.world_from_sensor[row][column]))
     }
 
-    /// A place of the world in the camera's frame, metres.
+    /// A place of the world in the camera's frame, meters.
     pub fn in_sensor(&self, place: Vec3) -> Vec3 {
         let offset = place - self.origin();
         Vec3::from_array([0, 1, 2].map(|column| offset.dot(self.column(column))))
@@ -63,7 +63,7 @@ mod tests {
     use voodoo_core::Lens;
 
     #[test]
-    fn the_ray_behind_a_pixel_leads_to_what_is_seen_there() {
+    fn the_ray_behind_a_pixel_leads_to_what_is_visible_there() {
         let world_from_sensor =
             [[0.0, 0.0, 1.0, 0.5], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.2], [0.0, 0.0, 0.0, 1.0]];
         let lens = Lens::PlumbBob([-0.2, 0.05, 0.001, 0.0, 0.0]);

@@ -4,19 +4,19 @@ use std::ops::Range;
 
 use voodoo_core::math::widest;
 
-/// Distances from a pixel to its neighbours, and to those a knight's move away, shares of 2^16; by chamfers of 1, 1.4 and 2.1969
+/// Distances from a pixel to its neighbors, and to those a knight's move away, shares of 2^16; by chamfers of 1, 1.4 and 2.1969
 /// (Borgefors, "Distance transformations in digital images", 1986), as OpenCV has them.
 const CHAMFERS: [i32; 3] = [65_536, 91_750, 143_976];
 /// No measured pixel is so far.
 const NOTHING: i32 = i32::MAX >> 2;
-/// Columns and rows around a picture that neighbours of its pixels may be in.
+/// Columns and rows around a picture that neighbors of its pixels may be in.
 const BORDER: usize = 2;
-/// Neighbours of a pixel in rows before it, in the order that decides between equals: rows back, columns on, and which step.
-const NEIGHBOURS_BEFORE: [(usize, usize, usize); 7] =
+/// Neighbors of a pixel in rows before it, in the order that decides between equals: rows back, columns on, and which step.
+const NEIGHBORS_BEFORE: [(usize, usize, usize); 7] =
     [(2, 1, 2), (2, 3, 2), (1, 0, 2), (1, 1, 1), (1, 2, 0), (1, 3, 1), (1, 4, 2)];
 
 /// Rows of distances to the nearest measured pixel, and of its depth, with a margin of [`BORDER`] pixels on all sides.
-struct Nearest {
+struct NearestPixel {
     stride: usize,
     away: Vec<i32>,
     depth: Vec<f32>,
@@ -24,7 +24,7 @@ struct Nearest {
 
 /// True in a line of pixels on the far side of edges between surfaces, which differ by more than `apart` in depth.
 ///
-/// `depth` has so many columns, metres, and is infinite where nothing was measured: the nearest measured one counts there. What is
+/// `depth` has so many columns, meters, and is infinite where nothing was measured: the nearest measured one counts there. What is
 /// told of pixels with nothing measured within `reach` rows and columns means nothing.
 pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -> Vec<bool> {
     let mut edges = vec![false; depth.len()];
@@ -34,8 +34,8 @@ pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -
     let rows = depth.len() / width;
     let stride = width + 2 * BORDER;
     let cells = (rows + 2 * BORDER) * stride;
-    let mut filled = Nearest { stride, away: vec![NOTHING; cells], depth: vec![0.0; cells] };
-    // What matters to these pixels, and their neighbours, is on the way from the nearest measured one: no farther than seven fifths
+    let mut filled = NearestPixel { stride, away: vec![NOTHING; cells], depth: vec![0.0; cells] };
+    // What matters to these pixels, and their neighbors, is on the way from the nearest measured one: no farther than seven fifths
     // of the rows or columns between, by the chamfers.
     let far = (7 * (reach + 1)).div_ceil(5);
     let spans = spans(depth, width, far);
@@ -44,12 +44,12 @@ pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -
         #[inline(always)]
         || {
             for (row, span) in spans.iter().enumerate() {
-                filled.pass_on::<false>(row, span, Some(&depth[row * width..][span.clone()]));
-                filled.along::<false>(row, span, far, &mut copy);
+                filled.propagate_rows::<false>(row, span, Some(&depth[row * width..][span.clone()]));
+                filled.propagate_columns::<false>(row, span, far, &mut copy);
             }
             for (row, span) in spans.iter().enumerate().rev() {
-                filled.pass_on::<true>(row, span, None);
-                filled.along::<true>(row, span, far, &mut copy);
+                filled.propagate_rows::<true>(row, span, None);
+                filled.propagate_columns::<true>(row, span, far, &mut copy);
             }
             filled.edges(rows, width, apart, &mut edges, &spans);
         },
@@ -86,7 +86,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// What `COUNT` pixels have from neighbours in these rows, which start at places and are a step away; measured pixels, where some are
+    /// What `COUNT` pixels have from neighbors in these rows, which start at places and are a step away; measured pixels, where some are
     /// given, are their own.
     ///
     /// All is read and then chosen by bits: of two places in memory the compiler would choose the address, one by one.
@@ -134,10 +134,10 @@ fn bits(condition: bool) -> u32 {
     u32::from(condition).wrapping_neg()
 }
 
-impl Nearest {
+impl NearestPixel {
     /// What a row's pixels have from the two rows above, or below, with all columns the other way round; and what was measured in them.
     #[inline(always)]
-    fn pass_on<const BACK: bool>(&mut self, row: usize, span: &Range<usize>, measured: Option<&[f32]>) {
+    fn propagate_rows<const BACK: bool>(&mut self, row: usize, span: &Range<usize>, measured: Option<&[f32]>) {
         let stride = self.stride;
         let row = row + BORDER;
         let split = if BACK { (row + 1) * stride } else { row * stride };
@@ -149,9 +149,9 @@ impl Nearest {
             (&mut below[..stride], &mut depths_below[..stride], &*above, &*depths_above)
         };
         let (away, depth) = (&mut away[BORDER..][span.clone()], &mut depth[BORDER..][span.clone()]);
-        // Blocks of neighbours stay in registers; the last one begins among those that are done, which changes nothing.
+        // Blocks of neighbors stay in registers; the last one begins among those that are done, which changes nothing.
         let rows = Rows { away: others, depth: other_depths, first: span.start };
-        let starts = NEIGHBOURS_BEFORE.map(|(back, on, step)| {
+        let starts = NEIGHBORS_BEFORE.map(|(back, on, step)| {
             let start = if BACK { (back - 1) * stride + 2 * BORDER - on } else { (row - back) * stride + on };
             (start, CHAMFERS[step])
         });
@@ -168,7 +168,7 @@ impl Nearest {
     /// A row's pixels may be nearer to what those `far` before them have, or behind: first the next one, then two together, and
     /// so on, of which the nearer ones count where both are as far.
     #[inline(always)]
-    fn along<const BACK: bool>(
+    fn propagate_columns<const BACK: bool>(
         &mut self,
         row: usize,
         span: &Range<usize>,
@@ -218,8 +218,8 @@ impl Nearest {
             let around = line(row.saturating_sub(1), span).iter().zip(here).zip(line(row + 1, span));
             least.iter_mut().zip(around).for_each(|(least, ((a, b), c))| *least = lesser(lesser(*a, *c), *b) + apart);
             let end = least.len() - 1;
-            for (place, neighbours) in [(0, [0, end.min(1)]), (end, [end.saturating_sub(1), end])] {
-                edges[place] = here[place] > lesser(least[neighbours[0]], least[neighbours[1]]);
+            for (place, neighbors) in [(0, [0, end.min(1)]), (end, [end.saturating_sub(1), end])] {
+                edges[place] = here[place] > lesser(least[neighbors[0]], least[neighbors[1]]);
             }
             if let (Some(inner), Some(here), Some(second), Some(third)) =
                 (edges.get_mut(1..end), here.get(1..end), least.get(1..), least.get(2..))

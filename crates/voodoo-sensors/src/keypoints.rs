@@ -4,21 +4,21 @@ use crate::eye::Eye;
 use voodoo_core::math::Vec3;
 use voodoo_core::{SiteGate, SiteRay};
 
-/// Standard deviation along a ray of a place on it, where none is told, metres.
+/// Standard deviation along a ray of a place on it, where none is told, meters.
 const ALONG_SIGMA: f64 = 0.04;
-/// Standard deviation of a site behind so many metres of the person's own body, beyond half a limb: the network guesses it.
+/// Standard deviation of a site behind so many meters of the person's own body, beyond half a limb: the network guesses it.
 const GUESSED: f64 = 0.4;
 
 /// A site, and the keypoints that it is made of.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct SiteKeypoints {
     /// Its name.
     pub site: String,
     /// Number and share of each.
-    pub shares: Vec<(usize, f64)>,
-    /// How far the network's idea of the site lies from ours, metres.
+    pub weights: Vec<(usize, f64)>,
+    /// How far the network's idea of the site lies from ours, meters.
     pub spread: f64,
-    /// How far behind the visible surface it lies, metres.
+    /// How far behind the visible surface it lies, meters.
     pub behind: f64,
 }
 
@@ -31,15 +31,15 @@ pub struct SitePixel {
     pub confidence: f64,
 }
 
-impl Part {
+impl SiteKeypoints {
     /// Where a site is by keypoints (column, row, confidence); none where one of them is missing, or believed less than `least`.
     pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
         let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
-        for (index, share) in &self.shares {
-            let [u, v, believed] = *keypoints.get(*index)?;
-            pixel = [pixel[0] + share * u, pixel[1] + share * v];
-            total += believed;
-            confidence = if believed < confidence { believed } else { confidence };
+        for (index, weight) in &self.weights {
+            let [u, v, reliability] = *keypoints.get(*index)?;
+            pixel = [pixel[0] + weight * u, pixel[1] + weight * v];
+            total += reliability;
+            confidence = if reliability < confidence { reliability } else { confidence };
         }
         // What is not finite anywhere is not in the sums.
         let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
@@ -56,7 +56,7 @@ pub struct Sensor<'a> {
     pub source: &'a str,
     /// Standard deviation of a keypoint that is believed, pixels.
     pub noise: f64,
-    /// Least standard deviation of a place by a depth camera, metres: how well it is known how far behind a surface a site lies.
+    /// Least standard deviation of a place by a depth camera, meters: how well it is known how far behind a surface a site lies.
     pub place_sigma: f64,
     /// Time of the frame, seconds.
     pub stamp: f64,
@@ -64,57 +64,62 @@ pub struct Sensor<'a> {
 
 /// A site that was seen, and what else is known of it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sighting {
+pub struct SiteObservation {
     /// Where in the picture.
-    pub seen: SitePixel,
+    pub pixel: SitePixel,
     /// The pixel without the lens: `x/z` and `y/z`, NaN where that is not known.
     pub flat: [f64; 2],
-    /// Where the site is expected, world, metres.
+    /// Where the site is expected, world, meters.
     pub expected: Vec3,
-    /// How much of the person's own body lies before it, metres.
+    /// How much of the person's own body lies before it, meters.
     pub hidden: f64,
-    /// What a depth camera sees there, along the optical axis, metres.
+    /// What a depth camera sees there, along the optical axis, meters.
     pub surface: Option<f64>,
 }
 
 /// What a site that was seen becomes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum SiteMeasurement {
     /// A ray.
     Ray(SiteRay),
-    /// A place in the world, and its standard deviation, metres.
+    /// A place in the world, and its standard deviation, meters.
     Place(Vec3, f64),
     /// Nothing: it is too far from where the site is expected, or the lens shows nothing there.
     Dropped,
 }
 
-impl Part {
+impl SiteKeypoints {
     /// What a sighting becomes: a place where a depth camera sees a surface that is near enough, else a ray that passes near enough.
-    pub fn told(&self, sighting: &Sighting, sensor: &Sensor, mut gate: Option<&mut SiteGate>) -> Told {
-        let (eye, expected) = (&sensor.eye, sighting.expected);
-        let direction = eye.direction(sighting.flat);
+    pub fn measurement(
+        &self,
+        observation: &SiteObservation,
+        sensor: &Sensor,
+        mut gate: Option<&mut SiteGate>,
+    ) -> SiteMeasurement {
+        let (eye, expected) = (&sensor.eye, observation.expected);
+        let direction = eye.direction(observation.flat);
         let depth = eye.in_sensor(expected).z;
         let offset = expected - eye.origin();
         let away = (offset - offset.dot(direction).max(0.0) * direction).length();
         if !(depth > 0.0 && away >= 0.0) {
-            return Told::Dropped;
+            return SiteMeasurement::Dropped;
         }
-        let across = sensor.noise / sighting.seen.confidence.min(1.0) * depth / eye.focal();
+        let across = sensor.noise / observation.pixel.confidence.min(1.0) * depth / eye.focal();
         let sigma = across.hypot(self.spread);
         let mut accepts = |distance: f64, source: &str| {
             gate.as_deref_mut().is_none_or(|gate| gate.accepts(&self.site, distance, sensor.stamp, source))
         };
-        if let Some(surface) = sighting.surface {
+        if let Some(surface) = observation.surface {
             let place = eye.origin() + direction * (surface / direction.dot(eye.axis()) + self.behind);
             if accepts(place.distance(expected), "points") {
-                return Told::Place(place, sigma.max(sensor.place_sigma));
+                return SiteMeasurement::Place(place, sigma.max(sensor.place_sigma));
             }
         }
         if !accepts(away, sensor.source) {
-            return Told::Dropped;
+            return SiteMeasurement::Dropped;
         }
-        let hidden = sighting.hidden - self.behind;
-        Told::Ray(SiteRay {
+        let hidden = observation.hidden - self.behind;
+        SiteMeasurement::Ray(SiteRay {
             site: self.site.clone(),
             origin: eye.origin(),
             direction,
@@ -132,17 +137,17 @@ impl Part {
 /// distance; none without any site that both have.
 pub fn nearest_person<'a>(
     people: impl Iterator<Item = &'a [[f64; 3]]>,
-    parts: &[Part],
+    layout: &[SiteKeypoints],
     expected: &[[f64; 2]],
     least: f64,
 ) -> Option<usize> {
     let mut best: Option<(usize, f64)> = None;
     for (number, keypoints) in people.enumerate() {
-        let apart = |(part, place): (&Part, &[f64; 2])| {
+        let apart = |(part, place): (&SiteKeypoints, &[f64; 2])| {
             let [u, v] = part.pixel(keypoints, least)?.pixel;
             Some((u - place[0]).hypot(v - place[1])).filter(|distance| distance.is_finite())
         };
-        let mut distances: Vec<f64> = parts.iter().zip(expected).filter_map(apart).collect();
+        let mut distances: Vec<f64> = layout.iter().zip(expected).filter_map(apart).collect();
         distances.sort_unstable_by(f64::total_cmp);
         let Some(upper) = distances.get(distances.len() / 2) else { continue };
         let lower = distances.get((distances.len() - 1) / 2).unwrap_or(upper);
@@ -158,8 +163,8 @@ pub fn nearest_person<'a>(
 mod tests {
     use super::*;
 
-    fn part(shares: &[(usize, f64)]) -> Part {
-        Part { site: "l_wrist".to_owned(), shares: shares.to_vec(), spread: 0.02, behind: 0.03 }
+    fn part(weights: &[(usize, f64)]) -> SiteKeypoints {
+        SiteKeypoints { site: "l_wrist".to_owned(), weights: weights.to_vec(), spread: 0.02, behind: 0.03 }
     }
 
     #[test]
@@ -175,46 +180,54 @@ mod tests {
 
     #[test]
     fn the_nearest_of_several_people_is_the_one() {
-        let parts = [part(&[(0, 1.0)]), part(&[(1, 1.0)]), part(&[(2, 1.0)])];
+        let layout = [part(&[(0, 1.0)]), part(&[(1, 1.0)]), part(&[(2, 1.0)])];
         let far = [[90.0, 10.0, 1.0], [90.0, 20.0, 1.0], [90.0, 30.0, 1.0]];
         let near = [[12.0, 10.0, 1.0], [12.0, 20.0, 1.0], [99.0, 30.0, 1.0]];
         let expected = [[10.0, 10.0], [10.0, 20.0], [10.0, 30.0]];
         let choose = |people: &[&[[f64; 3]]], expected: &[[f64; 2]]| {
-            nearest_person(people.iter().copied(), &parts, expected, 0.1)
+            nearest_person(people.iter().copied(), &layout, expected, 0.1)
         };
         assert_eq!(choose(&[&far, &near], &expected), Some(1));
         assert_eq!(choose(&[], &expected), None);
         assert_eq!(choose(&[&near], &[[f64::NAN; 2]; 3]), None);
     }
     #[test]
-    fn what_was_seen_becomes_a_ray_or_a_place_or_is_dropped() {
+    fn what_was_visible_becomes_a_ray_or_a_place_or_is_dropped() {
         let world_from_sensor =
             [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
         let camera = voodoo_core::Camera::pinhole(320, 240, [300.0, 300.0, 160.0, 120.0]).unwrap();
         let eye = Eye { world_from_sensor, camera: &camera };
         let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
-        let seen = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
-        let sighting =
-            Sighting { seen, flat: [0.0; 2], expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
+        let pixel = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
+        let observation =
+            SiteObservation { pixel, flat: [0.0; 2], expected: Vec3::new(0.05, 0.0, 2.0), hidden: 0.0, surface: None };
         let wrist = part(&[(0, 1.0)]);
         let mut gate = SiteGate::new(0.1, 0.0, 0.1);
-        let sigma = |told: Told| match told {
-            Told::Ray(ray) => ray.sigma,
+        let sigma = |measured: SiteMeasurement| match measured {
+            SiteMeasurement::Ray(ray) => ray.sigma,
             _ => f64::NAN,
         };
-        let clear = sigma(wrist.told(&sighting, &sensor, Some(&mut gate)));
+        let clear = sigma(wrist.measurement(&observation, &sensor, Some(&mut gate)));
         assert!((clear - 0.02_f64.hypot(0.02)).abs() < 1e-12);
-        let behind = Sighting { hidden: 0.13, ..sighting };
-        assert!((sigma(wrist.told(&behind, &sensor, None)) - clear.hypot(0.04)).abs() < 1e-12);
-        let deep = Sighting { surface: Some(1.95), ..sighting };
-        let Told::Place(place, least) = wrist.told(&deep, &sensor, Some(&mut gate)) else { panic!("a place") };
+        let behind = SiteObservation { hidden: 0.13, ..observation };
+        assert!((sigma(wrist.measurement(&behind, &sensor, None)) - clear.hypot(0.04)).abs() < 1e-12);
+        let deep = SiteObservation { surface: Some(1.95), ..observation };
+        let SiteMeasurement::Place(place, least) = wrist.measurement(&deep, &sensor, Some(&mut gate)) else {
+            panic!("a place")
+        };
         assert!(place.distance(Vec3::new(0.0, 0.0, 1.98)) < 1e-12 && least == 0.03);
-        let before = Sighting { surface: Some(1.0), ..sighting };
-        assert!(matches!(wrist.told(&before, &sensor, Some(&mut gate)), Told::Ray(_)), "what hides it is refused");
-        let far = Sighting { expected: Vec3::new(0.2, 0.0, 2.0), ..sighting };
-        assert_eq!(wrist.told(&far, &sensor, Some(&mut gate)), Told::Dropped);
-        for wrong in [Sighting { flat: [f64::NAN; 2], ..sighting }, Sighting { expected: -Vec3::Z, ..sighting }] {
-            assert_eq!(wrist.told(&wrong, &sensor, None), Told::Dropped);
+        let before = SiteObservation { surface: Some(1.0), ..observation };
+        assert!(
+            matches!(wrist.measurement(&before, &sensor, Some(&mut gate)), SiteMeasurement::Ray(_)),
+            "what hides it is refused"
+        );
+        let far = SiteObservation { expected: Vec3::new(0.2, 0.0, 2.0), ..observation };
+        assert_eq!(wrist.measurement(&far, &sensor, Some(&mut gate)), SiteMeasurement::Dropped);
+        for wrong in [
+            SiteObservation { flat: [f64::NAN; 2], ..observation },
+            SiteObservation { expected: -Vec3::Z, ..observation },
+        ] {
+            assert_eq!(wrist.measurement(&wrong, &sensor, None), SiteMeasurement::Dropped);
         }
     }
 }

@@ -6,7 +6,7 @@ use voodoo_core::TrackError;
 
 /// A region of a mask: pixels that touch, at corners too.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Region {
+pub(crate) struct MaskRegion {
     /// First row and column, and one beyond the last.
     pub rows: (usize, usize),
     /// Columns likewise.
@@ -17,8 +17,8 @@ pub(crate) struct Region {
     pub sums: [usize; 2],
 }
 
-impl Region {
-    fn of(run: &Run) -> Self {
+impl MaskRegion {
+    fn new(run: &Run) -> Self {
         let count = run.end - run.start;
         let columns = (run.start + run.end - 1) * count / 2;
         let sums = [columns, run.row * count];
@@ -44,22 +44,22 @@ struct Run {
 
 /// The regions of a mask of so many columns, and the number of its region, from 1, in each pixel; they are numbered by the first
 /// two by two pixels that hold something of them.
-pub(crate) fn regions(mask: &[u8], width: usize) -> (Vec<Region>, Vec<i32>) {
+pub(crate) fn regions(mask: &[u8], width: usize) -> (Vec<MaskRegion>, Vec<i32>) {
     let mut runs = joined_runs(mask, width);
     for index in 0..runs.len() {
         runs[index].parent = first(&runs, index);
     }
-    let mut found: Vec<((usize, usize), usize, Region)> = Vec::new();
+    let mut found: Vec<((usize, usize), usize, MaskRegion)> = Vec::new();
     let mut place = vec![0; runs.len()];
     for (index, run) in runs.iter().enumerate() {
         let block = (run.row / 2, run.start / 2);
         if run.parent == index {
             place[index] = found.len();
-            found.push((block, index, Region::of(run)));
+            found.push((block, index, MaskRegion::new(run)));
         } else {
             let known = &mut found[place[run.parent]];
             known.0 = known.0.min(block);
-            known.2.join(&Region::of(run));
+            known.2.join(&MaskRegion::new(run));
         }
     }
     found.sort_unstable_by_key(|(block, _, _)| *block);
@@ -132,7 +132,7 @@ pub(crate) fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
 /// What skin is looked for in: a picture, and where it may be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SkinPicture<'a> {
-    /// Of each pixel's colour, see [`chroma::bins`].
+    /// Of each pixel's color, see [`chroma::bins`].
     pub bins: &'a [u16],
     /// Columns.
     pub width: usize,
@@ -147,12 +147,12 @@ pub(crate) struct SkinPicture<'a> {
 }
 
 impl SkinPicture<'_> {
-    /// Pixels of skin's colour, single ones removed, into `seen`; and of those the ones that may be the body's, in regions at least
+    /// Pixels of skin's color, single ones removed, into `colored`; and of those the ones that may be the body's, in regions at least
     /// three pixels wide, with gaps closed between regions no longer than `longest`, into `skin`.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when sizes do not fit together.
-    pub(crate) fn find(&self, longest: f64, seen: &mut Vec<u8>, skin: &mut Vec<u8>) -> Result<(), TrackError> {
+    pub(crate) fn find(&self, longest: f64, colored: &mut Vec<u8>, skin: &mut Vec<u8>) -> Result<(), TrackError> {
         let count = self.bins.len();
         let whole = if self.width > 0 { count.is_multiple_of(self.width) } else { count == 0 };
         let masks = [self.body, self.before].into_iter().flatten().map(<[_]>::len);
@@ -161,8 +161,8 @@ impl SkinPicture<'_> {
             return Err(TrackError::measurement("skin", "a picture and masks of its size", found));
         }
         chroma::find_among(self.bins, self.table, skin)?;
-        smooth(skin, self.width, seen);
-        skin.copy_from_slice(seen);
+        smooth(skin, self.width, colored);
+        skin.copy_from_slice(colored);
         self.rule_out(skin);
         let [rows, columns] = bounds(skin, self.width);
         // Single pixels around all of it, where the picture has them, are none.
@@ -210,8 +210,8 @@ mod tests {
         let mask = [[0, 0, 0, 0, 0, 1], [1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 0, 0], [1, 0, 0, 0, 1, 1]].concat();
         let (found, labels) = regions(&mask, 6);
         assert_eq!(labels, [[0, 0, 0, 0, 0, 3], [1, 0, 0, 2, 0, 0], [0, 1, 0, 0, 0, 0], [1, 0, 0, 0, 4, 4]].concat());
-        assert_eq!(found[0], Region { rows: (1, 4), columns: (0, 2), area: 3, sums: [1, 6] });
-        assert_eq!(found[3], Region { rows: (3, 4), columns: (4, 6), area: 2, sums: [9, 6] });
+        assert_eq!(found[0], MaskRegion { rows: (1, 4), columns: (0, 2), area: 3, sums: [1, 6] });
+        assert_eq!(found[3], MaskRegion { rows: (3, 4), columns: (4, 6), area: 2, sums: [9, 6] });
         assert!(regions(&[], 0).0.is_empty() && regions(&[0; 6], 3).0.is_empty());
     }
 
@@ -248,8 +248,8 @@ mod tests {
                 state >> 16
             };
             let (height, width) = (1 + next() as usize % 30, 1 + next() as usize % 40);
-            let share = 20 + next() % 40;
-            let mask: Vec<u8> = (0..height * width).map(|_| u8::from(next() % 100 < share)).collect();
+            let fraction = 20 + next() % 40;
+            let mask: Vec<u8> = (0..height * width).map(|_| u8::from(next() % 100 < fraction)).collect();
             let (found, labels) = regions(&mask, width);
             let flooded = flooded(&mask, width);
             let mut pairs: Vec<(i32, i32)> = labels.iter().copied().zip(flooded).collect();
@@ -264,7 +264,7 @@ mod tests {
                     (places().min().unwrap(), places().max().unwrap() + 1, places().sum::<usize>())
                 };
                 let (rows, columns) = (span(|index, width| index / width), span(|index, width| index % width));
-                let expected = Region {
+                let expected = MaskRegion {
                     rows: (rows.0, rows.1),
                     columns: (columns.0, columns.1),
                     area: pixels().count(),
@@ -299,20 +299,20 @@ mod tests {
         assert_eq!(joined(&mask, 7, 1.0), mask);
         let (bins, table) = (vec![0; 12], vec![true; chroma::BINS]);
         let picture = SkinPicture { bins: &bins, width: 4, table: &table, body: None, always: None, before: None };
-        let look = |picture: SkinPicture| {
-            let (mut seen, mut skin) = (Vec::new(), Vec::new());
-            picture.find(3.0, &mut seen, &mut skin).map(|()| (seen, skin))
+        let find = |picture: SkinPicture| {
+            let (mut colored, mut skin) = (Vec::new(), Vec::new());
+            picture.find(3.0, &mut colored, &mut skin).map(|()| (colored, skin))
         };
-        assert_eq!(look(picture).unwrap(), (vec![1; 12], vec![1; 12]));
+        assert_eq!(find(picture).unwrap(), (vec![1; 12], vec![1; 12]));
         let body = [true, true, true, false].repeat(3);
-        assert_eq!(look(SkinPicture { body: Some(&body), ..picture }).unwrap().1[..4], [1, 1, 1, 0]);
+        assert_eq!(find(SkinPicture { body: Some(&body), ..picture }).unwrap().1[..4], [1, 1, 1, 0]);
         let always = [0.6; 12];
-        assert_eq!(look(SkinPicture { always: Some(&always), ..picture }).unwrap().1, [0; 12]);
+        assert_eq!(find(SkinPicture { always: Some(&always), ..picture }).unwrap().1, [0; 12]);
         let before = SkinPicture { always: Some(&always), before: Some(&body), ..picture };
-        assert_eq!(look(before).unwrap().1[..4], [1, 1, 1, 0]);
-        assert!(look(SkinPicture { width: 5, ..picture }).is_err());
-        assert!(look(SkinPicture { body: Some(&body[1..]), ..picture }).is_err());
-        assert!(look(SkinPicture { table: &table[1..], ..picture }).is_err());
+        assert_eq!(find(before).unwrap().1[..4], [1, 1, 1, 0]);
+        assert!(find(SkinPicture { width: 5, ..picture }).is_err());
+        assert!(find(SkinPicture { body: Some(&body[1..]), ..picture }).is_err());
+        assert!(find(SkinPicture { table: &table[1..], ..picture }).is_err());
     }
     /// Numbers in [0, 1) that look random and are the same in every run (Knuth's linear congruence).
     fn numbers(mut state: u64) -> impl FnMut() -> f64 {
@@ -338,19 +338,20 @@ mod tests {
     }
 
     /// Regions by filling them pixel by pixel.
-    fn filled(mask: &[u8], size: [usize; 2]) -> (Vec<Region>, Vec<i32>) {
+    fn filled(mask: &[u8], size: [usize; 2]) -> (Vec<MaskRegion>, Vec<i32>) {
         let (mut owner, mut found) = (vec![usize::MAX; mask.len()], Vec::new());
         for start in 0..mask.len() {
             if mask[start] == 0 || owner[start] != usize::MAX {
                 continue;
             }
             let (number, mut todo) = (found.len(), vec![start]);
-            let mut region = Region { rows: (usize::MAX, 0), columns: (usize::MAX, 0), area: 0, sums: [0, 0] };
+            let mut region = MaskRegion { rows: (usize::MAX, 0), columns: (usize::MAX, 0), area: 0, sums: [0, 0] };
             let mut block = (usize::MAX, usize::MAX);
             owner[start] = number;
             while let Some(index) = todo.pop() {
                 let (row, column) = (index / size[1], index % size[1]);
-                let one = Region { rows: (row, row + 1), columns: (column, column + 1), area: 1, sums: [column, row] };
+                let one =
+                    MaskRegion { rows: (row, row + 1), columns: (column, column + 1), area: 1, sums: [column, row] };
                 region.join(&one);
                 block = block.min((row / 2, column / 2));
                 for other in around(index, size).filter(|other| mask[*other] != 0) {
@@ -407,8 +408,8 @@ mod tests {
             assert_eq!(joined(&mask, size[1], longest), gaps_closed(&mask), "{seed}");
 
             // The same of a picture, with all that may rule skin out.
-            let share = 0.3 + 0.5 * number();
-            let mut table: Vec<bool> = (0..chroma::BINS).map(|_| number() < share).collect();
+            let fraction = 0.3 + 0.5 * number();
+            let mut table: Vec<bool> = (0..chroma::BINS).map(|_| number() < fraction).collect();
             table[5] = true;
             let bins: Vec<u16> =
                 mask.iter().map(|pixel| if *pixel != 0 { 5 } else { (65_536.0 * number()) as u16 }).collect();
@@ -423,8 +424,8 @@ mod tests {
                 always: Some(&always),
                 before: Some(&before),
             };
-            let (mut seen, mut skin) = (Vec::new(), Vec::new());
-            picture.find(longest, &mut seen, &mut skin).unwrap();
+            let (mut colored, mut skin) = (Vec::new(), Vec::new());
+            picture.find(longest, &mut colored, &mut skin).unwrap();
             let light: Vec<bool> = bins.iter().map(|bin| *bin < 32_768 && table[usize::from(*bin)]).collect();
             // Most of nine, of which the border's go on beyond it.
             let most = |index: usize| {
@@ -434,7 +435,7 @@ mod tests {
                 nine.filter(|other| light[*other]).count() > 4
             };
             let smooth: Vec<u8> = (0..count).map(|index| u8::from(most(index))).collect();
-            assert_eq!(seen, smooth, "{seed}");
+            assert_eq!(colored, smooth, "{seed}");
             let may = |index: usize| body[index] && (always[index] < 0.5 || before[index]);
             let kept: Vec<u8> = (0..count).map(|index| smooth[index] & u8::from(may(index))).collect();
             let opened = morphed(&morphed(&kept, size, true), size, false);

@@ -38,7 +38,7 @@ fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) 
     )
 }
 
-/// What most of each pixel and its eight neighbours are, into `found`; beyond the border a picture goes on as it ends.
+/// What most of each pixel and its eight neighbors are, into `found`; beyond the border a picture goes on as it ends.
 pub(crate) fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
     found.resize(mask.len(), 0);
     fill_rows(

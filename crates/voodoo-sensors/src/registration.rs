@@ -1,4 +1,4 @@
-//! What a depth camera sees of the body, in the picture of a colour camera beside it.
+//! What a depth camera sees of the body, in the picture of a color camera beside it.
 
 use std::ops::Range;
 
@@ -76,7 +76,7 @@ impl ProjectedPoints {
     }
 }
 
-/// Surfaces that differ by more than this in depth, metres, do not touch.
+/// Surfaces that differ by more than this in depth, meters, do not touch.
 const SURFACES_APART: f32 = 0.1;
 
 impl ProjectedPoints {
@@ -85,7 +85,7 @@ impl ProjectedPoints {
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when `beyond` is no picture of that size.
-    pub fn shown(
+    pub fn visible_mask(
         &self,
         beyond: &[bool],
         reach: usize,
@@ -112,12 +112,14 @@ impl ProjectedPoints {
             lines.enumerate().for_each(|(row, line)| fill(row * count, &mut line[..count]));
             grown(&part, stride, reach)
         };
-        let seen = part(&mut |first, line| {
-            line.iter_mut().zip(&self.nearest[first..]).for_each(|(seen, depth)| *seen = u8::from(depth.is_finite()));
+        let near_return = part(&mut |first, line| {
+            line.iter_mut()
+                .zip(&self.nearest[first..])
+                .for_each(|(near_return, depth)| *near_return = u8::from(depth.is_finite()));
         });
         let here = |row: usize| row * width + columns.start..row * width + columns.end;
-        for (row, seen) in rows.clone().zip(seen.chunks_exact(stride)) {
-            mask[here(row)].iter_mut().zip(seen).for_each(|(pixel, seen)| *pixel |= *seen != 0);
+        for (row, near_return) in rows.clone().zip(near_return.chunks_exact(stride)) {
+            mask[here(row)].iter_mut().zip(near_return).for_each(|(pixel, near_return)| *pixel |= *near_return != 0);
         }
         if let (Some(before), Some(marked)) = (&mut before, &self.marked) {
             let marked = part(&mut |first, line| line.copy_from_slice(&marked[first..][..count]));
@@ -128,7 +130,12 @@ impl ProjectedPoints {
         let edges = far_edges(&self.nearest, count, SURFACES_APART, reach);
         for (index, (row, edges)) in self.rows.clone().zip(edges.chunks_exact(count)).enumerate() {
             let here = row * width + self.columns.start..row * width + self.columns.end;
-            let edges = || edges.iter().zip(&seen[inner + index * stride..]).map(|(edge, seen)| *edge & (*seen != 0));
+            let edges = || {
+                edges
+                    .iter()
+                    .zip(&near_return[inner + index * stride..])
+                    .map(|(edge, near_return)| *edge & (*near_return != 0))
+            };
             mask[here.clone()].iter_mut().zip(edges()).for_each(|(pixel, edge)| *pixel &= !edge);
             if let Some(before) = &mut before {
                 before[here].iter_mut().zip(edges()).for_each(|(pixel, edge)| *pixel &= !edge);
@@ -143,13 +150,13 @@ impl ProjectedPoints {
 pub struct MeasuredPixels<'a> {
     /// Columns and rows.
     pub places: &'a [[f64; 2]],
-    /// Depths, metres.
+    /// Depths, meters.
     pub depths: &'a [f64],
     /// Which may be the still scene.
     pub still: Option<&'a [bool]>,
 }
 
-/// Depths within this of the nearest fifth, metres, belong to one surface: a limb is no deeper.
+/// Depths within this of the nearest fifth, meters, belong to one surface: a limb is no deeper.
 const ONE_SURFACE: f64 = 0.1;
 /// Fewer points around a place than this are no surface: one or two may be stray returns.
 const FEWEST_POINTS: usize = 3;
@@ -158,7 +165,7 @@ const POINTS_TOGETHER: usize = 64;
 
 /// Numbers of regions in a part of a picture, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Labels {
+pub struct RegionLabels {
     /// First row and column.
     pub first: [usize; 2],
     /// Rows and columns.
@@ -167,7 +174,7 @@ pub struct Labels {
     pub values: Vec<i32>,
 }
 
-impl Labels {
+impl RegionLabels {
     /// That of the pixel around a place (column, row); -1 outside.
     fn at(&self, place: &[f64; 2]) -> i32 {
         let [u, v] = place.map(nearest_whole);
@@ -185,7 +192,7 @@ impl MeasuredPixels<'_> {
     /// [`TrackError::Measurement`] when arrays do not belong together.
     pub fn nearest_surfaces(
         &self,
-        labels: &Labels,
+        labels: &RegionLabels,
         places: &[([f64; 2], i32)],
         radius: f64,
     ) -> Result<Vec<Option<(f64, bool)>>, TrackError> {
@@ -195,9 +202,9 @@ impl MeasuredPixels<'_> {
             return Err(TrackError::measurement("labels", "one for every pixel", found));
         }
         self.check()?;
-        // Neighbours in the list are near each other: most stretches of it are nowhere near a place.
+        // Neighbors in the list are near each other: most stretches of it are nowhere near a place.
         let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(POINTS_TOGETHER).map(bounds_of).collect();
-        let look = |(place, region): &([f64; 2], i32)| {
+        let surface = |(place, region): &([f64; 2], i32)| {
             let (mut near, mut chosen) = (Vec::new(), Vec::new());
             let far = |[low, high]: &[[f64; 2]; 2]| {
                 (0..2).any(|axis| low[axis] > place[axis] + radius || high[axis] < place[axis] - radius)
@@ -216,10 +223,10 @@ impl MeasuredPixels<'_> {
             }
             self.surface_of(near, chosen)
         };
-        Ok(places.iter().map(look).collect())
+        Ok(places.iter().map(surface).collect())
     }
 
-    /// Depth of the nearest surface within `radius` of a place, metres, and whether most of it is still; none with less than
+    /// Depth of the nearest surface within `radius` of a place, meters, and whether most of it is still; none with less than
     /// three points there.
     ///
     /// # Errors
@@ -320,14 +327,14 @@ mod tests {
     }
 
     #[test]
-    fn each_place_is_looked_at_among_the_points_of_its_region() {
+    fn each_place_is_checked_among_the_points_of_its_region() {
         let (mut places, mut depths) = two_surfaces();
         for outside in [[f64::NAN, 3.0], [-5.0, 3.0], [3.0, 99.0]] {
             places.push(outside);
             depths.push(1.0);
         }
         let right = |index: usize| if index % 41 >= 20 { 7 } else { 0 };
-        let labels = Labels { first: [0, 0], size: [41, 41], values: (0..41 * 41).map(right).collect() };
+        let labels = RegionLabels { first: [0, 0], size: [41, 41], values: (0..41 * 41).map(right).collect() };
         let measured = MeasuredPixels { places: &places, depths: &depths, still: None };
         let at = |place: [f64; 2], region: i32| {
             measured.nearest_surfaces(&labels, &[(place, region)], 8.0).unwrap()[0].map(|(depth, _)| depth.round())
@@ -344,7 +351,7 @@ mod tests {
         };
         let found = measured.nearest_surfaces(&labels, &[([20.0; 2], 7), ([20.0; 2], 0)], 8.0).unwrap();
         assert_eq!(found, [alone(7), alone(0)]);
-        let short = Labels { size: [41, 40], ..labels.clone() };
+        let short = RegionLabels { size: [41, 40], ..labels.clone() };
         assert!(measured.nearest_surfaces(&short, &[], 8.0).is_err());
     }
 
@@ -358,17 +365,21 @@ mod tests {
         assert_eq!(found.inside, [0, 1, 4, 5]);
         let mut beyond = [false; 20];
         beyond[19] = true;
-        let (mask, before) = found.shown(&beyond, 0, [4, 5]).unwrap();
-        let seen = |mask: &[bool]| (0..20).filter(|index| mask[*index]).collect::<Vec<_>>();
-        assert_eq!((seen(&mask), seen(&before.unwrap())), (vec![0, 12, 19], vec![12]), "13 is behind an edge");
+        let (mask, before) = found.visible_mask(&beyond, 0, [4, 5]).unwrap();
+        let near_return = |mask: &[bool]| (0..20).filter(|index| mask[*index]).collect::<Vec<_>>();
+        assert_eq!(
+            (near_return(&mask), near_return(&before.unwrap())),
+            (vec![0, 12, 19], vec![12]),
+            "13 is behind an edge"
+        );
         let near = ProjectedPoints::new(&places[..2], &points[..2], Some(&marks[..2]), [4, 5]).unwrap();
-        let (mask, before) = near.shown(&beyond, 1, [4, 5]).unwrap();
+        let (mask, before) = near.visible_mask(&beyond, 1, [4, 5]).unwrap();
         let around = vec![6, 7, 8, 11, 12, 13, 16, 17, 18];
-        assert_eq!((seen(&mask), seen(&before.unwrap())), ([around.clone(), vec![19]].concat(), around));
+        assert_eq!((near_return(&mask), near_return(&before.unwrap())), ([around.clone(), vec![19]].concat(), around));
         assert!(ProjectedPoints::new(&places, &points[1..], None, [4, 5]).is_err());
         assert!(ProjectedPoints::new(&places, &points, Some(&marks[1..]), [4, 5]).is_err());
-        assert!(near.shown(&beyond[1..], 1, [4, 5]).is_err());
+        assert!(near.visible_mask(&beyond[1..], 1, [4, 5]).is_err());
         let unmarked = ProjectedPoints::new(&places, &points, None, [4, 5]).unwrap();
-        assert_eq!(unmarked.shown(&beyond, 1, [4, 5]).unwrap().1, None);
+        assert_eq!(unmarked.visible_mask(&beyond, 1, [4, 5]).unwrap().1, None);
     }
 }

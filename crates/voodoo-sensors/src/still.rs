@@ -6,13 +6,13 @@ use std::ops::Range;
 use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
-/// What lies so far behind is another surface: metres, and share of the depth.
+/// What lies so far behind is another surface: meters, and share of the depth.
 const FARTHER: [f32; 2] = [0.05, 0.02];
-/// The depth of a still surface changes by less than this: metres, and share of the depth.
+/// The depth of a still surface changes by less than this: meters, and share of the depth.
 const STAYS: [f32; 2] = [0.02, 0.015];
 
-/// Of every pixel of a depth image `now` (metres, 0 = no return) whether it shows what may be the scene, and whether something
-/// before what was seen there once: `farthest`, of the pixel and its neighbours, since at the edges of things every camera sees now
+/// Of every pixel of a depth image `now` (meters, 0 = no return) whether it shows what may be the scene, and whether something
+/// before what was seen there once: `farthest`, of the pixel and its neighbors, since at the edges of things every camera sees now
 /// the one, now the other. `then` is an image some pictures ago. Nothing is told of pixels outside some rows and columns.
 ///
 /// # Errors
@@ -36,7 +36,7 @@ pub(crate) fn still(
         return Err(TrackError::measurement("depth", "images of one size", found));
     }
     let (mut stays, mut before) = (vec![false; now.len()], vec![false; now.len()]);
-    // Columns with a neighbour on either side, where there is one.
+    // Columns with a neighbor on either side, where there is one.
     let around = columns.start.saturating_sub(1)..(columns.end + 1).min(width);
     let (mut behind, mut line) = (vec![0.0; around.len()], vec![0.0; around.len()]);
     widest(
@@ -58,7 +58,7 @@ pub(crate) fn still(
     Ok((stays, before))
 }
 
-/// The least of every pixel and its eight neighbours, in some columns of a row of an image; of the outermost columns, of those alone.
+/// The least of every pixel and its eight neighbors, in some columns of a row of an image; of the outermost columns, of those alone.
 /// `line` is working memory.
 #[inline(always)]
 fn least_around(
@@ -105,13 +105,17 @@ mod tests {
         assert!(still(&now, &farthest, &then, 9, [0..4, 0..9]).is_err());
         assert!(still(&[], &[], &[], 0, [0..0, 0..0]).unwrap().0.is_empty());
         for window in [[1..3, 2..7], [0..1, 0..9], [1..2, 7..8], [2..2, 3..3], [0..3, 4..4]] {
-            let (told, ahead) = still(&now, &farthest, &then, 9, window.clone()).unwrap();
+            let (stays_there, ahead) = still(&now, &farthest, &then, 9, window.clone()).unwrap();
             let [rows, columns] = window;
             let inside = |index: &usize| rows.contains(&(index / 9)) && columns.contains(&(index % 9));
             for index in (0..27).filter(inside) {
-                assert_eq!((told[index], ahead[index]), (stays[index], before[index]), "{rows:?} {columns:?} {index}");
+                assert_eq!(
+                    (stays_there[index], ahead[index]),
+                    (stays[index], before[index]),
+                    "{rows:?} {columns:?} {index}"
+                );
             }
-            assert!((0..27).all(|index| inside(&index) || !(told[index] || ahead[index])));
+            assert!((0..27).all(|index| inside(&index) || !(stays_there[index] || ahead[index])));
         }
     }
 }

@@ -6,7 +6,7 @@ use voodoo_core::Camera;
 use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
-/// Part of a depth image (metres, along the optical axis) in which the body is expected.
+/// Part of a depth image (meters, along the optical axis) in which the body is expected.
 #[derive(Clone, Debug)]
 pub(crate) struct Window<'a> {
     /// Depths, row by row; what is not finite and above zero is no return.
@@ -48,7 +48,7 @@ impl Window<'_> {
         ))
     }
 
-    /// The points within the box from `low` to `high` (world, metres), in the frame of another camera, metres; and the index
+    /// The points within the box from `low` to `high` (world, meters), in the frame of another camera, meters; and the index
     /// of each one's pixel in the image.
     ///
     /// # Errors
@@ -120,7 +120,7 @@ fn below(value: f64) -> f32 {
     if f64::from(near) > value { near.next_down() } else { near }
 }
 
-/// Which depths along rays are returns from within a box (world, metres).
+/// Which depths along rays are returns from within a box (world, meters).
 #[inline(always)]
 fn gate<'a>(
     inside: &mut [bool],
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_points_are_those_in_the_box_seen_from_the_other_camera() {
+    fn the_points_are_those_in_the_box_visible_from_the_other_camera() {
         let camera = camera();
         let rays = camera.rays();
         let (to_world, to_other) = (pose(0.3, [0.1, 0.0, -0.2]), pose(-0.1, [0.05, 0.02, 0.01]));
@@ -212,8 +212,8 @@ mod tests {
     fn a_window_that_does_not_fit_is_refused() {
         let (camera, depth, level) = (camera(), noisy(48 * 64), pose(0.0, [0.0; 3]));
         let whole = Window { depth: &depth, size: SIZE, camera: &camera, step: 1, rows: 0..48, columns: 0..64 };
-        let look = |window: Window| window.within(LOW, HIGH, &level, &level).map_err(|error| error.to_string());
-        assert!(look(whole.clone()).is_ok());
+        let points_of = |window: Window| window.within(LOW, HIGH, &level, &level).map_err(|error| error.to_string());
+        assert!(points_of(whole.clone()).is_ok());
         for wrong in [
             Window { rows: 0..49, ..whole.clone() },
             Window { columns: 0..65, ..whole.clone() },
@@ -222,7 +222,7 @@ mod tests {
             Window { depth: &depth[1..], ..whole.clone() },
             Window { size: [48, 63], ..whole.clone() },
         ] {
-            assert!(look(wrong).unwrap_err().contains("window: expected"));
+            assert!(points_of(wrong).unwrap_err().contains("window: expected"));
         }
     }
 }

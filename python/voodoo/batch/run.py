@@ -20,12 +20,12 @@ from voodoo.batch.task import Job, Settings, do, failed
 from voodoo.errors import VoodooError
 
 SUMMARY, SETTINGS = "summary.csv", "settings.json"
-_EVERY_S, _SHARE = 2.0, 0.05
+_EVERY_S, _FRACTION = 2.0, 0.05
 """The table of summaries is written anew at most so often [s], and in at most so much of the time: of a million recordings it is
 large."""
 _AHEAD = 4
 """So many tasks a worker are known to the scheduler: a million at once would fill its memory."""
-_CONNECT_S, _LOOK_S = 30, 0.3
+_CONNECT_S, _POLL_S = 30, 0.3
 
 
 class Batch:
@@ -58,10 +58,10 @@ class Batch:
         self._written, self._took = -_EVERY_S, 0.0
 
     def _check_settings(self, settings: Settings) -> None:
-        told = settings.told()
+        described = settings.as_dict()
         before = self._store.read(SETTINGS)
         if before is None:
-            self._store.write(SETTINGS, (json.dumps(told, indent=1) + "\n").encode())
+            self._store.write(SETTINGS, (json.dumps(described, indent=1) + "\n").encode())
             return
         try:
             found = json.loads(before)
@@ -69,17 +69,17 @@ class Batch:
             found = None
         if not isinstance(found, dict):
             raise VoodooError(f"{self._store.url}/{SETTINGS}: expected the settings of a batch, found another file")
-        unlike = [f"{name} {found.get(name)!r}" for name, value in told.items() if found.get(name) != value]
-        if unlike:
+        different = [f"{name} {found.get(name)!r}" for name, value in described.items() if found.get(name) != value]
+        if different:
             raise VoodooError(
-                f"{self._store.url}: expected results of the same settings, found some of {', '.join(unlike)}; "
+                f"{self._store.url}: expected results of the same settings, found some of {', '.join(different)}; "
                 "give another --out, or the same settings"
             )
 
     def take(self, row: Row) -> None:
         """Keep the row of a recording; the table is written now and then."""
         self.rows[row.recording] = row
-        if time.monotonic() - self._written >= max(_EVERY_S, self._took / _SHARE):
+        if time.monotonic() - self._written >= max(_EVERY_S, self._took / _FRACTION):
             self.save()
 
     def save(self) -> None:
@@ -124,7 +124,7 @@ def run(
         submit(itertools.islice(waiting, _AHEAD * threads))
         while running and not (stop is not None and stop.is_set()):
             with contextlib.suppress(queue.Empty):
-                task = finished.get(timeout=_LOOK_S)
+                task = finished.get(timeout=_POLL_S)
                 job = running.pop(task)
                 yield _row(task, job)
                 task.release()

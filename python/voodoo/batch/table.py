@@ -23,7 +23,7 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     """The columns of everybody's frames, in the order of time and person.
 
     `stamp_s` float64 [s], `person` int32, `status`, `residual_m`, NAME_x, NAME_y, NAME_z [m] and NAME_rad as float32 (a tenth of
-    a millimetre at a kilometre), LIMB_status, and NAME_sigma_m as in a result's .csv. NaN and "" are what is not known.
+    a millimeter at a kilometer), LIMB_status, and NAME_sigma_m as in a result's .csv. NaN and "" are what is not known.
 
     Args:
         tracks: of each person, from 1; with the same joints.
@@ -107,7 +107,7 @@ def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
     table = pa.Table.from_arrays(arrays, names=list(columns)).replace_schema_metadata({NOTE: json.dumps(note).encode()})
     words = [name for name, column in columns.items() if isinstance(column, list)]
     out = io.BytesIO()
-    # Neighbouring frames share the high bytes of their numbers: sorted by byte they shrink.
+    # Neighboring frames share the high bytes of their numbers: sorted by byte they shrink.
     split = {name: "BYTE_STREAM_SPLIT" for name, column in columns.items() if name not in (*words, "person")}
     pq.write_table(table, out, compression="zstd", use_dictionary=[*words, "person"], column_encoding=split)
     return out.getvalue()

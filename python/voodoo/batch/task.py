@@ -62,7 +62,7 @@ class Settings:
     config: Mapping[str, Any] | None = None
     version: str = ""
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """As JSON has it."""
         found = {**vars(self), "use": None if self.use is None else list(self.use)}
         return {**found, "config": dict(self.config or {})}
@@ -93,14 +93,14 @@ def do(job: Job) -> Row:
         with on_disk(job.source) as path:
             row, columns = _track(job, path)
             row = replace(row, seconds=time.perf_counter() - began)
-            note = {"row": dict(vars(row)), "settings": job.settings.told()}
+            note = {"row": dict(vars(row)), "settings": job.settings.as_dict()}
             Store(job.out).write(Store(job.out).place_of(job.name), encode(columns, note))
             return row
     except Exception as error:
         # One recording of a thousand costs nothing but itself, whatever is wrong with it.
         words = " ".join(str(error).split()) or "no further detail"
-        told = words if isinstance(error, (ValueError, OSError)) else f"{type(error).__name__}: {words}"
-        return failed(job, told, time.perf_counter() - began)
+        text = words if isinstance(error, (ValueError, OSError)) else f"{type(error).__name__}: {words}"
+        return failed(job, text, time.perf_counter() - began)
 
 
 def failed(job: Job, why: str, seconds: float = float("nan")) -> Row:
@@ -115,7 +115,7 @@ def row_of(job: Job) -> Row | None:
         return None
     with file:
         note = note_of(file)
-    if note is None or note.get("settings") != job.settings.told():
+    if note is None or note.get("settings") != job.settings.as_dict():
         return None
     try:
         row = Row.of(note["row"])

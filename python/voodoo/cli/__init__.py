@@ -36,8 +36,8 @@ def main() -> None:
     app()
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(expected: bool) -> None:
+    if expected:
         from importlib.metadata import PackageNotFoundError, version
 
         try:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, progressing, say, say_interrupted
+from voodoo.cli.common import clear_errors, print_interrupted, print_message, progressing
 from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, PeopleOption, StrictOption, UseOption
 
 
@@ -98,15 +98,15 @@ def batch_command(
                     for row in progressing(rows, "tracking", len(batch.jobs)):
                         batch.take(row)
                         if row.status == FAILED:
-                            say(f"{row.recording}: {row.error}")
+                            print_message(f"{row.recording}: {row.error}")
                 finally:
                     batch.save()
                 interrupted = stop.is_set()
         ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
         done = sum(row.status == DONE for row in ours)
-        told = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
-        say_interrupted(interrupted, told)
-        typer.echo(told)
+        message = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
+        print_interrupted(interrupted, message)
+        typer.echo(message)
         broken = [row for row in ours if row.status == FAILED]
         if broken:
             raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")

@@ -95,7 +95,7 @@ def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:
     return found, False
 
 
-def say_interrupted(interrupted: bool, done: str) -> None:
+def print_interrupted(interrupted: bool, done: str) -> None:
     """After Ctrl-C say what is there on stderr and end with its exit code.
 
     Raises:
@@ -126,13 +126,13 @@ def clear_errors() -> Iterator[None]:
         _fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
 
 
-def say(message: str) -> None:
+def print_message(message: str) -> None:
     """One line on stderr."""
     typer.echo(f"voodoo: {' '.join(message.split())}", err=True)
 
 
 def _fail(message: str, hint: str = "") -> None:
-    say(message)
+    print_message(message)
     if hint:
         typer.echo(hint, err=True)
     raise typer.Exit(1)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, progressing, say_interrupted, until_interrupted
+from voodoo.cli.common import clear_errors, print_interrupted, progressing, until_interrupted
 from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
 from voodoo.errors import VoodooError
 
@@ -100,13 +100,13 @@ def eval_command(
             typer.echo(table(ablations))
             if out is not None:
                 typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
-            say_interrupted(interrupted, f"{len(ablations)} of {len(variants(chosen))} configurations are done")
+            print_interrupted(interrupted, f"{len(ablations)} of {len(variants(chosen))} configurations are done")
             failed = [score for item in ablations for score in item.failures]
             if failed:
                 raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
             return
         several = [path for path in paths if has_people(path)]
-        judgements = list(
+        judgments = list(
             progressing(
                 evaluate_all_people(several, config_file=config, loader=loader, model=model, use=kinds),
                 "following everybody",
@@ -114,8 +114,8 @@ def eval_command(
             )
         )
         if several:
-            show_people(judgements, out)
-            refuse_failures(judgements)
+            show_people(judgments, out)
+            refuse_failures(judgments)
         paths = [path for path in paths if path not in several]
         if not paths:
             return
@@ -130,5 +130,5 @@ def eval_command(
         if out is not None and scores:
             files = write_reports(out, scores, tables, picture=not interrupted)
             typer.echo("wrote " + ", ".join(str(file) for file in files))
-        say_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
+        print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
         refuse_failures(scores)

@@ -11,9 +11,9 @@ import typer
 from voodoo.cli.common import (
     clear_errors,
     numbers_of,
+    print_interrupted,
     progressing,
     refuse_both,
-    say_interrupted,
     states,
     topics_of,
 )
@@ -122,6 +122,6 @@ def ik_command(
         for name, values in errors.items():
             if np.isfinite(values).any():
                 typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
-        told = f"{len(result)} frames, {states(result)}; wrote {' and '.join(map(str, written))}"
-        say_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {told}")
-        typer.echo(told)
+        message = f"{len(result)} frames, {states(result)}; wrote {' and '.join(map(str, written))}"
+        print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
+        typer.echo(message)

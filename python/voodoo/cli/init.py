@@ -47,7 +47,7 @@ def init_command(
 ) -> None:
     """Find the first pose and write it as JSON, as --init of voodoo track reads it.
 
-    It is that of the first frame at or after S in which somebody is found: joints in metres in the recording's root frame,
+    It is that of the first frame at or after S in which somebody is found: joints in meters in the recording's root frame,
     the stature, and the frame's stamp. A start, truth or reference that lies beside the recording is not read. Edit the file
     and give it to voodoo track where the start is wrong. Exit code 1 if nobody is found.
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, say, topics_of
+from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, print_message, refuse_both, topics_of
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -138,7 +138,7 @@ def live_command(
         )
         done = run(source, wishes, duration=duration, report=report)
         for path in done.written:
-            say(f"wrote {path}")
+            print_message(f"wrote {path}")
         if done.signal == "SIGINT":
             raise typer.Exit(INTERRUPTED)
         if done.signal:

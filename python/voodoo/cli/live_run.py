@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.cli.common import say
+from voodoo.cli.common import print_message
 from voodoo.cli.people import body_of
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector
 from voodoo.errors import VoodooError
 from voodoo.export.ros2 import instant
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.first_look import FirstLook
+from voodoo.live.first_frame import FirstFrame
 from voodoo.live.follow import ONE, Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
@@ -108,7 +108,7 @@ def entered(
         source_of(word, rate=rate, loop=loop, root_frame=root_frame, options=options, calibration=place)
         for word, place in zip(words, places, strict=True)
     ]
-    return Live(sources, tell=say, eager=not several)
+    return Live(sources, on_message=print_message, eager=not several)
 
 
 def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | None) -> Done:
@@ -123,14 +123,14 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
         outputs, files = _outputs(live, wishes)
         session = Session(live, lambda frame: _follower(live, wishes, frame), outputs=outputs)
         try:
-            _watch(session, signals, duration)
+            _check_states(session, signals, duration)
         finally:
             try:
                 session.finish()
             finally:
                 if report is not None:
                     write_report(report, session)
-        say(f"{session.line()}; {session.published} published")
+        print_message(f"{session.line()}; {session.published} published")
         done.signal = signals[0] if signals else ""
         if files is not None:
             done.written += files.written
@@ -138,17 +138,17 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
     return done
 
 
-def _watch(session: Session, signals: Sequence[str], duration: float | None) -> None:
+def _check_states(session: Session, signals: Sequence[str], duration: float | None) -> None:
     """Say a line a second until the end."""
     clock = session.live.clock
-    began = said = clock.now()
+    began = reported = clock.now()
     while session.wait(_TICK_S) and not signals:
         now = clock.now()
         if duration is not None and now - began >= duration:
             return
-        if now - said >= _LINE_S:
-            said += _LINE_S
-            say(session.line())
+        if now - reported >= _LINE_S:
+            reported += _LINE_S
+            print_message(session.line())
 
 
 def write_report(path: Path, session: Session) -> None:
@@ -160,9 +160,9 @@ def write_report(path: Path, session: Session) -> None:
 
 
 def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
-    look = FirstLook(live, frame)
+    first = FirstFrame(live, frame)
     settings = replace(
-        FrontEndSettings.of(look, use=wishes.kinds), depth_filter=wishes.depth_filter, exclude=wishes.boxes
+        FrontEndSettings.of(first, use=wishes.kinds), depth_filter=wishes.depth_filter, exclude=wishes.boxes
     )
     if wishes.several:
         body = body_of(wishes.body, height=wishes.height, model=wishes.model)
@@ -171,7 +171,7 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
             people=lambda: People(body, config=config, detector=detector, limit=wishes.limit), settings=settings
         )
     tracker = start_tracker(
-        look,
+        first,
         init=wishes.beginning,
         body=None if wishes.body is None else Body.load(wishes.body),
         height=wishes.height,
@@ -180,7 +180,7 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
         use=wishes.kinds,
         detector=wishes.detector,
     )
-    return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, look))
+    return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
 
 
 def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
@@ -195,19 +195,19 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
         outputs.append(files)
     if wishes.record is not None:
         outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
-        say(f"{wishes.record} stores pictures of people")
+        print_message(f"{wishes.record} stores pictures of people")
     if wishes.view or wishes.serve is not None:
         try:
             viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
-        outputs.append(Shown(viewer, several=wishes.several))
+        outputs.append(ShowOutput(viewer, several=wishes.several))
         if viewer.address:
-            say(f"look at {viewer.address} in a browser")
+            print_message(f"look at {viewer.address} in a browser")
     return outputs, files
 
 
-class Shown(Output):
+class ShowOutput(Output):
     """Shows steps in Rerun; a viewer that is late shows fewer."""
 
     name = "view"
@@ -270,8 +270,8 @@ def warm_up() -> None:
     tracker = Tracker(body)
     tracker.reset(joints=_STANDING, fit_sizes=False)
     pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
-    seen = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
-    image = np.where(np.isfinite(seen) & (seen > 0.0), seen, 4.0).astype(np.float32)
+    observed = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
+    image = np.where(np.isfinite(observed) & (observed > 0.0), observed, 4.0).astype(np.float32)
     follower = Follower(Tracker(Body.human(model="measured")))
     for number in range(3):
         item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)

@@ -30,7 +30,7 @@ BodyOption = Annotated[
 ]
 HeightOption = Annotated[
     float | None,
-    typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in metres."),
+    typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in meters."),
 ]
 InitOption = Annotated[
     str | None,
@@ -54,7 +54,7 @@ ExcludeOption = Annotated[
     typer.Option(
         "--exclude",
         metavar="X0,Y0,Z0,X1,Y1,Z1",
-        help="A box in the root frame, two corners in metres, in which nobody is looked for or tracked; repeatable.",
+        help="A box in the root frame, two corners in meters, in which nobody is looked for or tracked; repeatable.",
     ),
 ]
 ModelOption = Annotated[
@@ -95,10 +95,10 @@ BackgroundOption = Annotated[
     typer.Option(
         "--background",
         metavar="DIR",
-        help="Pictures of the empty scene, CAMERA_0.png, ..., for colour; by default background/ beside the recording.",
+        help="Pictures of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
     ),
 ]
-NUMBERS = ("rate", "metres_per_unit", "tf_max_age")
+NUMBERS = ("rate", "meters_per_unit", "tf_max_age")
 """Options of loaders that are numbers."""
 
 LoaderNumberOption = Annotated[
@@ -106,7 +106,7 @@ LoaderNumberOption = Annotated[
     typer.Option(
         "--option",
         metavar="NAME=NUMBER",
-        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), metres_per_unit (16-bit depth of bags, 0.001), "
+        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit (16-bit depth of bags, 0.001), "
         "tf_max_age (bags, 0.5 s); repeatable.",
     ),
 ]
@@ -121,7 +121,7 @@ UseOption = Annotated[
 DepthRangeOption = Annotated[
     str | None,
     typer.Option(
-        "--depth-range", metavar="NEAR,FAR", help="Leave out depth beyond these metres, and flying pixels at edges."
+        "--depth-range", metavar="NEAR,FAR", help="Leave out depth beyond these meters, and flying pixels at edges."
     ),
 ]
 ViewOption = Annotated[

@@ -91,13 +91,13 @@ def follow_people(
     ]
     written += [path for path in (outputs.overlay, outputs.save) if path is not None]
     rows = sum(len(track) for track in result.tracks.values())
-    told = f"{len(result)} frames, {len(result.tracks)} persons in {rows} rows"
+    message = f"{len(result)} frames, {len(result.tracks)} persons in {rows} rows"
     if written:
-        told += f"; wrote {' and '.join(str(path) for path in written)}"
+        message += f"; wrote {' and '.join(str(path) for path in written)}"
     if interrupted:
-        typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {told}", err=True)
+        typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {message}", err=True)
         raise typer.Exit(INTERRUPTED)
-    typer.echo(told)
+    typer.echo(message)
     if not result.tracks:
         typer.echo(f"voodoo: {source.name}: nobody was found in {len(result)} frames", err=True)
 

@@ -58,7 +58,7 @@ def kinds_of(words: str | None) -> tuple[str, ...] | None:
 
 
 def depth_filter_of(words: str | None) -> DepthFilter | None:
-    """The filter of "NEAR,FAR" in metres; none for None.
+    """The filter of "NEAR,FAR" in meters; none for None.
 
     Raises:
         VoodooError: not two numbers, or limits that leave nothing.
@@ -68,7 +68,7 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
     try:
         nearest, farthest = (float(word) for word in words.split(","))
     except ValueError:
-        raise VoodooError(f"depth-range: expected NEAR,FAR in metres, found {words!r}") from None
+        raise VoodooError(f"depth-range: expected NEAR,FAR in meters, found {words!r}") from None
     return DepthFilter(nearest=nearest, farthest=farthest)
 
 
@@ -91,7 +91,7 @@ def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
         except ValueError:
             numbers = []
         if len(numbers) != 6 or not np.isfinite(numbers).all():
-            raise VoodooError(f"exclude: expected X0,Y0,Z0,X1,Y1,Z1 in metres, found {word!r}")
+            raise VoodooError(f"exclude: expected X0,Y0,Z0,X1,Y1,Z1 in meters, found {word!r}")
         low, high = np.sort(np.reshape(numbers, (2, 3)), axis=0).tolist()
         boxes.append(((low[0], low[1], low[2]), (high[0], high[1], high[2])))
     return FrontEndSettings(exclude=tuple(boxes)).exclude

@@ -35,11 +35,11 @@ def info_command(
         options = topics_of(topic) | numbers_of(option)
         source = opened(recording, loader, frame, left_out=LeftOut(), **options)
         typer.echo(str(source.info()))
-        seen = depth_range(source)
-        if seen is not None:
-            typer.echo(f"  depths     {seen}")
-            if seen.doubt:
-                typer.echo(f"  note       {seen.doubt}")
+        depth = depth_range(source)
+        if depth is not None:
+            typer.echo(f"  depths     {depth}")
+            if depth.warning:
+                typer.echo(f"  note       {depth.warning}")
 
 
 def config_command() -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, refuse_both, say, states, topics_of
+from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, print_message, refuse_both, states, topics_of
 from voodoo.cli.options import (
     BackgroundOption,
     BodyOption,
@@ -52,7 +52,7 @@ def track_command(
     ] = None,
     draw_regions: Annotated[
         bool,
-        typer.Option("--draw-regions", help="In --overlay, also what is the body by its colours, and edges found."),
+        typer.Option("--draw-regions", help="In --overlay, also what is the body by its colors, and edges found."),
     ] = False,
     view: ViewOption = False,
     save: Annotated[
@@ -84,17 +84,17 @@ def track_command(
 ) -> None:
     """Find a person in a recording, follow them, and write one row a frame.
 
-    All inputs the recording has are used: depth images, point clouds, laser scans, skin in colour images, 2-D
+    All inputs the recording has are used: depth images, point clouds, laser scans, skin in color images, 2-D
     keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
 
-    Pictures of calibrated cameras alone (a bag, or a folder with videos and Calib*.toml) are followed by the colour regions of
+    Pictures of calibrated cameras alone (a bag, or a folder with videos and Calib*.toml) are followed by the color regions of
     the body; --use color does so where there is more. They need a start: --init FILE, or one that lies beside them.
 
     The start is the recording's own, if one comes with it. Else somebody is looked for: in markers, keypoints of several
     cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until then, and when the
     person is gone, the status is searching and the coordinates are empty.
 
-    The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in metres for every joint and site, in the
+    The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in the
     recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, what is known of every
     limb. The .npz adds the pose of every limb. Ctrl-C writes the frames up to there and ends with exit code 130.
 
@@ -178,7 +178,7 @@ def track_command(
             **bare_for(beginning),
         )
         for words in source.assumed:
-            say(words)
+            print_message(words)
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target, inputs=(recording, *(with_ or ())))
@@ -188,7 +188,7 @@ def track_command(
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
                 follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer), left_out)
-            _say_left_out(source, left_out)
+            _print_left_out(source, left_out)
             return
         tracker = start_tracker(
             source,
@@ -213,28 +213,28 @@ def track_command(
         for target in targets:
             export(result, target, body=tracker.body, root_frame=source.root_frame)
         written = [str(path) for path in (*targets, overlay, save) if path is not None]
-        told = f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}"
+        message = f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}"
         if interrupted:
-            say(f"interrupted, the rest of {len(source)} frames is missing: {told}")
+            print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
-        typer.echo(told)
-        _say_doubts(source, result, left_out)
+        typer.echo(message)
+        _print_warnings(source, result, left_out)
 
 
-def _say_left_out(source: Recording, left_out: LeftOut | None) -> None:
+def _print_left_out(source: Recording, left_out: LeftOut | None) -> None:
     if left_out:
         first = next(iter(left_out.first.values()))
-        say(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
+        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
 
 
-def _say_doubts(source: Recording, result: Track, left_out: LeftOut | None) -> None:
+def _print_warnings(source: Recording, result: Track, left_out: LeftOut | None) -> None:
     """Say on stderr what was left out, and what may be wrong where nobody was tracked."""
     from voodoo.recordings.depth_range import depth_range
 
-    _say_left_out(source, left_out)
+    _print_left_out(source, left_out)
     if not result.found.any():
-        say(f"{source.name}: nobody was found in {len(result)} frames")
+        print_message(f"{source.name}: nobody was found in {len(result)} frames")
     if not {"tracking", "degraded"} & set(result.status):
-        seen = depth_range(source)
-        if seen is not None and seen.doubt:
-            say(f"{source.name}: {seen.doubt}")
+        depth = depth_range(source)
+        if depth is not None and depth.warning:
+            print_message(f"{source.name}: {depth.warning}")

@@ -34,7 +34,7 @@ class DetectorImage:
 
     Args:
         depth: (H, W) float32 [m] along the optical axis; 0 where nothing returned, and where it is known that what returned is
-            not asked for: boxes that were left out, the learnt background, persons who are tracked already.
+            not asked for: boxes that were left out, the learned background, persons who are tracked already.
         camera: its calibration.
         world_from_sensor: (4, 4) pose of its optical frame (x right, y down, z forward).
         floor: unit normal (3,) upwards and height along it [m], in the world, if it is known.
@@ -64,7 +64,7 @@ class DetectorImage:
 
 @dataclass(frozen=True, eq=False)
 class DetectedPerson:
-    """What a detector reports of a person. World frame, metres; probabilities from 0 to 1.
+    """What a detector reports of a person. World frame, meters; probabilities from 0 to 1.
 
     A `voodoo.Detection` has the same attributes and can be returned instead.
 

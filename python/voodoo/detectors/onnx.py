@@ -26,7 +26,7 @@ class OnnxDetector:
     What may be a person is cut out of the depth image as for the shipped network. The file's only input is a batch of pictures
     (N, 2, 96, 96), float32, 2.6 m wide at the depth z0 of the person's median pixel, turned so that up is up. Channel 0 is
     (z - z0) / 1.2 m, clipped to -1 ... 1, and 1 beside the person; channel 1 is 1 on the person and 0 beside. Two outputs are
-    read, others are ignored: `p` (N, J, 3), metres from the picture's middle to the right, downwards and backwards; and `vis`
+    read, others are ignored: `p` (N, J, 3), meters from the picture's middle to the right, downwards and backwards; and `vis`
     (N, J + 2), the log odds that each joint is in the image, that the trunk faces the camera, and that it is a person.
 
     Args:

@@ -35,7 +35,7 @@ class Variant:
     """One configuration of an ablation.
 
     Args:
-        name: "as configured", or the one change, e.g. "outline = false".
+        name: "as configured", or the one change, e.g. "depth_contour = false".
         config: all of it.
     """
 

@@ -50,7 +50,7 @@ def sigma_of(estimate: Estimate) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Share:
+class Coverage:
     """How errors of some joints compare with their standard deviations, by coordinate.
 
     Args:
@@ -69,7 +69,7 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class UncertaintyCalibration:
     """How far errors are as large as they were said to be.
 
     Args:
@@ -78,8 +78,8 @@ class Calibration:
         mean_m, kept_m, oracle_m: mean error of all joints, without the DROPPED least sure ones, and without the worst.
     """
 
-    shares: tuple[Share, ...]
-    quartiles: tuple[Share, ...]
+    coverages: tuple[Coverage, ...]
+    quartiles: tuple[Coverage, ...]
     mean_m: float
     kept_m: float
     oracle_m: float
@@ -90,7 +90,7 @@ class Calibration:
         return self.kept_m / self.oracle_m
 
 
-def calibrate(found: Sequence[Deviations]) -> Calibration | None:
+def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
     """Compare errors with their standard deviations; None where nothing is known of either."""
     if not found:
         return None
@@ -99,8 +99,8 @@ def calibrate(found: Sequence[Deviations]) -> Calibration | None:
     known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
     if not known.any():
         return None
-    shares = [
-        _share(name, errors[chosen & known], sigma[chosen & known])
+    coverages = [
+        _coverage(name, errors[chosen & known], sigma[chosen & known])
         for name, chosen in (
             ("all joints", np.ones_like(known)),
             ("shoulders and hips", np.broadcast_to(_TRUNK, known.shape)),
@@ -114,13 +114,13 @@ def calibrate(found: Sequence[Deviations]) -> Calibration | None:
         order = np.argsort(sigma[own].ravel(), kind="stable")
         parts = zip(("surest", "second", "third", "least sure"), np.array_split(order, 4), strict=True)
         quartiles += [
-            _share(f"{limbs}, {word} quarter", errors[own].ravel()[part], sigma[own].ravel()[part])
+            _coverage(f"{limbs}, {word} quarter", errors[own].ravel()[part], sigma[own].ravel()[part])
             for word, part in parts
         ]
     size, total = (np.linalg.norm(values[known], axis=1) for values in (errors, sigma))
     kept = len(size) - int(DROPPED * len(size))
-    return Calibration(
-        shares=tuple(shares),
+    return UncertaintyCalibration(
+        coverages=tuple(coverages),
         quartiles=tuple(quartiles),
         mean_m=float(size.mean()),
         kept_m=float(size[np.argsort(total, kind="stable")[:kept]].mean()),
@@ -128,9 +128,9 @@ def calibrate(found: Sequence[Deviations]) -> Calibration | None:
     )
 
 
-def _share(name: str, errors: FloatArray, sigma: FloatArray) -> Share:
+def _coverage(name: str, errors: FloatArray, sigma: FloatArray) -> Coverage:
     off, width = np.abs(errors).ravel(), sigma.ravel()
-    return Share(
+    return Coverage(
         name=name,
         coordinates=off.size,
         error_m=float(np.sqrt(mean_or_nan(off**2))),
@@ -140,20 +140,20 @@ def _share(name: str, errors: FloatArray, sigma: FloatArray) -> Share:
     )
 
 
-def calibration_markdown(calibration: Calibration, against: str) -> str:
+def calibration_markdown(calibration: UncertaintyCalibration, against: str) -> str:
     """The table as Markdown; `against` is what the errors were measured with."""
-    one, two = (f"{100 * share:.1f} %" for share in NORMAL)
+    one, two = (f"{100 * fraction:.1f} %" for fraction in NORMAL)
     lines = [
         f"## Standard deviations against {against}\n",
         f"Errors by coordinate; of a normal distribution {one} would be within one standard deviation, {two} within two.\n",
         "| joints | coordinates | error | standard deviation | within one | within two |",
         "|---|---|---|---|---|---|",
     ]
-    for share in (*calibration.shares, *calibration.quartiles):
-        if share.coordinates:
+    for fraction in (*calibration.coverages, *calibration.quartiles):
+        if fraction.coordinates:
             lines.append(
-                f"| {share.name} | {share.coordinates} | {100 * share.error_m:.1f} cm | {100 * share.sigma_m:.1f} cm "
-                f"| {100 * share.within_one:.1f} % | {100 * share.within_two:.1f} % |"
+                f"| {fraction.name} | {fraction.coordinates} | {100 * fraction.error_m:.1f} cm | {100 * fraction.sigma_m:.1f} cm "
+                f"| {100 * fraction.within_one:.1f} % | {100 * fraction.within_two:.1f} % |"
             )
     lines.append(
         f"\nMean error {100 * calibration.mean_m:.2f} cm; without the {100 * DROPPED:.0f} % least sure joints "

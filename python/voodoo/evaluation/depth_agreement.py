@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.evaluation.metrics import mean_or_nan, share_within
+from voodoo.evaluation.metrics import fraction_within, mean_or_nan
 from voodoo.measurements import DepthImage, PointCloud, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView, body_mask, limb_rings, transform
@@ -66,7 +66,7 @@ class FrameWitness:
     @property
     def within(self) -> float:
         """Share of the points within 5 cm of the model."""
-        return share_within(self.distances, WITHIN_M)
+        return fraction_within(self.distances, WITHIN_M)
 
 
 def witness(
@@ -158,5 +158,5 @@ def _overlap(depth: DepthImage, person: BoolArray, body: Body, estimate: Estimat
     height, width = depth.image.shape
     view = CameraView(depth.camera, depth.root_from_sensor)
     model = body_mask(body, estimate, view, width=width, height=height)
-    seen = person.reshape(height, width)
-    return float((model & seen).sum() / (model | seen).sum())
+    observed = person.reshape(height, width)
+    return float((model & observed).sum() / (model | observed).sum())

@@ -79,7 +79,7 @@ def evaluate(
         estimate = frame.estimate
         truth = _truth_at(recording, estimate.stamp)
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
-        seen = witness(frame.recorded, tracker, estimate, truth, selection)
+        observed = witness(frame.recorded, tracker, estimate, truth, selection)
         measured = called_measured(estimate)
         steps.append(
             _Step(
@@ -88,7 +88,7 @@ def evaluate(
                 frame.seconds,
                 joints,
                 measured,
-                seen,
+                observed,
                 sigma_of(estimate),
             )
         )
@@ -189,11 +189,11 @@ def _deaf_children() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    received = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, heard)
+        signal.signal(signal.SIGINT, received)
 
 
 def _one_thread() -> None:
@@ -287,16 +287,16 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         lost_without_offsets=np.nan if class_without is None else float(class_without == 0),
         first_pose_s=first_wait,
         first_pose_error_m=first_error,
-        within_5cm=metrics.share_within(errors, 0.05),
-        within_10cm=metrics.share_within(errors, 0.10),
+        within_5cm=metrics.fraction_within(errors, 0.05),
+        within_10cm=metrics.fraction_within(errors, 0.10),
         joint_error_m={name: metrics.mean_or_nan(errors[:, index]) for index, name in enumerate(metrics.JOINTS)},
         tracking_class=class_,
         lost_joints=tuple(name for index, name in enumerate(metrics.JOINTS) if lost[:, index].any()),
         selection=selection if distances.size else None,
-        depth_within_5cm=metrics.share_within(distances, 0.05),
+        depth_within_5cm=metrics.fraction_within(distances, 0.05),
         depth_median_m=float(np.median(distances)) if distances.size else np.nan,
         depth_p95_m=float(np.percentile(distances, 95.0)) if distances.size else np.nan,
-        person_within_5cm=metrics.share_within(distances[about_joints], 0.05),
+        person_within_5cm=metrics.fraction_within(distances[about_joints], 0.05),
         silhouette_iou=metrics.mean_or_nan(overlaps),
         jitter_m=metrics.jitter(positions),
         reference_jitter_m=metrics.jitter(reference),

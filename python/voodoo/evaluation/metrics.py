@@ -1,6 +1,6 @@
 """Measures of a trajectory against a reference: pure functions on arrays.
 
-Everywhere F frames, J joints, distances in metres, NaN = not known.
+Everywhere F frames, J joints, distances in meters, NaN = not known.
 """
 
 from __future__ import annotations
@@ -183,14 +183,14 @@ def lost_frames(
     frames of a 30 Hz recording last 1/3 s. Frames where the reference is not known neither end nor lengthen a run.
     """
     lost = np.zeros(len(far), dtype=bool)
-    seen = np.flatnonzero(known)
-    if len(seen) == 0:
+    observed = np.flatnonzero(known)
+    if len(observed) == 0:
         return lost
     period = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
-    flags = np.concatenate([[False], far[seen], [False]])
+    flags = np.concatenate([[False], far[observed], [False]])
     edges = np.flatnonzero(flags[1:] != flags[:-1])
     for first, end in zip(edges[::2], edges[1::2], strict=True):
-        run = seen[first:end]
+        run = observed[first:end]
         if stamps[run[-1]] - stamps[run[0]] + period > longer_than + _STAMP_TOLERANCE_S:
             lost[run] = True
     return lost
@@ -218,8 +218,8 @@ def tracking_class(
     at_end = False
     for joint in range(errors.shape[1]):
         lost[:, joint] = lost_frames(errors[:, joint] > limit, known[:, joint], stamps, longer_than=longer_than)
-        seen = np.flatnonzero(known[:, joint])
-        at_end |= len(seen) > 0 and bool(lost[seen[-1], joint])
+        observed = np.flatnonzero(known[:, joint])
+        at_end |= len(observed) > 0 and bool(lost[observed[-1], joint])
     if not known.any():
         return None, lost
     return (0 if at_end else 1 if lost.any() else 2), lost
@@ -243,7 +243,7 @@ def standing_still(
 
     It does in a frame when it is known and within `within` [m] of its place there in all frames from `around` [s] before to
     `around` after. A reference's own noise is less than that; a motion slower than 0.1 m/s is not told from standing. The
-    first and last frames, which lack neighbours, do not count.
+    first and last frames, which lack neighbors, do not count.
     """
     frames = len(reference)
     still = np.zeros(reference.shape[:2], dtype=bool)
@@ -282,7 +282,7 @@ def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) ->
     return mean_or_nan(second[counted])
 
 
-def share_within(distances: FloatArray, limit: float) -> float:
+def fraction_within(distances: FloatArray, limit: float) -> float:
     """Share of the known distances that are at most `limit`; NaN when none is known."""
     known = distances[np.isfinite(distances)]
     return float(np.mean(known <= limit)) if known.size else float("nan")

@@ -40,7 +40,7 @@ _LAST = 10.0
 
 @dataclass(frozen=True)
 class PeopleScore:
-    """How the people of one recording, or of several together, were followed; metres, seconds, NaN where not known.
+    """How the people of one recording, or of several together, were followed; meters, seconds, NaN where not known.
 
     Args:
         name, path: of the recording.
@@ -53,7 +53,7 @@ class PeopleScore:
         switches: of identity: a person is matched with another id than before, however long ago.
         id_true, id_false, id_missed: rows that belong together, rows too many and too few, see `idf1`.
         returns, returned: persons who came back after they had left, and how often with the id they had.
-        visits, seen: persons who came, and how many of these visits were ever matched.
+        visits, visits_matched: persons who came, and how many of these visits were ever matched.
         first_pose_s: time from JOINTS_IN_VIEW of a person to the first match, mean over the visits that had one.
         worst_first_pose_s: the longest of them.
         false_bodies: stretches of an id that match nobody and do not follow on a match of this id.
@@ -79,7 +79,7 @@ class PeopleScore:
     returns: int = 0
     returned: int = 0
     visits: int = 0
-    seen: int = 0
+    visits_matched: int = 0
     first_pose_s: float = np.nan
     worst_first_pose_s: float = np.nan
     false_bodies: int = 0
@@ -166,7 +166,7 @@ def score(
         returns=returns,
         returned=returned,
         visits=visits,
-        seen=len(waits),
+        visits_matched=len(waits),
         first_pose_s=float(np.mean(waits)) if waits else np.nan,
         worst_first_pose_s=max(waits) if waits else np.nan,
         false_bodies=false_bodies,
@@ -276,20 +276,20 @@ def _visits(truth: PeopleTruth, found: Matches) -> tuple[list[float], int, int, 
 
 def _false_bodies(found: Matches) -> tuple[int, int]:
     """Stretches of ids that match nobody: those that begin so, and those that follow on a match."""
-    born = left = 0
+    appeared = left = 0
     for column in range(len(found.ids)):
         before = NO_POSE
         for state, _ in groupby(found.of_id[:, column].tolist()):
             if state == NOBODY:
-                born += before == NO_POSE
+                appeared += before == NO_POSE
                 left += before != NO_POSE
             before = state
-    return born, left
+    return appeared, left
 
 
 def _joint_errors(truth: PeopleTruth, rows: PeopleRows, frames: _Frames, found: Matches) -> FloatArray:
     """Distances (N, 12) [m] of metrics.JOINTS in all matches of persons who are in view."""
-    wanted = np.stack([truth.of(name) for name in metrics.JOINTS], axis=2)
+    truth_positions = np.stack([truth.of(name) for name in metrics.JOINTS], axis=2)
     own = np.stack([rows.of(name) for name in metrics.JOINTS], axis=1)
     pairs = []
     for index, person in np.argwhere(found.of_person >= 0):
@@ -297,7 +297,7 @@ def _joint_errors(truth: PeopleTruth, rows: PeopleRows, frames: _Frames, found: 
         if truth.in_view[place, person] >= JOINTS_IN_VIEW:
             there = frames.rows[index]
             row = there[rows.persons[there] == found.ids[found.of_person[index, person]]][0]
-            pairs.append(np.linalg.norm(own[row] - wanted[place, person], axis=1))
+            pairs.append(np.linalg.norm(own[row] - truth_positions[place, person], axis=1))
     return np.array(pairs) if pairs else np.empty((0, len(metrics.JOINTS)))
 
 
@@ -318,7 +318,7 @@ def together(scores: Sequence[PeopleScore]) -> PeopleScore:
     """Those that did not fail as one: counts added up, means weighted by what they are means of."""
     good = [one for one in scores if not one.failure]
     added = ["seconds", "persons", "ids", "expected", "missed", "extra", "switches", "id_true", "id_false", "id_missed"]
-    added += ["returns", "returned", "visits", "seen", "false_bodies", "left_behind", "joints"]
+    added += ["returns", "returned", "visits", "visits_matched", "false_bodies", "left_behind", "joints"]
     sums = {name: sum(getattr(one, name) for one in good) for name in added}
 
     def mean(name: str, weight: str) -> float:
@@ -331,7 +331,7 @@ def together(scores: Sequence[PeopleScore]) -> PeopleScore:
         "together",
         Path(),
         **sums,
-        first_pose_s=mean("first_pose_s", "seen"),
+        first_pose_s=mean("first_pose_s", "visits_matched"),
         worst_first_pose_s=max(worst, default=np.nan),
         joint_error_m=mean("joint_error_m", "joints"),
         step_s=mean("step_s", "seconds"),

@@ -76,7 +76,7 @@ def _line(score: PeopleScore) -> str:
             f"{score.switches}",
             f"{score.returned} of {score.returns}" if score.returns else "-",
             wait if wait == "-" else f"{wait} ({_word(score.worst_first_pose_s, 2)})",
-            f"{score.visits - score.seen} of {score.visits}",
+            f"{score.visits - score.visits_matched} of {score.visits}",
             _word(score.false_a_minute, 1),
             f"{score.left_behind}",
             _word(100.0 * score.joint_error_m, 1),

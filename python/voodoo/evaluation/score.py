@@ -18,7 +18,7 @@ LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
 
 @dataclass(frozen=True)
 class Score:
-    """How one recording was tracked; metres, seconds and shares in [0, 1], NaN where it cannot be known.
+    """How one recording was tracked; meters, seconds and shares in [0, 1], NaN where it cannot be known.
 
     Args:
         name: of the recording.

@@ -16,7 +16,7 @@ CLASSES = (0, 1, 2)
 
 @dataclass(frozen=True)
 class Summary:
-    """Means over sequences of one kind, every sequence counting the same; metres and shares, NaN where unknown.
+    """Means over sequences of one kind, every sequence counting the same; meters and shares, NaN where unknown.
 
     Args:
         kind: "exact truth", "reference skeleton" or "no reference".
@@ -94,4 +94,4 @@ def _together(scores: Sequence[Score], name: str, count: str) -> float:
     """Share over all sequences, each counted by how many there are of what it is a share of; NaN when there are none."""
     counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
     total = sum(number for _, number in counts)
-    return sum(share * number for share, number in counts) / total if total else math.nan
+    return sum(fraction * number for fraction, number in counts) / total if total else math.nan

@@ -33,7 +33,7 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
         path: .bvh file.
         track: with limb poses, in a frame whose z points up.
         body: in the sizes it was tracked with (`Tracker.body`).
-        scale: BVH units per metre; animation programs expect centimetres.
+        scale: BVH units per meter; animation programs expect centimeters.
 
     Raises:
         VoodooError: the track has no limb poses, is of another body, or its stamps do not rise.
@@ -73,7 +73,7 @@ def _describe(
 ) -> None:
     """Append the joint of a bone and, depth first, those of its children; `order` is that of the channels.
 
-    `sizes`: BVH units per metre, offset (L, 3) of every joint, and which of them (L,) move.
+    `sizes`: BVH units per meter, offset (L, 3) of every joint, and which of them (L,) move.
     """
     bone, (scale, offsets, moving) = parts[index], sizes
     order.append(index)

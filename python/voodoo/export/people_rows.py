@@ -124,7 +124,7 @@ def write_rows(path: Path, rows: PeopleRows) -> None:
 def _cells(rows: PeopleRows) -> Iterable[list[str]]:
     columns = (rows.stamps, rows.persons, rows.status, rows.residual, rows.joints, rows.angles)
     for stamp, person, status, residual, joints, angles in zip(*columns, strict=True):
-        # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
+        # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
         numbers = ["" if np.isnan(value) else f"{value:.6f}" for value in (residual, *joints.ravel(), *angles)]
         yield [repr(float(stamp)), str(int(person)), status, *numbers]
 

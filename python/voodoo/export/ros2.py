@@ -96,9 +96,11 @@ class _Human:
         self.track, self.body, self.person, self.topic = track, body, person, topic
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
-        self._posed, self._shown = skeleton(track, body), track.found
-        shown = self._shown
-        self._names, angles = joint_angles(self._posed.of_frames(shown)) if shown.any() else ((), np.empty((0, 0)))
+        self._posed, self._displayed = skeleton(track, body), track.found
+        displayed = self._displayed
+        self._names, angles = (
+            joint_angles(self._posed.of_frames(displayed)) if displayed.any() else ((), np.empty((0, 0)))
+        )
         self._rows = iter(angles)
 
     def kinds(self, markers: bool) -> dict[str, str]:
@@ -112,7 +114,7 @@ class _Human:
         nanoseconds = round(float(self.track.stamps[index]) * 1e9)
         header = _header(nanoseconds, root_frame)
         messages: dict[str, Any] = {}
-        if self._shown[index]:
+        if self._displayed[index]:
             messages["/tf"] = _new(
                 _TF, transforms=_transforms(self.track, self._posed, index, root_frame, self.person, nanoseconds)
             )
@@ -128,7 +130,7 @@ class _Human:
                 pose = _body_pose(self.track, self._posed, index, self.person)
                 messages[f"{self.topic}/pose"] = _new(_POSE, header=header, pose=pose)
         if markers:
-            drawn = _markers(self.track, self.body, index, header) if self._shown[index] else [_no_markers(header)]
+            drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
             messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
 

@@ -247,7 +247,7 @@ class Track:
             for stamp, status, residual, joints, angles, support, sigma in zip(
                 self.stamps, self.status, self.residual, self.joints, self.angles, words, sigmas, strict=True
             ):
-                # repr keeps stamps in epoch seconds exact; six digits of a metre are enough for the rest.
+                # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
                 row = [repr(float(stamp)), status]
                 row += [_cell(value) for value in (residual, *joints.ravel(), *angles)]
                 writer.writerow([*row, *support, *(_cell(value) for value in sigma)])
@@ -354,7 +354,7 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         angles=content["angles"] if "angles" in content else np.empty((0, 0)),
         covariance=content.get("covariance", np.empty((0, 0, 3, 3))),
         root_covariance=content.get("root_covariance", np.empty((0, 6, 6))),
-        **_told(content),
+        **_optional_fields(content),
     )
 
 
@@ -398,7 +398,7 @@ def _only_person(path: Path) -> Track:
     return next(iter(tracks.values()))
 
 
-def _told(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
+def _optional_fields(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
     """Status of the limbs, and what was left out, as far as a file has them: the first version has not."""
     if "limb_status" not in content or "left_out_counts" not in content:
         return {}

@@ -14,7 +14,7 @@ from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
 
 
 def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:
-    """Write the joints and sites of a track as markers, in metres; those of searching frames are empty cells.
+    """Write the joints and sites of a track as markers, in meters; those of searching frames are empty cells.
 
     Args:
         path: .trc file.

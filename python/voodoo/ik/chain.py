@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo.errors import BodyError, MeasurementError
-from voodoo.ik.image import Silhouette, seen_views
+from voodoo.ik.image import Silhouette, core_views
 from voodoo.ik.options import Options
 from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, numbers, vector
 from voodoo.model.body import Body
@@ -128,7 +128,7 @@ class Chain:
             MeasurementError: a number that cannot be used; it says which.
         """
         Options(margin=margin, thin=thin)  # refuses what `solve` refuses
-        views = seen_views(images)
+        views = core_views(images)
         return self._core.criterion(
             base_pose(world_from_base),
             vector(angles),

@@ -48,7 +48,7 @@ class Silhouette:
 
         Raises:
             MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
-                whole numbers (millimetres) or negative, or the pose is not rigid.
+                whole numbers (millimeters) or negative, or the pose is not rigid.
         """
         if not isinstance(camera, Camera):
             raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
@@ -73,12 +73,12 @@ class Silhouette:
         # A picture without the person says nothing; it takes no part.
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
-        seen = None if depth is None else _depths(depth, camera, person)
+        observed = None if depth is None else _depths(depth, camera, person)
         # It is rigid, so the inverse rotation is the transposed one.
         inverse = np.eye(4)
         inverse[:3, :3] = pose[:3, :3].T
         inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, seen, self.border, _pinhole(camera), inverse)
+        self._core = _core.View(self.distance, self.thickness, observed, self.border, _pinhole(camera), inverse)
 
     @property
     def core(self) -> _core.View:
@@ -91,7 +91,7 @@ class Silhouette:
         return f"Silhouette({width}x{height}, {'empty' if self.empty else 'a person'})"
 
 
-def seen_views(images: Sequence[Silhouette]) -> list[_core.View]:
+def core_views(images: Sequence[Silhouette]) -> list[_core.View]:
     """The silhouettes with someone in them, as the core takes them.
 
     Raises:
@@ -132,7 +132,7 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
     disc within the silhouette that covers it; 0 outside. Exact to half a pixel."""
     inside = np.maximum(-distance, np.float32(0.0))
     thickness = np.zeros(distance.shape, dtype=np.float32)
-    # Discs about the middles of the silhouette cover it (its medial axis): where no neighbour's disc holds the pixel's own.
+    # Discs about the middles of the silhouette cover it (its medial axis): where no neighbor's disc holds the pixel's own.
     padded = np.pad(inside, 1)
     middle = inside > 0.0
     height, width = distance.shape
@@ -154,12 +154,12 @@ def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8])
     """Depths of the person as the core takes them: zero where there is none."""
     if isinstance(depth, np.ndarray) and depth.dtype.kind in "iu":
         raise MeasurementError(
-            f"depth: expected metres, as floats, found {depth.dtype}: multiply by the metres of a unit"
+            f"depth: expected meters, as floats, found {depth.dtype}: multiply by the meters of a unit"
         )
     found = np.nan_to_num(numbers("depth", depth), nan=0.0, posinf=0.0, neginf=0.0)
     if found.shape != (camera.height, camera.width) or (found < 0.0).any():
         raise MeasurementError(
-            f"depth: expected metres of shape {(camera.height, camera.width)} of its camera, found {found.shape}, "
+            f"depth: expected meters of shape {(camera.height, camera.width)} of its camera, found {found.shape}, "
             f"{int((found < 0.0).sum())} of them negative"
         )
     if camera.distorted:
@@ -176,7 +176,7 @@ def _pinhole(camera: Camera) -> Camera:
 
 
 def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
-    """The mask as a pinhole camera of the same focal lengths and centre would see it."""
+    """The mask as a pinhole camera of the same focal lengths and center would see it."""
     at = _distorted_pixels(camera)
     soft = cv2.remap(mask.astype(np.float32), at[..., 0], at[..., 1], cv2.INTER_LINEAR)
     return np.asarray(soft >= _UNDISTORTED, dtype=np.uint8)

@@ -26,7 +26,7 @@ class Options:
         margin: how deep bones shall lie inside the silhouettes, in radii of their limbs, less the silhouette's border; 0 is
             J10's criterion.
         thin: up to how many times that depth a silhouette is the limb itself, in whose middle the bone shall lie; 0: bones are
-            nowhere centred.
+            nowhere centerd.
         bones: the segments that are projected; None: joint to joint.
     """
 

@@ -13,7 +13,7 @@ from voodoo.ik.values import FloatArray
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Posture:
-    """What a solve found; immutable. World frame, metres, radians.
+    """What a solve found; immutable. World frame, meters, radians.
 
     Attributes:
         angles: (n,) in the order of `angle_names`, within the limits.
@@ -56,7 +56,7 @@ class Postures:
     h: FloatArray
     steps: FloatArray
     tried: FloatArray
-    looked: FloatArray
+    compared: FloatArray
     converged: npt.NDArray[np.bool_]
 
     def __repr__(self) -> str:

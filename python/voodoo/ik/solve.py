@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.ik.chain import Chain
-from voodoo.ik.image import Silhouette, seen_views
+from voodoo.ik.image import Silhouette, core_views
 from voodoo.ik.options import Options, chosen_options
 from voodoo.ik.posture import Posture, Postures
 from voodoo.ik.rest import Rest, named_rest, rest_parts
@@ -58,7 +58,7 @@ def solve(
     """
     chain = _chain(chain)
     options = chosen_options(options, changes)
-    views = seen_views(images)
+    views = core_views(images)
     begin = start.angles if isinstance(start, Posture) else chain.rest() if start is None else start
     angles, poses, sites, residuals, steps, converged, h = chain.core.solve(
         base_pose(world_from_base),
@@ -123,7 +123,7 @@ def solve_many(
         raise MeasurementError(f"starts: expected finite numbers ({n},) or (N, {n}), found shape {begin.shape}")
     begin = np.ascontiguousarray(np.broadcast_to(begin, (len(places), n)))
     goals = [Target.at(site, (0.0, 0.0, 0.0)).parts() for site in sites]
-    views = seen_views(images)
+    views = core_views(images)
     found = chain.core.solve_many(
         base_pose(world_from_base),
         begin,
@@ -135,8 +135,8 @@ def solve_many(
         options.parts(),
         rest_parts(chain, rest),
     )
-    angles, joints, h, steps, tried, looked, converged = found
-    return Postures(angles, joints, h, steps, tried, looked, converged != 0.0)
+    angles, joints, h, steps, tried, compared, converged = found
+    return Postures(angles, joints, h, steps, tried, compared, converged != 0.0)
 
 
 def _chain(chain: Chain | Body) -> Chain:

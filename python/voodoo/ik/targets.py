@@ -13,7 +13,7 @@ from voodoo.errors import MeasurementError
 from voodoo.ik.values import Vector, three
 from voodoo.model.joint import short
 
-Parts: TypeAlias = tuple[str, str, tuple[float, float, float, float, float, float], float, int]
+TargetParts: TypeAlias = tuple[str, str, tuple[float, float, float, float, float, float], float, int]
 """Site, kind, values, weight and priority of a target."""
 
 
@@ -44,7 +44,7 @@ class Target:
         if self.kind not in ("position", "line"):
             raise MeasurementError(f"target {self.site}: kind: expected position or line, found {self.kind!r}")
         if len(self.values) != 6 or not all(map(math.isfinite, self.values)):
-            raise MeasurementError(f"target {self.site}: expected finite metres, found {self.values}")
+            raise MeasurementError(f"target {self.site}: expected finite meters, found {self.values}")
         if not (isinstance(self.weight, (int, float)) and math.isfinite(self.weight) and self.weight > 0.0):
             raise MeasurementError(f"target {self.site}: weight: expected a number above zero, found {self.weight!r}")
         if isinstance(self.priority, bool) or not isinstance(self.priority, int) or self.priority < 0:
@@ -76,7 +76,7 @@ class Target:
         a, b, c, d, e, f = (float(value) for value in np.concatenate([n, np.cross(o, n)]))
         return cls(site, "line", (a, b, c, d, e, f), weight, priority)
 
-    def parts(self) -> Parts:
+    def parts(self) -> TargetParts:
         """The target as the core takes it."""
         return (self.site, self.kind, self.values, self.weight, self.priority)
 
@@ -84,7 +84,7 @@ class Target:
 Targets: TypeAlias = Mapping[str, Vector] | Sequence[Target]
 
 
-def target_parts(targets: Targets) -> list[Parts]:
+def target_parts(targets: Targets) -> list[TargetParts]:
     """Targets as the core takes them; a mapping holds positions.
 
     Raises:
@@ -96,12 +96,12 @@ def target_parts(targets: Targets) -> list[Parts]:
                 f"targets: expected site -> position (3,), or a list of Target, found {short(targets)}"
             )
         return [target.parts() for target in targets]
-    parts: list[Parts] = []
+    parts: list[TargetParts] = []
     for site, position in targets.items():
         if not isinstance(site, str):
             raise MeasurementError(f"targets: expected names of sites, found {short(site)}")
         x, y, z = three(f"target {site}: position", position)
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-            raise MeasurementError(f"target {site}: expected finite metres, found {short(position)}")
+            raise MeasurementError(f"target {site}: expected finite meters, found {short(position)}")
         parts.append((site, "position", (x, y, z, 0.0, 0.0, 0.0), 1.0, 0))
     return parts

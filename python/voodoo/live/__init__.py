@@ -32,7 +32,7 @@ def open(
     rate: float = 1.0,
     loop: bool = False,
     root_frame: str | None = None,
-    tell: Callable[[str], None] | None = None,
+    on_message: Callable[[str], None] | None = None,
 ) -> Live:
     """Live sources as an iterator of recorded frames; use it in a `with` block.
 
@@ -51,4 +51,4 @@ def open(
         source if isinstance(source, Source) else source_of(source, rate=rate, loop=loop, root_frame=root_frame)
         for source in sources
     ]
-    return Live(made, tell=tell)
+    return Live(made, on_message=on_message)

@@ -17,12 +17,12 @@ from voodoo.model.camera import Camera
 from voodoo.recordings.recording import refuse_blank
 
 WAIT_S = 0.010
-"""How long a depth image waits for the colour picture or transform that belongs to it, as in recordings."""
+"""How long a depth image waits for the color picture or transform that belongs to it, as in recordings."""
 _STALE_S = 0.5
 """What is older than its frame by more is nothing of that instant."""
 _PENDING = 4
 _FAR_M = 100.0
-_LOOK = 16
+_STRIDE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,18 +178,18 @@ class Assembler:
     def _refuse_far(self, item: DepthImage) -> None:
         if item.image.dtype.kind != "f":
             return
-        seen = item.image[::_LOOK, ::_LOOK]
-        metres = seen[np.isfinite(seen) & (seen > 0.0)] * item.metres_per_unit
-        if metres.size and float(np.median(metres)) > _FAR_M:
+        observed = item.image[::_STRIDE, ::_STRIDE]
+        meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
+        if meters.size and float(np.median(meters)) > _FAR_M:
             raise Fault(
                 "wrong unit",
-                f"{item.sensor}, stamp {item.stamp:.6f}: expected metres, found a median of {np.median(metres):.0f}",
+                f"{item.sensor}, stamp {item.stamp:.6f}: expected meters, found a median of {np.median(meters):.0f}",
             )
 
 
 def _same(before: npt.NDArray[np.generic], image: npt.NDArray[np.generic]) -> bool:
     # Noise shows in the first rows that are looked at.
-    rows = slice(None, None, _LOOK)
+    rows = slice(None, None, _STRIDE)
     if before.shape != image.shape or not np.array_equal(before[rows], image[rows], equal_nan=image.dtype.kind == "f"):
         return False
     return np.array_equal(before, image, equal_nan=image.dtype.kind == "f")

@@ -17,7 +17,7 @@ FAULTS: dict[str, str] = {
     "no stamp": "a header with a stamp of zero, or one that is no time",
     "frozen picture": "a depth image that repeats the one before bit by bit under another stamp",
     "blank picture": "a depth image in which nothing returned: all zero or NaN",
-    "wrong unit": "depths beyond 100 m: metres that are millimetres",
+    "wrong unit": "depths beyond 100 m: meters that are millimeters",
     "another size": "an image of another size than its calibration says",
     "calibration missing": "an image of a camera whose calibration did not come",
     "calibration unusable": "a calibration that makes no camera",
@@ -81,12 +81,12 @@ class Faults:
         first: name -> the first one, in words.
     """
 
-    def __init__(self, tell: Callable[[str], None] | None = None) -> None:
+    def __init__(self, on_message: Callable[[str], None] | None = None) -> None:
         """None yet."""
         self.counts: dict[str, int] = {}
         self.first: dict[str, str] = {}
-        self._tell = tell
-        self._told: dict[str, tuple[float, int]] = {}
+        self._on_message = on_message
+        self._optional_fields: dict[str, tuple[float, int]] = {}
         self._lock = threading.Lock()
 
     def add(self, kind: str, words: object, now: float, count: int = 1) -> None:
@@ -101,21 +101,21 @@ class Faults:
         with self._lock:
             self.counts[kind] = self.counts.get(kind, 0) + count
             self.first.setdefault(kind, str(words))
-            at, counted = self._told.get(kind, (float("-inf"), 0))
+            at, counted = self._optional_fields.get(kind, (float("-inf"), 0))
             if now - at < _QUIET_S:
                 return
             since = self.counts[kind] - counted
-            self._told[kind] = (now, self.counts[kind])
-        self.say(f"{kind}: {words}" if since == 1 else f"{kind} ({since} times): {words}")
+            self._optional_fields[kind] = (now, self.counts[kind])
+        self.log(f"{kind}: {words}" if since == 1 else f"{kind} ({since} times): {words}")
 
     def add_error(self, error: VoodooError, now: float, otherwise: str) -> None:
         """Count what raised an error; `otherwise` is its name where the error does not tell."""
         self.add(kind_of(error, otherwise), error, now)
 
-    def say(self, words: str) -> None:
+    def log(self, words: str) -> None:
         """Tell something that is no fault."""
-        if self._tell is not None:
-            self._tell(words)
+        if self._on_message is not None:
+            self._on_message(words)
 
     def __len__(self) -> int:
         """How many there were."""

@@ -32,9 +32,9 @@ class Latencies:
         at = int(math.log(min(max(seconds, _LEAST_S), _MOST_S) / _LEAST_S) / math.log(_STEP))
         self._counts[at] += 1
 
-    def percentile(self, share: float) -> float:
-        """The latency [s] that `share` (0 to 100) percent do not exceed, to 1 %; NaN without any."""
+    def percentile(self, percent: float) -> float:
+        """The latency [s] that `fraction` (0 to 100) percent do not exceed, to 1 %; NaN without any."""
         if not self.count:
             return math.nan
-        at = int(np.searchsorted(np.cumsum(self._counts), max(math.ceil(self.count * share / 100.0), 1)))
+        at = int(np.searchsorted(np.cumsum(self._counts), max(math.ceil(self.count * percent / 100.0), 1)))
         return min(_LEAST_S * _STEP ** (at + 0.5), max(self.largest, _LEAST_S))

@@ -28,7 +28,7 @@ _QUALITY = 95
 
 
 class Recorder(Output):
-    """Writes depth, clouds, scans, colour (JPEG), calibrations, poses of sensors, and the skeletons.
+    """Writes depth, clouds, scans, color (JPEG), calibrations, poses of sensors, and the skeletons.
 
     What was dropped because the tracker was late is not in it; neither are keypoints and markers, for which ROS has no message.
 
@@ -157,10 +157,10 @@ def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
 
 def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
     image = item.image
-    if image.dtype.kind == "u" and item.metres_per_unit != 0.001:
-        image = np.where(image > 0, image * np.float64(item.metres_per_unit), np.nan).astype(np.float32)
-    elif image.dtype.kind == "f" and item.metres_per_unit != 1.0:
-        image = (image * item.metres_per_unit).astype(np.float32)
+    if image.dtype.kind == "u" and item.meters_per_unit != 0.001:
+        image = np.where(image > 0, image * np.float64(item.meters_per_unit), np.nan).astype(np.float32)
+    elif image.dtype.kind == "f" and item.meters_per_unit != 1.0:
+        image = (image * item.meters_per_unit).astype(np.float32)
     return _new(
         "sensor_msgs/msg/Image",
         header=header,

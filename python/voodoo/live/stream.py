@@ -39,7 +39,7 @@ class Live:
         clock: of the host.
         tell: is given a line for people at every fault.
         wait: how long a frame waits for the pictures and transforms that belong to it [s].
-        eager: decode colour pictures at once, beside the tracker; False: when somebody looks at them.
+        eager: decode color pictures at once, beside the tracker; False: when somebody looks at them.
 
     Attributes:
         faults: what went wrong, by name.
@@ -50,7 +50,7 @@ class Live:
         sources: Sequence[Source],
         *,
         clock: Clock | None = None,
-        tell: Callable[[str], None] | None = None,
+        on_message: Callable[[str], None] | None = None,
         wait: float = WAIT_S,
         eager: bool = True,
     ) -> None:
@@ -60,7 +60,7 @@ class Live:
         _check_joined(sources)
         self.sources = tuple(sources)
         self.clock: Clock = clock if clock is not None else HostClock()
-        self.faults = Faults(tell)
+        self.faults = Faults(on_message)
         self._delivered = 0
         self._assembler = Assembler(self.faults, wait=wait, eager=eager)
         self._inbox = Inbox()
@@ -219,7 +219,7 @@ class Live:
             source.close()
             if not source.stays:
                 raise
-            self.faults.say(f"{source.name}: waiting for it: {error}")
+            self.faults.log(f"{source.name}: waiting for it: {error}")
             return False
         except BaseException:
             self.close()
@@ -233,7 +233,7 @@ class Live:
                 if not is_open:
                     source.open(self.clock, self.faults)
                     is_open = True
-                    self.faults.say(f"{source.name}: it is there again")
+                    self.faults.log(f"{source.name}: it is there again")
                 for arrival in source.read(_TICK_S):
                     # The first source's images make the frames.
                     self.deliver(arrival if source is self.sources[0] else replace(arrival, drives=False))
@@ -271,7 +271,7 @@ class Live:
                 self._hand_on(assembler.flush(self.clock.now()))
             assembler.feed(arrival, at)
         self._hand_on(assembler.poll(self.clock.now()))
-        self._watch()
+        self._check_states()
 
     def _hand_on(self, frame: LiveFrame | None) -> None:
         if frame is None:
@@ -283,23 +283,23 @@ class Live:
             self._period = frame.stamp - self._stamp
         self._stamp = frame.stamp
         if self._lost:
-            self.faults.say(f"data again after {now - (self._good or now):.1f} s")
+            self.faults.log(f"data again after {now - (self._good or now):.1f} s")
         self._good, self._lost = now, False
         self._frames.put(frame)
 
     def _check_roots(self) -> None:
         roots = {source.name: source.root_frame for source in self.sources if source.root_frame}
         if len(set(roots.values())) > 1:
-            told = ", ".join(f"{name} in {root!r}" for name, root in roots.items())
+            message = ", ".join(f"{name} in {root!r}" for name, root in roots.items())
             raise VoodooError(
-                f"sources: expected one root frame, found {told}; --calibration and --frame say where they are"
+                f"sources: expected one root frame, found {message}; --calibration and --frame say where they are"
             )
 
     @property
     def _patience(self) -> float:
         return max(LOST_S, _PERIODS * self._period)
 
-    def _watch(self) -> None:
+    def _check_states(self) -> None:
         """Tell that a source stalls."""
         if not self._lost and self.lost and not self._inbox.closed:
             self._lost = True

@@ -73,7 +73,7 @@ class Body:
         Raises:
             BodyError: the stature is out of range, or the model unknown.
         """
-        height = number_of("height", height, "a stature in metres")
+        height = number_of("height", height, "a stature in meters")
         if not isinstance(model, str):
             raise BodyError(f"model: expected one of {', '.join(get_args(HumanModel))}, found {short(model)}")
         if model == "measured":
@@ -142,9 +142,9 @@ def checked_joints(
         try:
             x, y, z = (float(value) for value in as_numbers(position).reshape(-1))
         except (TypeError, ValueError, OverflowError):
-            raise BodyError(f"{what}[{name}]: expected three numbers in metres, found {short(position)}") from None
+            raise BodyError(f"{what}[{name}]: expected three numbers in meters, found {short(position)}") from None
         if not all(map(math.isfinite, (x, y, z))):
-            raise BodyError(f"{what}[{name}]: expected finite metres, found {short(position)}")
+            raise BodyError(f"{what}[{name}]: expected finite meters, found {short(position)}")
         checked[name] = (x, y, z)
     return checked
 

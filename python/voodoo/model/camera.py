@@ -18,7 +18,7 @@ from voodoo.model.joint import as_numbers, short
 CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "inverse_plumb_bob"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
 (and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle); and Brown-Conrady
-from distorted to undistorted coordinates, as RealSense's colour cameras are calibrated."""
+from distorted to undistorted coordinates, as RealSense's color cameras are calibrated."""
 
 _COEFFICIENTS: dict[str, tuple[int, ...]] = {
     "plumb_bob": (0, 4, 5),
@@ -40,7 +40,7 @@ MOST_PIXELS = 2**25
 class Camera:
     """A calibrated camera in its optical frame: x right, y down, z forward.
 
-    Integer pixel coordinates are pixel centres; (0, 0) is the centre of the top-left pixel. Without distortion
+    Integer pixel coordinates are pixel centers; (0, 0) is the center of the top-left pixel. Without distortion
     u = fx x/z + cx and v = fy y/z + cy. Projections and rays are those of the compiled core, which all parts of the
     tracker use.
 
@@ -164,7 +164,7 @@ class Camera:
         return self.core.project(np.ascontiguousarray(points, dtype=np.float64))
 
     def rays(self) -> npt.NDArray[np.float32]:
-        """Normalized image coordinates x/z, y/z of every pixel centre, lens distortion removed.
+        """Normalized image coordinates x/z, y/z of every pixel center, lens distortion removed.
 
         Returns:
             (height, width, 2) float32, read-only and cached; depth (along z) times (x, y, 1) is the point. NaN where

@@ -52,7 +52,7 @@ class Joint(_Part):
     """An elastic-band joint of a limb to its parent (K07 section 4).
 
     Attributes:
-        name: usually that of the site at its centre.
+        name: usually that of the site at its center.
         on_parent: the joint's ellipse in the parent's frame, e.g. `voodoo.Place(position=(0.0, 0.0, 0.2))`.
         on_limb: the same in the limb's own frame; with the joint at rest the two coincide.
         semi_axes: semi-axes of the ellipse along the joint frame's x and y [m]: (0, 0) universal, one positive: hinge

@@ -45,7 +45,7 @@ class CameraView:
         sensor_from_root = np.linalg.inv(self.root_from_sensor)
         points = points_root @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
         points[points[:, 2] < _NEAREST_M] = np.nan
-        # Integer coordinates are pixel centres, so enlarging moves them by half a pixel as well.
+        # Integer coordinates are pixel centers, so enlarging moves them by half a pixel as well.
         return (self.camera.project(points) + 0.5) * self.scale - 0.5, points[:, 2]
 
 
@@ -54,22 +54,22 @@ class TopView:
     """Straight from above, without perspective: forward is up in the picture, left is left.
 
     Args:
-        centre: (x, y, z) [m] of the root frame shown in the middle.
-        metres_per_pixel: of the picture.
+        center: (x, y, z) [m] of the root frame shown in the middle.
+        meters_per_pixel: of the picture.
         size: width = height [px].
         axes: "rep103" for root frames with x forward, y left, z up; "optical" for x right, y down, z forward.
     """
 
-    centre: tuple[float, float, float]
-    metres_per_pixel: float
+    center: tuple[float, float, float]
+    meters_per_pixel: float
     size: int
     axes: Axes = "rep103"
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See View; depth counts downwards from the centre."""
-        x, y, z = (points_root - np.array(self.centre)).T
+        """See View; depth counts downwards from the center."""
+        x, y, z = (points_root - np.array(self.center)).T
         right, forward, down = (-y, x, -z) if self.axes == "rep103" else (x, z, y)
-        pixels = np.column_stack([right, -forward]) / self.metres_per_pixel + (self.size - 1) / 2
+        pixels = np.column_stack([right, -forward]) / self.meters_per_pixel + (self.size - 1) / 2
         return pixels, down
 
 
@@ -86,7 +86,7 @@ def limb_rings(shape: TaperedEllipticCylinder, *, rings: int = 2, samples: int =
     return np.stack([a * np.cos(angle), b * np.sin(angle), np.broadcast_to(shape.length * t, (rings, samples))], axis=2)
 
 
-def limb_outline(
+def limb_silhouette(
     shape: TaperedEllipticCylinder, root_from_limb: FloatArray, view: View
 ) -> npt.NDArray[np.float32] | None:
     """Outline of a limb in a view: (K, 2) pixels, convex.
@@ -106,28 +106,28 @@ def limb_outline(
 
 
 def body_mask(body: Body, estimate: Estimate, view: View, *, width: int, height: int) -> npt.NDArray[np.bool_]:
-    """Pixels (height, width) whose centres lie inside the outline of a limb."""
+    """Pixels (height, width) whose centers lie inside the outline of a limb."""
     mask = np.zeros((height, width), dtype=bool)
     for limb in body.limbs:
-        outline = limb_outline(limb.shape, estimate.world_from_limb[limb.name], view)
-        if outline is not None and len(outline) >= 3:
-            _fill(mask, outline.astype(np.float64))
+        contour = limb_silhouette(limb.shape, estimate.world_from_limb[limb.name], view)
+        if contour is not None and len(contour) >= 3:
+            _fill(mask, contour.astype(np.float64))
     return mask
 
 
-def _fill(mask: npt.NDArray[np.bool_], outline: FloatArray) -> None:
-    """Set the pixels whose centres lie in a convex polygon (K, 2).
+def _fill(mask: npt.NDArray[np.bool_], contour: FloatArray) -> None:
+    """Set the pixels whose centers lie in a convex polygon (K, 2).
 
     Not cv2.fillConvexPoly: it also sets every pixel the border touches, half a pixel too many all around.
     """
     height, width = mask.shape
-    low = np.clip(np.ceil(outline.min(axis=0)), 0, (width, height)).astype(int)
-    high = np.clip(np.floor(outline.max(axis=0)) + 1, 0, (width, height)).astype(int)
+    low = np.clip(np.ceil(contour.min(axis=0)), 0, (width, height)).astype(int)
+    high = np.clip(np.floor(contour.max(axis=0)) + 1, 0, (width, height)).astype(int)
     if (high <= low).any():
         return
     x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
-    edge = np.roll(outline, -1, axis=0) - outline
-    side = edge[:, 0, None, None] * (y - outline[:, 1, None, None]) - edge[:, 1, None, None] * (
-        x - outline[:, 0, None, None]
+    edge = np.roll(contour, -1, axis=0) - contour
+    side = edge[:, 0, None, None] * (y - contour[:, 1, None, None]) - edge[:, 1, None, None] * (
+        x - contour[:, 0, None, None]
     )
     mask[low[1] : high[1], low[0] : high[0]] |= (side >= 0.0).all(axis=0) | (side <= 0.0).all(axis=0)

@@ -96,11 +96,11 @@ def _product(
     return x / length, y / length, z / length, w / length
 
 
-def turned_between(first: FloatArray, second: FloatArray, share: float) -> FloatArray:
+def turned_between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
     """The rotation (3, 3) at a share, 0 to 1, of the way from one to another, turning evenly about one axis."""
     (ax, ay, az, aw), (bx, by, bz, bw) = quaternions(np.array([first, second])).tolist()
     turn = _turn_of_quaternion(*_product((-ax, -ay, -az, aw), (bx, by, bz, bw)))
-    x, y, z = (value * share for value in turn)
+    x, y, z = (value * fraction for value in turn)
     return matrix_of_quaternion(_product((ax, ay, az, aw), _quaternion_of_turn(x, y, z)))
 
 

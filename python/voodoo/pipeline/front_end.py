@@ -54,7 +54,7 @@ class FrontEnd:
         """A new person: nothing was measured of them."""
         chosen = self.settings
         # Somebody set the pose, or a source other than the tracker did.
-        self._vouched = self.search.posed
+        self._trusted_start = self.search.posed
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
 
     @property
@@ -69,7 +69,7 @@ class FrontEnd:
 
     @property
     def skin(self) -> dict[str, SkinTracker]:
-        """The skin cue of each colour camera."""
+        """The skin cue of each color camera."""
         return self.memory.all("skin")
 
     def step(self, recorded: RecordedFrame) -> Estimate:
@@ -109,8 +109,8 @@ class FrontEnd:
     def _learn(self, recorded: RecordedFrame, estimate: Estimate) -> None:
         for item in recorded.measurements:
             for adapter in adapters_of(item):
-                adapter.learn(item, estimate, self.memory, vouched=self._vouched)
-        self._vouched = False
+                adapter.learn(item, estimate, self.memory, trusted_start=self._trusted_start)
+        self._trusted_start = False
 
     def _forget(self) -> None:
         """The person is gone: whoever comes next moves and looks otherwise."""
@@ -127,16 +127,16 @@ class FrontEnd:
             "_frozen": copy(self._frozen),
             "_gate": copy(self._gate),
             "search": copy(self.search),
-            "_vouched": self._vouched,
+            "_trusted_start": self._trusted_start,
         }
 
     def frame(self, recorded: RecordedFrame) -> Frame:
         """The tracker's frame, without stepping; a tracker without a pose is put where a source of first poses finds one."""
         use = self.settings.use
         alive = self._frozen.without(recorded.measurements, use=use)
-        if self.search.wanted(recorded.stamp):
+        if self.search.is_due(recorded.stamp):
             used = [item for item in alive if any(adapter.kind in use for adapter in adapters_of(item))]
-            if self.search.look(recorded.stamp, used, self.settings):
+            if self.search.search(recorded.stamp, used, self.settings):
                 self._begin()
         frame = Frame(stamp=recorded.stamp)
         for low, high in self.settings.exclude:

@@ -88,7 +88,7 @@ def follow(
     options: Options | None = None,
     warm: bool = True,
     rest: bool = True,
-    watched: Callable[[Iterable[RecordedFrame]], Iterable[RecordedFrame]] = iter,
+    wrap: Callable[[Iterable[RecordedFrame]], Iterable[RecordedFrame]] = iter,
 ) -> tuple[Track, dict[str, FloatArray]]:
     """Postures of all frames from the known sites and the silhouettes.
 
@@ -100,7 +100,7 @@ def follow(
             skullbase where hands and head are lacking.
         pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
             last posture, or stands before the still scene; "color" by the difference from the still background; "regions" by
-            colours, learnt where the person was, near the posture that the known sites have alone; "none": plain inverse
+            colors, learned where the person was, near the posture that the known sites have alone; "none": plain inverse
             kinematics.
         options: see voodoo.ik.Options.
         warm: start each frame from the posture before; else solve it by itself, from the first pose.
@@ -132,7 +132,7 @@ def follow(
     follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
     scenes = {} if pictures in ("none", "regions") else _scenes(recording, positions, known, pictures)
     regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
-    seen_poses: Mapping[str, npt.ArrayLike] = tracker.estimate.world_from_limb
+    current_poses: Mapping[str, npt.ArrayLike] = tracker.estimate.world_from_limb
     near: FloatArray | Posture = start
     others = [name for name in there if name not in known]
     postures: list[Posture] = []
@@ -140,23 +140,23 @@ def follow(
     last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
     level = recording.root_frame in LEVEL_FRAMES
     try:
-        for recorded in watched(recording):
+        for recorded in wrap(recording):
             targets = positions.at(recorded.stamp, known)
-            seen = {**last, **targets} if warm else targets
-            images = _silhouettes(recorded, seen, scenes, level=level) if targets else []
-            colours = [item for item in recorded.measurements if isinstance(item, ColorImage)] if regions else []
+            observed = {**last, **targets} if warm else targets
+            images = _silhouettes(recorded, observed, scenes, level=level) if targets else []
+            colors = [item for item in recorded.measurements if isinstance(item, ColorImage)] if regions else []
             if regions is not None and targets:
                 # The first frame is the one whose posture is known.
                 if postures:
-                    seen_poses = solve(chain, targets, start=near, options=options).world_from_limb
-                images = _cut_out(regions, colours, seen_poses)
+                    current_poses = solve(chain, targets, start=near, options=options).world_from_limb
+                images = _cut_out(regions, colors, current_poses)
             if warm:
                 posture = follower.step(targets, images=images)
             else:
                 posture = solve(chain, targets, images=images, start=start, options=options)
             last, near = posture.joints, posture
             if regions is not None and targets:
-                regions.learn(colours, posture.world_from_limb)
+                regions.learn(colors, posture.world_from_limb)
             truth = positions.at(recorded.stamp, others)
             off = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
             rows.append([off.get(name, float("nan")) for name in others])
@@ -217,7 +217,7 @@ def _silhouettes(
 def _cut_out(
     regions: RegionSilhouettes, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
 ) -> list[Silhouette]:
-    """Silhouettes of all pictures by their colours, near a posture."""
+    """Silhouettes of all pictures by their colors, near a posture."""
     found = zip(regions.of(pictures, world_from_limb), pictures, strict=True)
     return [Silhouette(mask, camera=camera, world_from_camera=item.root_from_sensor) for (mask, camera), item in found]
 
@@ -228,7 +228,7 @@ def _scenes(
     """What each camera sees without the person, from pictures spread over the recording; cameras are taken to stand still."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
     depths: dict[str, list[DepthImage]] = {}
-    colours: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}
+    colors: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}
     for index, recorded in enumerate(recording):
         if index not in chosen:
             continue
@@ -237,10 +237,10 @@ def _scenes(
                 depths.setdefault(item.sensor, []).append(item)
             elif pictures == "color" and isinstance(item, ColorImage):
                 there = surroundings(positions.at(recorded.stamp, known), item.camera, item.root_from_sensor)
-                colours.setdefault(item.sensor, []).append((item.image, there))
-    if not depths and not colours:
+                colors.setdefault(item.sensor, []).append((item.image, there))
+    if not depths and not colors:
         raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")
     scenes: dict[str, StillScene | StillBackground] = {name: StillScene(images) for name, images in depths.items()}
-    for name, pairs in colours.items():
+    for name, pairs in colors.items():
         scenes[name] = StillBackground([image for image, _ in pairs], occupied=[there for _, there in pairs])
     return scenes

@@ -13,7 +13,7 @@ from voodoo.recordings.recording import Recording
 def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFrame]:
     """The frames of a recording, each with the measurements that follow it within `wait` seconds.
 
-    A colour picture taken a few milliseconds after a depth image belongs to it, not to the next one a whole period
+    A color picture taken a few milliseconds after a depth image belongs to it, not to the next one a whole period
     later; the price is a latency of at most `wait`. The stamp of a frame stays that of its own measurement. Frames that are
     complete stay as they are.
 

@@ -24,7 +24,7 @@ from voodoo.tracker import Tracker
 
 
 class PeopleFrontEnd:
-    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in colour, keypoints, skin.
+    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in color, keypoints, skin.
 
     Args:
         people: who is followed.
@@ -60,10 +60,10 @@ class PeopleFrontEnd:
     def frame(self, recorded: RecordedFrame) -> Frame:
         """The frame of all persons, without stepping."""
         chosen = self.settings
-        colored = self.people.wants_color
-        looked_at = colored or self.own.skin
+        colored = self.people.needs_color
+        colors_needed = colored or self.own.skin
         alive = self._alive = self._frozen.without(
-            recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not looked_at
+            recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not colors_needed
         )
         frame = Frame(stamp=recorded.stamp)
         for low, high in chosen.exclude:

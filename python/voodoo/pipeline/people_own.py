@@ -13,11 +13,11 @@ from voodoo._core import Frame
 from voodoo.errors import MeasurementError
 from voodoo.measurements import ColorImage, DepthImage, KeypointImage
 from voodoo.people import Followed, People, PeopleEstimate
-from voodoo.pipeline.starts.base import Seen
+from voodoo.pipeline.starts.base import StartFrame
 from voodoo.pipeline.starts.cameras import everybody
 from voodoo.sensors.adapters import Adapter, Context, Memory, adapters_of
 from voodoo.sensors.gating import SiteGate
-from voodoo.sensors.keypoints.people import shared_out
+from voodoo.sensors.keypoints.people import assign_keypoints
 from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.rays import add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
@@ -72,11 +72,11 @@ class PeopleOwn:
         depths = [item for item in used if isinstance(item, DepthImage)]
         self._cameras.update(item.sensor for item in images)
         predicted = {number: Followed(self._people, number).predict(stamp) for number in self._persons}
-        shared = [shared_out(item, predicted) for item in images]
-        pictures = {number: [each.of[number] for each in shared if number in each.of] for number in predicted}
-        for number, joints in self._come(stamp, [each.rest for each in shared], predicted).items():
+        assigned = [assign_keypoints(item, predicted) for item in images]
+        pictures = {number: [each.of[number] for each in assigned if number in each.of] for number in predicted}
+        for number, joints in self._come(stamp, [each.rest for each in assigned], predicted).items():
             predicted[number] = dict(joints)
-            rest = [shared_out(each.rest, {number: joints}).of for each in shared]
+            rest = [assign_keypoints(each.rest, {number: joints}).of for each in assigned]
             pictures[number] = [of[number] for of in rest if number in of]
         frames = {}
         for number, items in pictures.items():
@@ -93,7 +93,7 @@ class PeopleOwn:
             person = self._persons.setdefault(number, self._new())
             for item in pictured:
                 for adapter in _own_adapters(item, self._settings):
-                    adapter.learn(item, found, person.memory, vouched=False)
+                    adapter.learn(item, found, person.memory, trusted_start=False)
 
     @property
     def skin(self) -> bool:
@@ -112,7 +112,7 @@ class PeopleOwn:
         if sum(bool(item.people) for item in rest) < least:
             return {}
         come: dict[int, Mapping[str, FloatArray]] = {}
-        for found in everybody(Seen(stamp, rest, self._people.prototype, self._settings), cameras=least):
+        for found in everybody(StartFrame(stamp, rest, self._people.prototype, self._settings), cameras=least):
             middle = np.mean(list(found.joints.values()), axis=0)
             roots = [joints[_ROOT] for joints in [*predicted.values(), *come.values()] if _ROOT in joints]
             if any(np.linalg.norm((middle - root)[:2]) < _SAME_M for root in roots):
@@ -157,7 +157,7 @@ class PeopleOwn:
 
 
 def _own_adapters(item: KeypointImage | ColorImage, settings: FrontEndSettings) -> list[Adapter[Any]]:
-    """Adapters of what is one person's: colour regions are everybody's."""
+    """Adapters of what is one person's: color regions are everybody's."""
     return [
         adapter
         for adapter in adapters_of(item)

@@ -9,7 +9,7 @@ import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
 from voodoo.names import SEARCHING
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder
+from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.pipeline.starts.chosen import Starts, automatic_starts
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
@@ -38,7 +38,7 @@ class Search:
         self._tracker = tracker
         self._starts = starts or automatic_starts()
         self.posed = bool(tracker.estimate.joints)
-        self.found: Found | None = None
+        self.found: FoundStart | None = None
         self._supported: float | None = None
 
     def __copy__(self) -> Search:
@@ -47,21 +47,21 @@ class Search:
         vars(twin).update(vars(self))
         return twin
 
-    def look(self, stamp: float, measurements: Sequence[Any], settings: FrontEndSettings) -> bool:
+    def search(self, stamp: float, measurements: Sequence[Any], settings: FrontEndSettings) -> bool:
         """Ask the sources, and put the tracker where one of them found somebody; whether one did.
 
         Raises:
             BodyError, MeasurementError: a given pose that is none of this body.
         """
-        seen = Seen(stamp, measurements, self._tracker.body, settings)
+        frame = StartFrame(stamp, measurements, self._tracker.body, settings)
         for finder in self._starts.finders:
-            found = finder.look(seen)
+            found = finder.find(frame)
             if found is not None and self._take(found, finder):
                 self.posed, self.found, self._supported = True, found, None
                 return True
         return False
 
-    def _take(self, found: Found, finder: StartFinder) -> bool:
+    def _take(self, found: FoundStart, finder: StartFinder) -> bool:
         try:
             self._tracker.reset(joints={name: tuple(place) for name, place in found.joints.items()}, fit_sizes=True)
         except MeasurementError:
@@ -70,7 +70,7 @@ class Search:
             return False
         return True
 
-    def wanted(self, stamp: float) -> bool:
+    def is_due(self, stamp: float) -> bool:
         """Whether somebody is looked for at this time [s]: nobody is tracked, or a body that a source found is lost."""
         if not self.posed:
             return True

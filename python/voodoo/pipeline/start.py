@@ -289,7 +289,7 @@ def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] |
             f"{recording.name}: expected a first pose, found none, and by {', '.join(sorted(map(str, kinds)))} alone the body "
             f"{body.name!r} is not found; give a pose with --init FILE, a JSON file like "
             '{"height_m": 1.76, "joints": {"l_shoulder": [x, y, z], "r_hip": [x, y, z], ...}} '
-            f"in metres in the frame {recording.root_frame!r}"
+            f"in meters in the frame {recording.root_frame!r}"
         )
 
 

@@ -33,7 +33,7 @@ class Calibration:
 
 @dataclass(frozen=True, eq=False)
 class FolderCalibration:
-    """Cameras of a folder; `depth_factor` is units per metre of the depth images."""
+    """Cameras of a folder; `depth_factor` is units per meter of the depth images."""
 
     root_frame: str
     depth_factor: float
@@ -48,7 +48,7 @@ fx = 525.0              # pixels: focal lengths and principal point of this came
 fy = 525.0
 cx = {cx}
 cy = {cy}
-depth_factor = 1000.0   # units per metre: 1000 where images are in millimetres, 5000 in the TUM RGB-D benchmark
+depth_factor = 1000.0   # units per meter: 1000 where images are in millimeters, 5000 in the TUM RGB-D benchmark
 sensor_frame = "camera_depth_optical_frame"
 """
 
@@ -82,7 +82,7 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
     depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
     factor = content.get("depth_factor", 5000.0)
     if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0.0 < factor < 1e9:
-        raise RecordingError(f"{path}: depth_factor: expected units per metre > 0, found {short(factor)}")
+        raise RecordingError(f"{path}: depth_factor: expected units per meter > 0, found {short(factor)}")
     color = None
     if "color" in content:
         table = content["color"]

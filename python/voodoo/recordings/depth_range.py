@@ -11,7 +11,7 @@ from voodoo.errors import VoodooError
 from voodoo.measurements import DepthImage
 from voodoo.recordings.recording import Recording
 
-_LOOK = 5
+_IMAGES = 5
 """Images at the start that are looked at until one shows something."""
 _NEAR_M, _FAR_M = 1.2, 8.0
 """A camera that sees a person sees farther than the first, and sees the nearest half of what it sees before the second."""
@@ -30,12 +30,12 @@ class DepthRange:
         return f"{self.near:.2f} to {self.far:.2f} m (90 % of the first image, half of it before {self.middle:.2f} m)"
 
     @property
-    def doubt(self) -> str:
+    def warning(self) -> str:
         """What is wrong with it where no person is that near or that far; "" otherwise."""
         if self.near < self.far < _NEAR_M or self.middle > _FAR_M:
             return (
                 f"depths of {self.near:.2f} to {self.far:.2f} m leave no room for a person: is the unit right? "
-                "(depth_factor of calibration.toml: 1000 for millimetres; --option metres_per_unit=0.001 of a bag)"
+                "(depth_factor of calibration.toml: 1000 for millimeters; --option meters_per_unit=0.001 of a bag)"
             )
         return ""
 
@@ -43,13 +43,13 @@ class DepthRange:
 def depth_range(recording: Recording) -> DepthRange | None:
     """That of the first depth image in which something is seen; None without one, or where it cannot be read."""
     try:
-        for recorded in islice(recording, _LOOK):
+        for recorded in islice(recording, _IMAGES):
             for item in recorded.measurements:
                 if isinstance(item, DepthImage):
-                    metres = item.image.astype(np.float64).ravel() * item.metres_per_unit
-                    metres = metres[np.isfinite(metres) & (metres > 0.0)]
-                    if metres.size:
-                        near, middle, far = (float(value) for value in np.percentile(metres, (5.0, 50.0, 95.0)))
+                    meters = item.image.astype(np.float64).ravel() * item.meters_per_unit
+                    meters = meters[np.isfinite(meters) & (meters > 0.0)]
+                    if meters.size:
+                        near, middle, far = (float(value) for value in np.percentile(meters, (5.0, 50.0, 95.0)))
                         return DepthRange(near, middle, far)
     except VoodooError:
         return None  # whoever reads on is told

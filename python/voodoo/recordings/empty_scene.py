@@ -82,9 +82,9 @@ def read_pictures(
 
 def no_pictures(folder: str | Path, cameras: Mapping[str, Sequence[str]]) -> RecordingError:
     """The error of a folder that was named and holds no camera's pictures."""
-    told = "; ".join(f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()) or "no camera"
+    listed = "; ".join(f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()) or "no camera"
     return RecordingError(
-        f"{folder}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({told}), found none"
+        f"{folder}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({listed}), found none"
     )
 
 
@@ -92,5 +92,5 @@ def scene_words(folder: Path | None, files: Mapping[str, Sequence[Path]]) -> tup
     """What is known of the empty scene, in words; () without a folder of pictures."""
     if folder is None:
         return ()
-    told = ", ".join(f"{sensor} {len(paths)}" for sensor, paths in files.items()) or "none that belongs to a camera"
-    return (f"pictures of the empty scene in {folder}: {told}",)
+    listed = ", ".join(f"{sensor} {len(paths)}" for sensor, paths in files.items()) or "none that belongs to a camera"
+    return (f"pictures of the empty scene in {folder}: {listed}",)

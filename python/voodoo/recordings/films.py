@@ -19,7 +19,7 @@ from voodoo.measurements import ColorImage
 from voodoo.model.camera import Camera
 from voodoo.recordings.camera_files import PlacedCamera
 from voodoo.recordings.empty_scene import PICTURES
-from voodoo.recordings.folder import Clock
+from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.pictures import decode_color, picture_size
 from voodoo.recordings.stored import check_stored, read_stored
 
@@ -93,9 +93,9 @@ class Video(Pictures):
         film = _opened(path)
         count = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
         size = (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
-        told = float(film.get(cv2.CAP_PROP_FPS))
+        stored_rate = float(film.get(cv2.CAP_PROP_FPS))
         film.release()
-        rate = told if rate is None else rate
+        rate = stored_rate if rate is None else rate
         # A picture takes a byte at least: a damaged head may announce billions.
         if not (0 < count <= path.stat().st_size and np.isfinite(rate) and 0.0 < rate < 1e5):
             raise RecordingError(f"{path}: expected pictures at a rate above zero, found {count} at {rate} a second")
@@ -119,7 +119,7 @@ class PictureFolder(Pictures):
         RecordingError: the first picture cannot be read or has another size than calibrated, or two have one stamp.
     """
 
-    def __init__(self, files: Sequence[Path], sensor: str, placed: PlacedCamera, clock: Clock) -> None:
+    def __init__(self, files: Sequence[Path], sensor: str, placed: PlacedCamera, clock: FrameClock) -> None:
         """Find the stamps; see the class."""
         first = min(files)
         super().__init__(sensor, placed, picture_size(read_stored(first, "a readable picture"), first))

@@ -40,24 +40,24 @@ class FolderRecording(Recording):
 
         depth/1305031102.160407.png   16-bit PNGs named by their stamp in seconds, or numbered (00000.png)
         depth.txt                     optional: lines "stamp depth/name.png", # starts a comment; then names are free
-        rgb/, rgb.txt                 optional: the same for colour (PNG or JPEG)
+        rgb/, rgb.txt                 optional: the same for color (PNG or JPEG)
         calibration.toml              the camera
         truth.csv                     optional: exact joint positions in the root frame, as beside a rendered bag
         init.json                     optional: where the person is in the first frame, as --init reads it
 
-    There is one frame for each depth image, holding the colour images since the previous one. A groundtruth.txt (the
+    There is one frame for each depth image, holding the color images since the previous one. A groundtruth.txt (the
     camera's path, in that benchmark) is not used. calibration.toml::
 
         width = 640
         height = 480
-        fx = 525.0                     # pixels; integer pixel coordinates are pixel centres
+        fx = 525.0                     # pixels; integer pixel coordinates are pixel centers
         fy = 525.0
         cx = 319.5
         cy = 239.5
         # all that follows is optional
         distortion = []                # OpenCV order
         model = "plumb_bob"            # or rational_polynomial, equidistant
-        depth_factor = 5000.0          # units per metre
+        depth_factor = 5000.0          # units per meter
         sensor_frame = "camera_depth_optical_frame"
         root_frame = "base_link"       # default: sensor_frame
         root_from_sensor = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]]   # default: identity
@@ -93,7 +93,9 @@ class FolderRecording(Recording):
         self.path = path
         self.name = path.resolve().name
         self._left_out = left_out
-        clock = Clock(None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4))
+        clock = FrameClock(
+            None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
+        )
         self._depth = _listing(path, "depth", (".png",), clock, left_out)
         if not self._depth:
             raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
@@ -176,7 +178,7 @@ class FolderRecording(Recording):
         )
 
 
-class Clock:
+class FrameClock:
     """Stamps from the names of files.
 
     Args:
@@ -206,13 +208,13 @@ class Clock:
         if not digits or max(numbers) > _MOST_NUMBERED:
             return numbers
         rate = self._rate or _RATE
-        told = f"{files[0].parent.name}/ is numbered, and taken for {rate:g} images/s"
-        self.notes += [told if self._rate else f"{told}; --option rate=N says another rate"]
+        message = f"{files[0].parent.name}/ is numbered, and taken for {rate:g} images/s"
+        self.notes += [message if self._rate else f"{message}; --option rate=N says another rate"]
         return [number / rate for number in numbers]
 
 
 def _listing(
-    path: Path, name: str, suffixes: tuple[str, ...], clock: Clock, left_out: LeftOut | None
+    path: Path, name: str, suffixes: tuple[str, ...], clock: FrameClock, left_out: LeftOut | None
 ) -> list[tuple[float, Path]]:
     """(stamp, file) of NAME.txt, else of the files in NAME/."""
     table = path / f"{name}.txt"

@@ -66,7 +66,7 @@ class Joined(Recording):
 
     def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
         """Those of all recordings."""
-        return {name: seen for one in (*self._others, self._first) for name, seen in one.empty_scene().items()}
+        return {name: observed for one in (*self._others, self._first) for name, observed in one.empty_scene().items()}
 
     def info(self) -> RecordingInfo:
         """That of the first, with the sensors of all."""
@@ -102,7 +102,7 @@ class WithKeypoints(Recording):
     """A recording whose pictures come with the keypoints that a network found in them.
 
     Args:
-        recording: with colour or depth images.
+        recording: with color or depth images.
         folders: sensor -> folder of OpenPose JSON files, one for each of its images, sorted by name.
         layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
         left_out: of the recording, see open_recording.

@@ -27,8 +27,8 @@ def read_positions(path: Path, first: tuple[str, ...]) -> tuple[tuple[str, ...],
     header = rows[0]
     names = tuple(cell.removesuffix("_x") for cell in header[len(first) :: 3])
     if header != [*first, *(f"{name}_{axis}" for name in names for axis in "xyz")] or len(set(names)) != len(names):
-        wanted = ", ".join((*first, "NAME_x", "NAME_y", "NAME_z", "..."))
-        raise RecordingError(f"{path}: expected columns {wanted}, found {header[: len(first) + 3]}...")
+        expected = ", ".join((*first, "NAME_x", "NAME_y", "NAME_z", "..."))
+        raise RecordingError(f"{path}: expected columns {expected}, found {header[: len(first) + 3]}...")
     table = np.empty((len(rows) - 1, len(header)))
     for index, row in enumerate(rows[1:]):
         where = f"{path}, line {index + 2}"

@@ -18,11 +18,11 @@ _JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "k
 
 
 @dataclass(frozen=True)
-class Part:
+class SiteKeypoints:
     """A site and the keypoints it is made of."""
 
     site: str
-    shares: Mapping[int, float]
+    weights: Mapping[int, float]
     spread: float
 
 
@@ -31,13 +31,13 @@ class Layout:
     """A network's keypoints: how many, and which sites they give."""
 
     count: int
-    parts: tuple[Part, ...]
+    parts: tuple[SiteKeypoints, ...]
 
 
-def _parts(left: Mapping[str, int], right: Mapping[str, int]) -> list[Part]:
+def _parts(left: Mapping[str, int], right: Mapping[str, int]) -> list[SiteKeypoints]:
     rows = []
     for prefix, indices in (("l_", left), ("r_", right)):
-        rows += [Part(prefix + name, {index: 1.0}, _JOINT_SPREAD[name]) for name, index in indices.items()]
+        rows += [SiteKeypoints(prefix + name, {index: 1.0}, _JOINT_SPREAD[name]) for name, index in indices.items()]
     return rows
 
 
@@ -55,14 +55,14 @@ def _body_25(start: Mapping[str, int], *, toe: int) -> dict[str, int]:
     return {**rows, "toe": toe}
 
 
-def _ears(left: int, right: int) -> Part:
+def _ears(left: int, right: int) -> SiteKeypoints:
     # The middle of the ears is the middle of the head, from every side.
-    return Part("head_center", {left: 0.5, right: 0.5}, 0.06)
+    return SiteKeypoints("head_center", {left: 0.5, right: 0.5}, 0.06)
 
 
-def _palm(side: str, wrist: int, little: int, index: int) -> Part:
-    # The palm's centre lies between the wrist and the knuckles of the little and the index finger.
-    return Part(f"{side}_hand", {wrist: 0.4, little: 0.3, index: 0.3}, 0.02)
+def _palm(side: str, wrist: int, little: int, index: int) -> SiteKeypoints:
+    # The palm's center lies between the wrist and the knuckles of the little and the index finger.
+    return SiteKeypoints(f"{side}_hand", {wrist: 0.4, little: 0.3, index: 0.3}, 0.02)
 
 
 _COCO_LEFT, _COCO_RIGHT = _joints("left", 5)
@@ -84,8 +84,8 @@ LAYOUTS: dict[str, Layout] = {
         (
             *_parts({**_COCO_LEFT, "toe": 19}, {**_COCO_RIGHT, "toe": 22}),
             _ears(3, 4),
-            Part("skullbase", {17: 1.0}, 0.05),
-            Part("skull_tip", {18: 1.0}, 0.05),
+            SiteKeypoints("skullbase", {17: 1.0}, 0.05),
+            SiteKeypoints("skull_tip", {18: 1.0}, 0.05),
         ),
     ),
     # MediaPipe: 33 landmarks; ears 7 and 8; knuckles of little and index finger from 17
@@ -107,8 +107,8 @@ LAYOUTS: dict[str, Layout] = {
         (
             *_parts({**_COCO_LEFT, "toe": 20}, {**_COCO_RIGHT, "toe": 21}),
             _ears(3, 4),
-            Part("skull_tip", {17: 1.0}, 0.05),
-            Part("vc7", {18: 1.0}, 0.05),
+            SiteKeypoints("skull_tip", {17: 1.0}, 0.05),
+            SiteKeypoints("vc7", {18: 1.0}, 0.05),
         ),
     ),
     # pelvis, right leg, left leg, spine, thorax (8), nose (9), top of the head (10), left arm, right arm
@@ -119,9 +119,9 @@ LAYOUTS: dict[str, Layout] = {
                 {"hip": 4, "knee": 5, "ankle": 6, "shoulder": 11, "elbow": 12, "wrist": 13},
                 {"hip": 1, "knee": 2, "ankle": 3, "shoulder": 14, "elbow": 15, "wrist": 16},
             ),
-            Part("humanoid_root", {0: 1.0}, 0.04),
-            Part("vc7", {8: 1.0}, 0.05),
-            Part("skull_tip", {10: 1.0}, 0.05),
+            SiteKeypoints("humanoid_root", {0: 1.0}, 0.04),
+            SiteKeypoints("vc7", {8: 1.0}, 0.05),
+            SiteKeypoints("skull_tip", {10: 1.0}, 0.05),
         ),
     ),
 }

@@ -124,8 +124,8 @@ def open_recording(
         options["left_out"] = left_out
     unknown = sorted(set(options) - set(known))
     if unknown:
-        told = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
-        raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {told}")
+        message = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
+        raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {message}")
     recording = LOADERS[name].open(path, **options)
     found = getattr(recording, "loader", name)  # a bag tells itself which of the two it is
     if found != name:
@@ -163,7 +163,7 @@ def guess_loader(path: Path) -> str:
             return "folder"
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
             raise RecordingError(
-                f"{path}: expected depth images in depth/, found colour alone; depth of the same camera is needed, or several "
+                f"{path}: expected depth images in depth/, found color alone; depth of the same camera is needed, or several "
                 "calibrated cameras (a folder with their videos and Calib*.toml); docs/how-to/color.md says how"
             )
         cameras = _of_cameras(path)

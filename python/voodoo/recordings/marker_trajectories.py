@@ -25,7 +25,7 @@ X, Y).
 
 It is Pose2Sim's convention; it keeps right-handedness, not the direction a person faces."""
 
-_METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
+_METERS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,7 +94,7 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
     try:
         rate, frames, markers = float(header["DataRate"]), int(header["NumFrames"]), int(header["NumMarkers"])
-        unit = _METRES[header["Units"].strip()]
+        unit = _METERS[header["Units"].strip()]
     except (KeyError, ValueError) as error:
         raise RecordingError(
             f"{path}, line 3: expected DataRate, NumFrames, NumMarkers and Units (m, cm, mm), found {header}"
@@ -150,13 +150,13 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         rate, first = float(reader.point_rate), int(reader.first_frame)
     count = len(frames[0]) if frames else 0
     names = names[:count]
-    if not count or unit not in _METRES or not 0.0 < rate < math.inf or len(set(names)) != count:
+    if not count or unit not in _METERS or not 0.0 < rate < math.inf or len(set(names)) != count:
         raise RecordingError(
             f"{path}: expected named points in m, cm or mm at a rate above zero, found {count} points with "
             f"{len(set(names))} names in {shortened(repr(unit))} at {rate} Hz"
         )
     table = np.array(frames)
-    positions = table[:, :, :3] * _METRES[unit]
+    positions = table[:, :, :3] * _METERS[unit]
     positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not seen
     stamps = (first + np.arange(len(table))) / rate
     return _trajectories(path, stamps, names, positions, rate, world_from_file)

@@ -1,6 +1,6 @@
 """Decoding of stored pictures that refuses damaged ones.
 
-OpenCV fills what it cannot read with grey or black and says nothing, so the container is checked first.
+OpenCV fills what it cannot read with gray or black and says nothing, so the container is checked first.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.
         size: expected (width, height).
 
     Raises:
-        RecordingError: damaged, not 16-bit grey, or of another size.
+        RecordingError: damaged, not 16-bit gray, or of another size.
     """
     check_png(data, source)
     check_size(data, source, size)

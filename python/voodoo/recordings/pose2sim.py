@@ -40,7 +40,7 @@ FRAME = "world"
 class Pose2SimRecording(Recording):
     """A folder of Pose2Sim::
 
-        Calib_*.toml                     cameras, see read_camera_toml; world Z up, metres; or in calibration/, ../calibration/
+        Calib_*.toml                     cameras, see read_camera_toml; world Z up, meters; or in calibration/, ../calibration/
         keypoints/cam01_json/*.json      OpenPose files, one an image, sorted by name; or pose/cam01_json as Pose2Sim has it
         *.trc                            optional: triangulated joints, Y up
 
@@ -173,7 +173,7 @@ size = [1920.0, 1080.0]                     # pixels
 matrix = [[1500.0, 0.0, 959.5], [0.0, 1500.0, 539.5], [0.0, 0.0, 1.0]]
 distortions = [0.0, 0.0, 0.0, 0.0]          # as OpenCV has them
 rotation = [1.57, 0.0, 0.0]                 # camera from world, Rodrigues vector in radians
-translation = [0.0, 1.0, 3.0]               # camera from world, metres
+translation = [0.0, 1.0, 3.0]               # camera from world, meters
 """
 
 
@@ -189,8 +189,8 @@ def calibration_of(path: Path, names: Sequence[str] = ()) -> Path:
         hint = (
             f"Write {path / 'Calib.toml'} with the numbers of the cameras:\n\n{tables}" if names and not found else ""
         )
-        told = "one Calib*.toml, the calibration of the cameras"
-        raise RecordingError(f"{path}: expected {told}, found {len(found) or 'none'}", hint=hint)
+        message = "one Calib*.toml, the calibration of the cameras"
+        raise RecordingError(f"{path}: expected {message}, found {len(found) or 'none'}", hint=hint)
     return found[0]
 
 

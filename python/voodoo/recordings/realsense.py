@@ -1,6 +1,6 @@
 """What is peculiar about the .bag of librealsense's recorder (2.55): see docs/how-to/cameras.md.
 
-After every image four bytes follow (float32, metres of a unit of depth); calibration lies on `.../Depth_0/info/camera_info`;
+After every image four bytes follow (float32, meters of a unit of depth); calibration lies on `.../Depth_0/info/camera_info`;
 frame ids are numbers, and the pose of a stream is on `.../Depth_0/tf/N`, where N numbers what the poses are relative to.
 The .db3 of later recorders is a bag like others, but for the lens models: their names stand in strings only.
 """

@@ -77,7 +77,7 @@ class RecordingInfo:
         rate_hz: mean frame rate, NaN with less than two frames.
         root_frame: frame of all `root_from_sensor` and of the reference.
         sensors: what is yielded; the first one makes the frames.
-        unused: (topic, reason) of what was recognised but is not yielded.
+        unused: (topic, reason) of what was recognized but is not yielded.
         reference: words on the reference, or "none".
         notes: what to mind about this kind of recording.
     """
@@ -193,8 +193,8 @@ def refuse_blank(item: DepthImage, where: object) -> None:
         RecordingError: it is blank.
     """
     image = item.image
-    seen = image.any() if image.dtype.kind == "u" else (np.isfinite(image) & (image > 0.0)).any()
-    if not seen:
+    observed = image.any() if image.dtype.kind == "u" else (np.isfinite(image) & (image > 0.0)).any()
+    if not observed:
         raise RecordingError(
             f"{where}, stamp {item.stamp:.6f}: expected depths, found a blank image", reason="that are blank"
         )

@@ -38,25 +38,25 @@ from voodoo.recordings.ros_messages import (
     scan_fields,
     stamp_of,
 )
-from voodoo.recordings.ros_topics import COMPRESSED, Source, TopicChoice, TopicFinder
+from voodoo.recordings.ros_topics import COMPRESSED, TopicChoice, TopicFinder, TopicSource
 from voodoo.recordings.together import together
 from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
 
-_MILLIMETRE = 0.001
+_MILLIMETER = 0.001
 STILL_FRAMES = ("odom", "map")
 """Where a robot that moves says it is (REP-105): smoothly, and without drift but with jumps."""
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class RosRecording(Recording):
-    """A ROS bag: depth images, clouds, laser scans and colour images in one root frame.
+    """A ROS bag: depth images, clouds, laser scans and color images in one root frame.
 
     There is one frame for each depth image (without depth: for each cloud, else each scan, else each picture of the first
     camera); it also holds what was recorded since the previous one. Where there is nothing but pictures, those of all cameras
     are used, and a frame holds those taken within half an interval of the first camera's. What comes after the last frame is
     not yielded. Stamps are header stamps in seconds; double precision keeps them to about 0.2 microseconds. Messages are read
-    while iterating and colour is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover`
+    while iterating and color is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover`
     repair it), as is one whose index announces other messages than it holds.
 
     truth.csv, truth_people.csv and init.json in the bag's folder or the one above become `reference`, `people` and `start`,
@@ -73,7 +73,7 @@ class RosRecording(Recording):
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
         root_frame: by default odom, else map, where base_link moves in it; else base_link, or else world, if the bag's
             transforms know it, else the frame of the first sensor.
-        metres_per_unit: of 16-bit depth images; None: what a bag of librealsense's recorder tells, else 0.001.
+        meters_per_unit: of 16-bit depth images; None: what a bag of librealsense's recorder tells, else 0.001.
         tf_max_age: how old a changing transform may be [s].
         background: folder of pictures of the empty scene, instead of the one beside the bag.
         bare: read neither reference nor start.
@@ -94,7 +94,7 @@ class RosRecording(Recording):
         color_topic: TopicChoice = None,
         camera_info_topic: str | None = None,
         root_frame: str | None = None,
-        metres_per_unit: float | None = None,
+        meters_per_unit: float | None = None,
         tf_max_age: float = 0.5,
         background: str | Path | None = None,
         bare: bool = False,
@@ -104,8 +104,8 @@ class RosRecording(Recording):
         if isinstance(use, str) or not use or not set(use) <= set(TOPIC_KINDS):
             raise RecordingError(f"use: expected a tuple of some of {', '.join(TOPIC_KINDS)}, found {use!r}")
         self.path = path
-        scale = _MILLIMETRE if metres_per_unit is None else metres_per_unit
-        scale = number_option(path, "metres_per_unit", scale, "a length > 0", most=1e3)
+        scale = _MILLIMETER if meters_per_unit is None else meters_per_unit
+        scale = number_option(path, "meters_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
         self._info: RecordingInfo | None = None
@@ -120,7 +120,7 @@ class RosRecording(Recording):
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
         sources = finder.find(use)
         self._unused = finder.unused
-        self._units = {s.topic: self._unit(s.topic, scale, told=metres_per_unit is not None) for s in sources}
+        self._units = {s.topic: self._unit(s.topic, scale, given=meters_per_unit is not None) for s in sources}
         self._tree = TransformTree(path, max_age=max_age)
         self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
@@ -226,10 +226,10 @@ class RosRecording(Recording):
             notes=(*self.assumed, *scene_words(self._background, self._background_files())),
         )
 
-    def _unit(self, topic: str, otherwise: float, *, told: bool) -> float:
-        """Metres of a unit of 16-bit depth: what librealsense's recorder wrote, unless somebody tells."""
+    def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
+        """Meters of a unit of 16-bit depth: what librealsense's recorder wrote, unless somebody tells."""
         units = realsense.units_topic(topic)
-        if told or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
+        if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
         with reading(f"{self.path}, topic {units}", "a readable message"):
             return number_option(
@@ -253,7 +253,7 @@ class RosRecording(Recording):
                     raise
                 self.assumed = (*self.assumed, f"{file} is not used: {error}")
 
-    def _read_transforms(self, asked: str | None, sources: Sequence[Source]) -> str:
+    def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the tree and choose the root frame."""
         self._read_recorders_transforms()
         names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
@@ -295,7 +295,7 @@ class RosRecording(Recording):
                     stream_from_reference = matrix(pose.translation, pose.rotation, where)
                 self._tree.add_edge(*frames, 0.0, stream_from_reference, static=True)
 
-    def _check_together(self, sources: Sequence[Source]) -> None:
+    def _check_together(self, sources: Sequence[TopicSource]) -> None:
         """Refuse pictures of several cameras of which nobody tells how they stand to each other; tell what is left out."""
         if len(self._sources) == 1:
             raise RecordingError(
@@ -323,7 +323,7 @@ class RosRecording(Recording):
         cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
         return read_pictures(self._background_files(), cameras, left_out=self._left_out)
 
-    def _connected(self, source: Source, *, optional: bool) -> bool:
+    def _connected(self, source: TopicSource, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver
         if optional and not self._tree.reaches(self.root_frame, source.frame):
             self._unused.append((source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
@@ -361,7 +361,7 @@ class RosRecording(Recording):
                         f"{self.path}, topic {topic}: expected one calibration, found {camera} after {source.camera}"
                     )
 
-    def _measurement(self, source: Source, message: Message, stamp: float, where: str) -> Measurement:
+    def _measurement(self, source: TopicSource, message: Message, stamp: float, where: str) -> Measurement:
         root_from_sensor = self._tree.lookup(self.root_frame, self._bag.frame_of(source.topic, message), stamp)
         camera, compressed = source.camera, source.type == COMPRESSED
         if source.kind == "scan":

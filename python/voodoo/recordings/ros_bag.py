@@ -264,15 +264,15 @@ def zip_members(path: Path) -> list[str]:
 def _unpack(path: Path, folder: Path) -> None:
     with reading(path, "a complete .zip file"), zipfile.ZipFile(path) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
-        wanted = [member for member in members if _is_of_bag(PurePosixPath(member.filename).name)]
-        unpacked, packed = sum(member.file_size for member in wanted), path.stat().st_size
+        requested = [member for member in members if _is_of_bag(PurePosixPath(member.filename).name)]
+        unpacked, packed = sum(member.file_size for member in requested), path.stat().st_size
         room = min(_MOST_UNPACKED, shutil.disk_usage(folder).free)
         if unpacked > room or unpacked > _LITTLE + _MOST_GAIN * packed:
             raise RecordingError(
                 f"{path}: expected an archive that unpacks to at most {min(room, _LITTLE + _MOST_GAIN * packed)} bytes, "
                 f"found {unpacked}"
             )
-        for member in wanted:
+        for member in requested:
             name = PurePosixPath(member.filename).name
             if (folder / name).exists():
                 raise RecordingError(f"{path}: expected one bag, found several files named {name}")

@@ -22,7 +22,7 @@ DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
     "mono16": np.dtype(np.uint16),
     "32FC1": np.dtype(np.float32),
 }
-"""16-bit depth counts millimetres (REP-118), 32-bit float depth metres."""
+"""16-bit depth counts millimeters (REP-118), 32-bit float depth meters."""
 COLOR_CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "8UC3": 3, "8UC4": 4, "mono8": 1, "8UC1": 1}
 
 # sensor_msgs/PointField: INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64
@@ -133,7 +133,7 @@ def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.
     channels = COLOR_CHANNELS.get(message.encoding)
     if channels is None:
         raise RecordingError(
-            f"{source}: expected a colour encoding ({', '.join(COLOR_CHANNELS)}), found {message.encoding!r}"
+            f"{source}: expected a color encoding ({', '.join(COLOR_CHANNELS)}), found {message.encoding!r}"
         )
     _check_size(message.width, message.height, camera, source)
     image = _rows(message, channels, source).reshape(message.height, message.width, channels)
@@ -213,13 +213,13 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
 def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:
     """(H, W * pixel_bytes) bytes without the padding at the end of the rows."""
     height, width, step = int(message.height), int(message.width), int(message.step)
-    wanted = width * pixel_bytes
-    if height < 1 or width < 1 or step < wanted or len(message.data) < step * (height - 1) + wanted:
+    expected = width * pixel_bytes
+    if height < 1 or width < 1 or step < expected or len(message.data) < step * (height - 1) + expected:
         raise RecordingError(
-            f"{source}: expected {height} rows of {wanted} bytes for {width}x{height} {message.encoding}, "
+            f"{source}: expected {height} rows of {expected} bytes for {width}x{height} {message.encoding}, "
             f"found {len(message.data)} bytes in rows of {step}"
         )
-    return np.lib.stride_tricks.as_strided(message.data, (height, wanted), (step, 1))
+    return np.lib.stride_tricks.as_strided(message.data, (height, expected), (step, 1))
 
 
 def _check_size(width: int, height: int, camera: Camera, source: str) -> None:

@@ -34,7 +34,7 @@ _TYPES: dict[TopicKind, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Source:
+class TopicSource:
     """A topic that is read: kind, message type, number of messages, and from its first message the frame id, the
     stamp [s] and a word on the format. `camera` and the topic it came from are set for images."""
 
@@ -52,9 +52,9 @@ class Source:
 class TopicFinder:
     """Chooses topics by type, name and encoding, or as told.
 
-    A kind for which several topics qualify needs a choice; colour beside other kinds, on which nothing depends, is left out
+    A kind for which several topics qualify needs a choice; color beside other kinds, on which nothing depends, is left out
     instead when it is ambiguous or not calibrated, and noted in `unused`. Where there is nothing but pictures, those of all
-    calibrated cameras are used: in colour, or grey ones where none is.
+    calibrated cameras are used: in color, or gray ones where none is.
 
     Args:
         bag: the bag.
@@ -71,13 +71,13 @@ class TopicFinder:
         self._topics = {topic.name: topic for topic in bag.topics}
         self._first: dict[str, Message] = {}
 
-    def find(self, use: Sequence[TopicKind]) -> list[Source]:
+    def find(self, use: Sequence[TopicKind]) -> list[TopicSource]:
         """Sources of the kinds in `use`, the first one making the frames.
 
         Raises:
             RecordingError: nothing usable, an ambiguous choice, a missing calibration or a wrong encoding.
         """
-        sources: list[Source] = []
+        sources: list[TopicSource] = []
         for kind in TOPIC_KINDS:
             if kind not in use:
                 continue
@@ -148,12 +148,12 @@ class TopicFinder:
         self.unused += [(item.split(" ")[0], "not a depth encoding") for item in refused]
         return usable
 
-    def _cameras(self) -> list[Source]:
+    def _cameras(self) -> list[TopicSource]:
         """Pictures of all cameras there are, one topic a camera."""
         names = [topic.name for topic in self.bag.topics if topic.type in _TYPES["color"] and topic.messages]
         names = self._pictures(names, channels=3) or self._pictures(names, channels=1)
         bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
-        found: dict[str, Source] = {}
+        found: dict[str, TopicSource] = {}
         for name in sorted(bases.values(), key=_natural):
             try:
                 source = self._source(name, "color")
@@ -183,14 +183,14 @@ class TopicFinder:
         named = [name for name in usable if "color" in name.lower() or "rgb" in name.lower()]
         return named or usable
 
-    def _same_as_depth(self, source: Source, sources: list[Source]) -> bool:
+    def _same_as_depth(self, source: TopicSource, sources: list[TopicSource]) -> bool:
         """Whether a cloud is a depth image once more: counted twice, it would weigh twice."""
         same = source.kind == "points" and any(s.kind == "depth" and s.frame == source.frame for s in sources)
         if same:
             self.unused.append((source.topic, "same frame as the depth image, hence the same points (points_topic=)"))
         return same
 
-    def _source(self, name: str, kind: TopicKind) -> Source:
+    def _source(self, name: str, kind: TopicKind) -> TopicSource:
         topic, message = self._topics[name], self._message(name)
         camera, info_topic = None, None
         with reading(f"{self.bag.path}, topic {name}", f"a {topic.type} message"):
@@ -204,7 +204,7 @@ class TopicFinder:
             else:
                 detail = f"scan of {len(message.ranges)} rays"
             stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), self.bag.frame_of(name, message)
-        return Source(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
+        return TopicSource(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
 
     def _calibration(self, name: str, kind: TopicKind, frame: str) -> tuple[str, Camera]:
         """CameraInfo beside the image (its name with the last part replaced), or as chosen for depth."""

@@ -48,11 +48,11 @@ def inverse(a_from_b: FloatArray) -> FloatArray:
     return result
 
 
-def between(first: FloatArray, second: FloatArray, share: float) -> FloatArray:
+def between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
     """The rigid transform (4, 4) at a share, 0 to 1, of the way from one to another: straight on, turning evenly."""
     result = np.eye(4)
-    result[:3, :3] = turned_between(first[:3, :3], second[:3, :3], share)
-    result[:3, 3] = (1.0 - share) * first[:3, 3] + share * second[:3, 3]
+    result[:3, :3] = turned_between(first[:3, :3], second[:3, :3], fraction)
+    result[:3, 3] = (1.0 - fraction) * first[:3, 3] + fraction * second[:3, 3]
     return result
 
 
@@ -108,12 +108,12 @@ class TransformTree:
         self.source = source
         self.max_age = max_age
         self._edges: dict[tuple[str, str], _Edge] = {}
-        self._neighbours: dict[str, list[str]] = {}
+        self._neighbors: dict[str, list[str]] = {}
 
     @property
     def frames(self) -> tuple[str, ...]:
         """Names of all frames, sorted."""
-        return tuple(sorted(self._neighbours))
+        return tuple(sorted(self._neighbors))
 
     def add(self, message: Message, *, static: bool) -> None:
         """Take up a tf2_msgs/TFMessage."""
@@ -130,8 +130,8 @@ class TransformTree:
         """Take up parent_from_child (4, 4) at a stamp [s]."""
         if (parent, child) not in self._edges:
             self._edges[parent, child] = _Edge()
-            self._neighbours.setdefault(parent, []).append(child)
-            self._neighbours.setdefault(child, []).append(parent)
+            self._neighbors.setdefault(parent, []).append(child)
+            self._neighbors.setdefault(child, []).append(parent)
         self._edges[parent, child].add(stamp, transform, static=static)
 
     def keep(self, since: float, until: float) -> None:
@@ -166,7 +166,7 @@ class TransformTree:
         queue = deque([root])
         while queue and frame not in previous and root != frame:
             current = queue.popleft()
-            for other in self._neighbours.get(current, ()):
+            for other in self._neighbors.get(current, ()):
                 if other != root and other not in previous:
                     previous[other] = current
                     queue.append(other)
@@ -188,7 +188,7 @@ class TransformTree:
 
     def moves(self, root: str, frame: str) -> bool:
         """Whether a frame moves in another one, by more than odometry wavers while a robot stands; False if not connected."""
-        if not {root, frame} <= self._neighbours.keys():
+        if not {root, frame} <= self._neighbors.keys():
             return False
         try:
             path = self.path(root, frame)
@@ -225,8 +225,8 @@ class TransformTree:
         index = max(bisect_right(edge.stamps, stamp) - 1, 0)
         span = edge.stamps[index + 1] - edge.stamps[index] if index + 1 < len(edge.stamps) else math.inf
         if stamp > edge.stamps[index] and span <= 2.0 * self.max_age:
-            share = (stamp - edge.stamps[index]) / span
-            return between(edge.transforms[index], edge.transforms[index + 1], share)
+            fraction = (stamp - edge.stamps[index]) / span
+            return between(edge.transforms[index], edge.transforms[index + 1], fraction)
         age = stamp - edge.stamps[index]
         if abs(age) > self.max_age:
             raise RecordingError(

@@ -71,13 +71,13 @@ def read_start(path: Path, root_from: RootFromStart) -> Start:
         numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)
         # A whole number of JSON may be larger than any float.
         if not numbers or not all(abs(v) <= sys.float_info.max for v in value):
-            raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in metres, found {short(value)}")
+            raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in meters, found {short(value)}")
         x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value, dtype=np.float64) + root_from_base[:3, 3])
         joints[str(name)] = (x, y, z)
     start = Start(joints=joints)
     height = content.get("height_m")
     if height is not None:
         if not isinstance(height, (int, float)) or not 0.3 < height < 3.0:
-            raise RecordingError(f"{path}: height_m: expected a stature in metres, found {short(height)}")
+            raise RecordingError(f"{path}: height_m: expected a stature in meters, found {short(height)}")
         start["height_m"] = float(height)
     return start

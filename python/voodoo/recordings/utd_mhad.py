@@ -28,7 +28,7 @@ from voodoo.recordings.recording import (
 )
 
 CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=160.5, cy=119.0)
-"""Kinect v1 at 320x240, for the un-mirrored image. The nominal centre of the mirrored one is (160, 120), hence
+"""Kinect v1 at 320x240, for the un-mirrored image. The nominal center of the mirrored one is (160, 120), hence
 (159, 120) after u -> 319 - u; the skeleton lies on the silhouettes best with (158.5, 119), hence (160.5, 119)."""
 
 FRAME = "kinect_depth_optical_frame"
@@ -127,7 +127,7 @@ def _read_skeleton(path: Path, frames: int) -> Reference:
             f"{path}: expected d_skel float of shape (20, 3, {frames}), found {skeleton.dtype} of {skeleton.shape}"
         )
     if not np.isfinite(skeleton).all() or np.abs(skeleton).max() > 20.0:
-        raise RecordingError(f"{path}: expected joints in metres, found values that are not finite or beyond 20 m")
+        raise RecordingError(f"{path}: expected joints in meters, found values that are not finite or beyond 20 m")
     kept = [index for index, name in enumerate(_JOINTS) if name is not None]
     # X changes sign because the image was mirrored, Y because the optical frame points down.
     positions = skeleton[kept].transpose(2, 0, 1).astype(np.float64) * (-1.0, -1.0, 1.0)

@@ -22,7 +22,7 @@ from voodoo.recordings.empty_scene import (
     scene_words,
 )
 from voodoo.recordings.films import VIDEOS, PictureFolder, Pictures, Video, pictures_in
-from voodoo.recordings.folder import Clock
+from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation, start_of
 from voodoo.recordings.recording import (
@@ -44,7 +44,7 @@ _OTHERS = (FOLDER, "keypoints", "pose", "calibration", "Calibration", "pose-3d",
 class VideosRecording(Recording):
     """A folder with the pictures of several calibrated cameras::
 
-        Calib_*.toml                 cameras, see read_camera_toml; world Z up, metres; or in calibration/, or ../calibration/
+        Calib_*.toml                 cameras, see read_camera_toml; world Z up, meters; or in calibration/, or ../calibration/
         videos/cam01.mp4             a video a camera; or videos/cam01/, images/cam01/, of PNG or JPEG files, or beside the file
         background/cam01_0.png       optional: pictures of the empty scene
         init.json, truth.csv, *.trc  optional: first pose, truth, triangulated joints to compare with
@@ -85,7 +85,7 @@ class VideosRecording(Recording):
         if not sources:
             raise RecordingError(f"{path}: expected videos in videos/, or folders of pictures in images/, found none")
         placed = read_camera_toml(calibration_of(path, [source.stem for source in sources]))
-        clock = Clock(rate)
+        clock = FrameClock(rate)
         self._cameras: list[Pictures] = []
         for camera, source in _chosen(path, _matched(path, placed, sources), color_topic):
             sensor = source.relative_to(path).as_posix()
@@ -212,17 +212,17 @@ def _chosen(
     """
     if names is None:
         return pairs
-    wanted = [names] if isinstance(names, str) else list(names)
+    expected = [names] if isinstance(names, str) else list(names)
     known = {
         name: pair for pair in pairs for name in (pair[1].relative_to(path).as_posix(), pair[1].stem, pair[0].name)
     }
-    unknown = [name for name in wanted if name not in known]
-    if unknown or not wanted:
+    unknown = [name for name in expected if name not in known]
+    if unknown or not expected:
         raise RecordingError(
             f"{path}: color_topic: expected some of {', '.join(camera.name for camera, _ in pairs)}, found "
             f"{', '.join(unknown) or 'none'}"
         )
-    return [known[name] for name in dict.fromkeys(wanted)]
+    return [known[name] for name in dict.fromkeys(expected)]
 
 
 def _plain(name: str) -> str:

@@ -1,4 +1,4 @@
-"""What a depth camera sees of the body, in the picture of a colour camera beside it; and what may be the still scene."""
+"""What a depth camera sees of the body, in the picture of a color camera beside it; and what may be the still scene."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def body_view(
     *,
     depth_camera: Camera,
     world_from_depth: FloatArray,
-    metres_per_unit: float,
+    meters_per_unit: float,
     color_camera: Camera,
     world_from_color: FloatArray,
     joints: npt.ArrayLike,
@@ -31,20 +31,20 @@ def body_view(
     step: int = 1,
     scene: StillDepth | None = None,
 ) -> BodyView:
-    """Where, in a colour image, a depth camera beside it saw something within the box around the body.
+    """Where, in a color image, a depth camera beside it saw something within the box around the body.
 
     Args:
         depth: (H, W) uint16 or float32; 0 and NaN mean "no return".
         depth_camera, world_from_depth: calibration and (4, 4) pose.
-        metres_per_unit: of `depth`.
-        color_camera, world_from_color: calibration and (4, 4) pose of the colour camera.
+        meters_per_unit: of `depth`.
+        color_camera, world_from_color: calibration and (4, 4) pose of the color camera.
         joints: (N, 3) predicted positions of the body [m].
         margin: enlargement of their box [m].
         step: every step-th row and column of the depth image is used.
         scene: what the depth camera saw before; takes up this image.
 
     Returns:
-        Mask of the colour image and the points; the gaps between the depth pixels are closed in the mask.
+        Mask of the color image and the points; the gaps between the depth pixels are closed in the mask.
     """
     world_from_color, world_from_depth = (
         np.asarray(pose, dtype=np.float64) for pose in (world_from_color, world_from_depth)
@@ -55,13 +55,13 @@ def body_view(
         depth,
         lens,
         np.ascontiguousarray(joints, dtype=np.float64),
-        metres_per_unit=metres_per_unit,
+        meters_per_unit=meters_per_unit,
         world_from_depth=world_from_depth,
         color_from_depth=_between(*poses),
         color_camera=color_camera,
-        # A few centimetres of the body's distance move what is beyond by less than a pixel.
+        # A few centimeters of the body's distance move what is beyond by less than a pixel.
         beyond=lambda away: _beyond(lens, poses[1], color_camera, poses[0], max(round(away, 1), 0.1)),
-        # A depth pixel covers this many colour pixels; one and a half of them close the gaps and the edge filter's rim.
+        # A depth pixel covers this many color pixels; one and a half of them close the gaps and the edge filter's rim.
         reach=math.ceil(1.5 * step * color_camera.fx / lens.fx),
         step=step,
         margin=margin,
@@ -87,9 +87,9 @@ def _border(camera: Camera) -> FloatArray:
     lens has none."""
     right, bottom = camera.width - 1.0, camera.height - 1.0
     corners = np.array([(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)])
-    share = np.arange(_SIDE)[:, None] / _SIDE
+    fraction = np.arange(_SIDE)[:, None] / _SIDE
     sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
-    border = np.concatenate([first + share * (second - first) for first, second in sides])
+    border = np.concatenate([first + fraction * (second - first) for first, second in sides])
     middle = np.clip((camera.cx, camera.cy), 0.0, (right, bottom))
     outwards = np.linspace(1.0 / _OUTWARDS, 1.0, _OUTWARDS)[:, None]
     places = (middle + outwards * (border[:, None] - middle)).reshape(-1, 2)
@@ -107,23 +107,23 @@ def _between(color_pose: bytes, depth_pose: bytes) -> FloatArray:
 def _beyond(
     depth_camera: Camera, depth_pose: bytes, color_camera: Camera, color_pose: bytes, z: float
 ) -> npt.NDArray[np.bool_]:
-    """(H, W) of the colour image: True where the depth camera does not look, at a distance from it [m]; read-only."""
+    """(H, W) of the color image: True where the depth camera does not look, at a distance from it [m]; read-only."""
     world_from_depth, world_from_color = (np.frombuffer(pose).reshape(4, 4) for pose in (depth_pose, color_pose))
     bent = depth_camera.distorted or color_camera.distorted
     rays = _border(depth_camera) if bent else _corners(depth_camera)
     border = (z * rays) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
-    outline = color_camera.project(in_sensor(world_from_color, border))
+    contour = color_camera.project(in_sensor(world_from_color, border))
     if bent:
         # Of each way from the middle outwards the last place that both lenses show.
-        outline = outline.reshape(-1, _OUTWARDS, 2)
-        last = np.isfinite(outline).all(axis=2).cumprod(axis=1).sum(axis=1) - 1
-        outline = outline[last >= 0, last[last >= 0]]
-    # The corners are the centres of the outermost pixels.
-    middle = outline.mean(axis=0)
-    outline = middle + (outline - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
+        contour = contour.reshape(-1, _OUTWARDS, 2)
+        last = np.isfinite(contour).all(axis=2).cumprod(axis=1).sum(axis=1) - 1
+        contour = contour[last >= 0, last[last >= 0]]
+    # The corners are the centers of the outermost pixels.
+    middle = contour.mean(axis=0)
+    contour = middle + (contour - middle) * (1.0 + 4.0 / min(depth_camera.width, depth_camera.height))
     away = np.ones((color_camera.height, color_camera.width), dtype=np.uint8)
-    if len(outline) > 2 and np.isfinite(outline).all():
-        places = outline.round().clip(-9999, 9999).astype(np.int32)
+    if len(contour) > 2 and np.isfinite(contour).all():
+        places = contour.round().clip(-9999, 9999).astype(np.int32)
         cv2.fillPoly(away, [places], 0) if bent else cv2.fillConvexPoly(away, places, 0)
     away.setflags(write=False)
     return away.view(np.bool_)

@@ -23,13 +23,13 @@ class DepthFilter:
     """Drops pixels that are not surface.
 
     A flying pixel of a time-of-flight camera mixes the light of two surfaces and hangs between them, so it has
-    neighbours clearly nearer AND clearly farther along one of the four lines through it. A pixel of a slanted surface
-    has that too, but with equal steps: it is kept when it lies near the middle of two neighbours that are less than
-    `slant` apart. A pixel that has no neighbour at its own depth at all is a flying one as well.
+    neighbors clearly nearer AND clearly farther along one of the four lines through it. A pixel of a slanted surface
+    has that too, but with equal steps: it is kept when it lies near the middle of two neighbors that are less than
+    `slant` apart. A pixel that has no neighbor at its own depth at all is a flying one as well.
 
     Args:
         edge: depths that differ by more than this belong to different surfaces [m], at 1 m; it grows with the depth.
-        slant: two opposite neighbours farther apart than this are two surfaces [m], at 1 m; it grows with the depth.
+        slant: two opposite neighbors farther apart than this are two surfaces [m], at 1 m; it grows with the depth.
         nearest, farthest: range limits along the optical axis [m] (K06 III-A: 0.5 to 7.5 m).
 
     Raises:
@@ -49,19 +49,19 @@ class DepthFilter:
                 f"{self.nearest!r}, farthest {self.farthest!r}, edge {self.edge!r}, slant {self.slant!r}"
             )
 
-    def apply(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> DepthArray:
+    def apply(self, image: DepthArray, *, meters_per_unit: float = 0.001) -> DepthArray:
         """A copy of the image (H, W) with 0 where a pixel is dropped.
 
         Args:
             image: uint16 or float32; 0 and NaN mean "no return".
-            metres_per_unit: of the image.
+            meters_per_unit: of the image.
         """
-        dropped = self.dropped(image, metres_per_unit=metres_per_unit)
+        dropped = self.dropped(image, meters_per_unit=meters_per_unit)
         kept: DepthArray = image.copy()
         kept[dropped] = 0
         return kept
 
-    def dropped(self, image: DepthArray, *, metres_per_unit: float = 0.001) -> npt.NDArray[np.bool_]:
+    def dropped(self, image: DepthArray, *, meters_per_unit: float = 0.001) -> npt.NDArray[np.bool_]:
         """(H, W): True for pixels that returned something that is not used.
 
         Raises:
@@ -71,9 +71,9 @@ class DepthFilter:
             raise MeasurementError(f"depth: expected an array (H, W), found {type(image).__name__}")
         if image.ndim != 2 or image.dtype not in (np.uint16, np.float32):
             raise MeasurementError(f"depth: expected (H, W) uint16 or float32, found {image.dtype} of {image.shape}")
-        if not (np.isfinite(metres_per_unit) and metres_per_unit > 0.0):
-            raise MeasurementError(f"metres_per_unit: expected a finite length > 0, found {metres_per_unit!r}")
-        z = image.astype(np.float32) * np.float32(metres_per_unit)
+        if not (np.isfinite(meters_per_unit) and meters_per_unit > 0.0):
+            raise MeasurementError(f"meters_per_unit: expected a finite length > 0, found {meters_per_unit!r}")
+        z = image.astype(np.float32) * np.float32(meters_per_unit)
         returned = np.isfinite(z) & (z > 0.0)
         z[~returned] = 0.0
         outside = returned & ((z < self.nearest) | (z > self.farthest))
@@ -97,7 +97,7 @@ class DepthFilter:
 
 def depth_points(depth: DepthImage) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """Points (H*W, 3) [m] of a depth image in the root frame, row by row, and which pixels (H*W,) measured anything."""
-    z = depth.image.astype(np.float64).reshape(-1) * depth.metres_per_unit
+    z = depth.image.astype(np.float64).reshape(-1) * depth.meters_per_unit
     rays = depth.camera.rays().reshape(-1, 2)
     valid = np.isfinite(z) & (z > 0.0) & np.isfinite(rays).all(axis=1)
     points = np.full((len(z), 3), np.nan)
@@ -107,7 +107,7 @@ def depth_points(depth: DepthImage) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     return points, valid
 
 
-def metres(depth: DepthImage) -> FloatArray:
+def meters(depth: DepthImage) -> FloatArray:
     """Depths (height, width) [m], NaN where nothing returned."""
-    z = depth.image.astype(np.float64) * depth.metres_per_unit
+    z = depth.image.astype(np.float64) * depth.meters_per_unit
     return np.asarray(np.where(z > 0.0, z, np.nan))

@@ -13,8 +13,8 @@ from voodoo.sensors.pixels import FloatArray
 CELL_M, SIZE_M = 0.10, 40.0
 """Side of a cell, half a leg; and of the map, around where the laser was first."""
 _LEAST_PASSES = 3
-_SHARE = 0.2
-"""A cell that returned more than this share of the beams that came to it may be furniture, as may its neighbours."""
+_FRACTION = 0.2
+"""A cell that returned more than this share of the beams that came to it may be furniture, as may its neighbors."""
 _ALL_NEW = 0.25
 """Where more than this share of all returns has come, the map is wrong: the frame moves."""
 
@@ -37,9 +37,9 @@ class FreeSpace:
         places = transform(scan.root_from_sensor, scan.points())[:, :2]
         if self._origin is None or not len(places):
             return np.zeros(len(places), dtype=bool)
-        share = self._hits / np.maximum(self._passes + self._hits, 1.0)
-        about = cv2.dilate(share, np.ones((3, 3), np.uint8))
-        open_ = (self._passes >= _LEAST_PASSES) & (about < _SHARE)
+        fraction = self._hits / np.maximum(self._passes + self._hits, 1.0)
+        about = cv2.dilate(fraction, np.ones((3, 3), np.uint8))
+        open_ = (self._passes >= _LEAST_PASSES) & (about < _FRACTION)
         cells, inside = self._cells(places)
         new = np.zeros(len(places), dtype=bool)
         new[inside] = open_[cells[:, 0], cells[:, 1]]
@@ -60,9 +60,9 @@ class FreeSpace:
         along = origin + (way / np.maximum(reach, CELL_M)[:, None])[:, None] * steps[None, :, None]
         for grid, where in ((self._passes, along[passed[..., 0]]), (self._hits, places)):
             cells, _ = self._cells(where)
-            seen = np.zeros(grid.shape, dtype=bool)
-            seen[cells[:, 0], cells[:, 1]] = True
-            grid += seen
+            observed = np.zeros(grid.shape, dtype=bool)
+            observed[cells[:, 0], cells[:, 1]] = True
+            grid += observed
 
     def _cells(self, places: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
         """Rows and columns (M, 2) of the places (N, 2) that lie in the map, and which do (N,)."""

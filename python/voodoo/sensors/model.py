@@ -1,12 +1,12 @@
 """The sensor model: a standard deviation for every datum, which becomes its weight (K06 IV-C).
 
 K06 weighs each datum "with a measure that describes its accuracy" and gives bare numbers: 3-D point 1, face 30, hand
-20. Here every number has one meaning. A datum whose position is uncertain by `sigma` metres weighs
+20. Here every number has one meaning. A datum whose position is uncertain by `sigma` meters weighs
 
     weight = min( (reference_sigma / sigma)^2 / sharing, max_weight )
 
 with `reference_sigma` = 0.10 m. A ray with a sigma of 2.2 cm at the body then weighs 20, one of 1.8 cm 30: what a skin
-region's centre is good for, so the published numbers are those of this model. `sharing` is the number of data that
+region's center is good for, so the published numbers are those of this model. `sharing` is the number of data that
 share one error: the pixels of a depth image are as many measurements of the surface, but the misfit between model and
 clothes is common to a patch of them. With 25 (a patch of 5 x 5) a time-of-flight point at 3 m weighs 1.
 
@@ -28,7 +28,7 @@ PAPER_WEIGHTS: dict[str, float] = {"point": 1.0, "face": 30.0, "hand": 20.0}
 """Weights of K06 section V: a 3-D point, the ray of the face tracker, the ray of a hand tracker."""
 
 POINTS_SHARING = 25.0
-"""Neighbouring pixels of a depth image that share one error."""
+"""Neighboring pixels of a depth image that share one error."""
 
 
 def _check(name: str, value: float, *, zero: bool = True) -> None:
@@ -79,7 +79,7 @@ class SensorModel:
             return min((self.reference_sigma / sigma) ** 2 / sharing, self.max_weight)
         values = np.asarray(sigma, dtype=np.float64)
         if not np.isfinite(values).all() or (values <= 0.0).any():
-            raise MeasurementError(f"sigma: expected finite metres > 0, found {sigma!r}")
+            raise MeasurementError(f"sigma: expected finite meters > 0, found {sigma!r}")
         weights = np.minimum((self.reference_sigma / values) ** 2 / sharing, self.max_weight)
         return float(weights) if weights.ndim == 0 else weights
 
@@ -152,7 +152,7 @@ class PixelNoise:
     """Standard deviation of a feature in an image.
 
     At depth z it is uncertain across the ray by `pixels / confidence * z / focal`; a confidence of 0.5 doubles it.
-    `spread` is how far the feature itself is from the site it stands for (a network's idea of a hip), in metres at
+    `spread` is how far the feature itself is from the site it stands for (a network's idea of a hip), in meters at
     any depth.
 
     Args:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from voodoo.model.camera import Camera
 
 MOST_PIXELS = 640 * 480
-"""Larger pictures are reduced: an edge is found to a pixel or two, which here is a centimetre at four metres."""
+"""Larger pictures are reduced: an edge is found to a pixel or two, which here is a centimeter at four meters."""
 
 
 class Pinhole:
@@ -23,14 +23,14 @@ class Pinhole:
 
     Attributes:
         original: the camera that was given.
-        camera: the pinhole camera of the pictures that `apply` returns: the same focal length and centre, but for the size.
+        camera: the pinhole camera of the pictures that `apply` returns: the same focal length and center, but for the size.
     """
 
     def __init__(self, camera: Camera, *, most: int = MOST_PIXELS) -> None:
         """Find where each pixel comes from."""
         self.original = camera
-        share = min(1.0, float(np.sqrt(most / (camera.width * camera.height))))
-        width, height = max(round(camera.width * share), 1), max(round(camera.height * share), 1)
+        fraction = min(1.0, float(np.sqrt(most / (camera.width * camera.height))))
+        width, height = max(round(camera.width * fraction), 1), max(round(camera.height * fraction), 1)
         x, y = width / camera.width, height / camera.height
         self.camera = Camera(
             width,

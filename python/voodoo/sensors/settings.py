@@ -24,11 +24,11 @@ ByteImage: TypeAlias = npt.NDArray[np.uint8]
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 WHOLE_BODY = ("depth", "points", "keypoints", "markers")
-"""Inputs that tell the whole body's pose, so that colour regions are used beside them only where somebody asks for it."""
+"""Inputs that tell the whole body's pose, so that color regions are used beside them only where somebody asks for it."""
 
 
 def default_inputs() -> tuple[str, ...]:
-    """What is used unless somebody says otherwise: all inputs but colour regions."""
+    """What is used unless somebody says otherwise: all inputs but color regions."""
     return tuple(kind for kind in inputs() if kind != "color")
 
 
@@ -42,7 +42,7 @@ class FrontEndSettings:
         depth_noise: of depth images and point clouds; the weight is that at the predicted range of the body. None:
             every point weighs 1, as in the papers (a time-of-flight point at 3 m).
         scan_noise: of laser scans; None: every return weighs 1.
-        sharing: neighbouring depth pixels that share one error.
+        sharing: neighboring depth pixels that share one error.
         scan_sharing: the same for a scan, whose beams lie farther apart.
         keypoint_noise: of 2-D keypoints.
         min_confidence: keypoints believed less are not used.
@@ -50,11 +50,11 @@ class FrontEndSettings:
         agreement: scale [m] of `agreed`; 0 switches it off.
         marker_sigma: standard deviation [m] of a marker that is given without one.
         depth_filter: what is dropped from depth images; None takes them as they are.
-        skin: settings of the skin-colour cue.
+        skin: settings of the skin-color cue.
         exclude: boxes (low, high), two corners [m] in the root frame: nobody is looked for in them, and nothing in them is the
             body's.
-        empty_scene: sensor -> pictures (H, W, 3) of what that camera sees when nobody is there, for colour regions.
-        draw_regions: pictures of the result show what is the body by its colours, and the edges found along its contour.
+        empty_scene: sensor -> pictures (H, W, 3) of what that camera sees when nobody is there, for color regions.
+        draw_regions: pictures of the result show what is the body by its colors, and the edges found along its contour.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
 
     Raises:
@@ -94,7 +94,7 @@ class FrontEndSettings:
     def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:
         """The defaults for a recording, with the inputs in `use`.
 
-        Without `use` all inputs, colour regions only where nothing tells the whole body's pose (see WHOLE_BODY), and no skin
+        Without `use` all inputs, color regions only where nothing tells the whole body's pose (see WHOLE_BODY), and no skin
         in pictures that are all there is, nor of several persons. The floor is known where the root frame is one of LEVEL_FRAMES.
 
         Raises:
@@ -136,4 +136,4 @@ def _check_box(box: Box) -> None:
     if not all(math.isfinite(value) for value in (*low, *high)) or not all(
         a < b for a, b in zip(low, high, strict=True)
     ):
-        raise MeasurementError(f"exclude: expected two corners in metres, the lower one first, found {low} and {high}")
+        raise MeasurementError(f"exclude: expected two corners in meters, the lower one first, found {low} and {high}")

@@ -132,9 +132,9 @@ class StereoPair:
         *,
         world_from_left: npt.ArrayLike | None = None,
     ) -> StereoDepth:
-        """Depth of one pair of pictures (H, W) grey or (H, W, 3) BGR.
+        """Depth of one pair of pictures (H, W) gray or (H, W, 3) BGR.
 
-        Use it as `frame.add_depth(d.image, camera=d.camera, metres_per_unit=1.0, world_from_sensor=d.world_from_sensor,
+        Use it as `frame.add_depth(d.image, camera=d.camera, meters_per_unit=1.0, world_from_sensor=d.world_from_sensor,
         weight=model.weight(d.noise.sigma(range), sharing=...))`.
 
         Args:
@@ -149,8 +149,8 @@ class StereoPair:
             if image.dtype != np.uint8 or image.shape[:2] != (self.camera.height, self.camera.width):
                 expected = (self.camera.height, self.camera.width)
                 raise MeasurementError(f"{name}: expected uint8 of {expected}, found {image.dtype} of {image.shape}")
-            grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-            pictures.append(cv2.remap(grey, maps[0], maps[1], cv2.INTER_LINEAR))
+            gray = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+            pictures.append(cv2.remap(gray, maps[0], maps[1], cv2.INTER_LINEAR))
         disparity = self._matcher.compute(pictures[0], pictures[1]).astype(np.float32) / _FRACTIONS
         with np.errstate(divide="ignore"):
             z = np.float32(self.camera.fx * self.baseline) / disparity

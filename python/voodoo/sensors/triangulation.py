@@ -23,7 +23,7 @@ _PARALLEL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class TriangulatedSite:
     """Where rays meet.
 
     Args:
@@ -37,12 +37,12 @@ class Place:
     trust: FloatArray
 
     @property
-    def seen_by(self) -> npt.NDArray[np.bool_]:
+    def visible_in(self) -> npt.NDArray[np.bool_]:
         """Which rays (N,) see it."""
         return np.asarray(self.trust >= TRUSTED)
 
 
-def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Place | None:
+def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> TriangulatedSite | None:
     """Where the rays of one site meet, by robust least squares; None where fewer than two rays agree.
 
     The meeting points of all pairs are tried; the one that most rays agree with is refined with the Geman-McClure weight
@@ -80,7 +80,7 @@ def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Place | None
         return None
     matrix = (information[seeing, None, None] * across[seeing]).sum(axis=0)
     least = float(np.linalg.eigvalsh(matrix)[0])
-    return Place(point, least**-0.5, trust) if least > 0.0 else None
+    return TriangulatedSite(point, least**-0.5, trust) if least > 0.0 else None
 
 
 def _meeting(origins: FloatArray, directions: FloatArray, across: FloatArray) -> FloatArray | None:

@@ -26,7 +26,7 @@ _STANDS_M = 0.05
 
 @dataclass(frozen=True)
 class Stop:
-    """Where the person is at a time: seconds, metres on the floor, direction it faces [rad], 0 away from the camera."""
+    """Where the person is at a time: seconds, meters on the floor, direction it faces [rad], 0 away from the camera."""
 
     time: float
     x: float
@@ -49,9 +49,9 @@ def path(points: Sequence[tuple[float, float, float]], *, standing: float = math
     stops = [Stop(*points[0], facings[0])]
     for index, point in enumerate(points[1:-1], start=1):
         span = points[index + 1][0] - point[0]
-        share = min(_TURN_S / span, 0.5)
-        x, y = (point[axis] + share * (points[index + 1][axis] - point[axis]) for axis in (1, 2))
-        stops += [Stop(*point, facings[index - 1]), Stop(point[0] + share * span, x, y, facings[index])]
+        fraction = min(_TURN_S / span, 0.5)
+        x, y = (point[axis] + fraction * (points[index + 1][axis] - point[axis]) for axis in (1, 2))
+        stops += [Stop(*point, facings[index - 1]), Stop(point[0] + fraction * span, x, y, facings[index])]
     return (*stops, Stop(*points[-1], facings[-1]))
 
 

@@ -29,7 +29,7 @@ _ROOT = "humanoid_root"
 class WithPasserBy(Recording):
     """A recording of one person with exact truth, in front of whom somebody walks by; `people` is the truth of both.
 
-    The passer-by, person 2, covers depth and colour of what is behind. How much of person 1 is in view is the share of their
+    The passer-by, person 2, covers depth and color of what is behind. How much of person 1 is in view is the share of their
     joints that are not covered. Lasers and clouds are left out, as they would not see the passer-by.
 
     Args:
@@ -87,13 +87,15 @@ class WithPasserBy(Recording):
                 continue
             _, sites = pose_at(self._walker.body, self._walker.stops, stamp)
             positions[index, 1] = [sites.get(name, np.full(3, np.nan)) for name in names]
-            seen = self._seen(stamp, camera.camera, camera.root_from_sensor)
-            whole = WIDER**2 * np.count_nonzero(self._seen(stamp, wider(camera.camera), camera.root_from_sensor).depth)
-            in_view[index, 1] = min(float(np.count_nonzero(seen.depth)) / max(whole, 1), 1.0)
-            in_view[index, 0] = _uncovered(reference.positions[index], camera, seen.depth)
+            observed = self._rendered(stamp, camera.camera, camera.root_from_sensor)
+            whole = WIDER**2 * np.count_nonzero(
+                self._rendered(stamp, wider(camera.camera), camera.root_from_sensor).depth
+            )
+            in_view[index, 1] = min(float(np.count_nonzero(observed.depth)) / max(whole, 1), 1.0)
+            in_view[index, 0] = _uncovered(reference.positions[index], camera, observed.depth)
         return PeopleTruth(stamps, np.array([1, 2]), in_view, names, positions)
 
-    def _seen(self, stamp: float, camera: Camera, root_from_sensor: FloatArray) -> RenderedDepth:
+    def _rendered(self, stamp: float, camera: Camera, root_from_sensor: FloatArray) -> RenderedDepth:
         poses, _ = pose_at(self._walker.body, self._walker.stops, stamp)
         return render_depth(self._walker.body, poses, camera=camera, world_from_sensor=root_from_sensor)
 
@@ -113,16 +115,16 @@ class WithPasserBy(Recording):
             return item
         if isinstance(item, ColorImage):
             return ColorImage(item.sensor, item.stamp, partial(self._painted, item), item.camera, item.root_from_sensor)
-        seen = self._seen(item.stamp, item.camera, item.root_from_sensor).depth
-        own = self._noise.image(np.where(seen > 0.0, seen, np.inf), chance)
-        units = np.rint(own * 0.001 / item.metres_per_unit).astype(item.image.dtype)
+        observed = self._rendered(item.stamp, item.camera, item.root_from_sensor).depth
+        own = self._noise.image(np.where(observed > 0.0, observed, np.inf), chance)
+        units = np.rint(own * 0.001 / item.meters_per_unit).astype(item.image.dtype)
         # Behind what stands nearer still the passer-by is not seen.
         nearer = (own > 0) & ((item.image == 0) | (units < item.image))
         return replace(item, image=np.where(nearer, units, item.image))
 
     def _painted(self, item: ColorImage) -> npt.NDArray[np.uint8]:
-        seen = self._seen(item.stamp, item.camera, item.root_from_sensor)
-        label = np.where(seen.limb >= 0, labels_of(seen.limb_names, 0)[seen.limb], 0).astype(np.uint8)
+        observed = self._rendered(item.stamp, item.camera, item.root_from_sensor)
+        label = np.where(observed.limb >= 0, labels_of(observed.limb_names, 0)[observed.limb], 0).astype(np.uint8)
         picture = np.array(item.image)
         own = paint(label, [self._walker], (self._seed, round(item.stamp * 1e3) % 2**31))
         picture[label > 0] = own[label > 0]

@@ -21,12 +21,12 @@ from voodoo.synthetic.gait import Stop, pose_at
 from voodoo.synthetic.render import render_depth
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
-Colour: TypeAlias = tuple[int, int, int]
+Color: TypeAlias = tuple[int, int, int]
 """Blue, green, red, 0 to 255."""
 
 CAMERA = Camera(320, 240, 277.0, 277.0, 159.5, 119.5)
 """60 degrees wide."""
-METRES_PER_UNIT = 0.001
+METERS_PER_UNIT = 0.001
 DEPTH, COLOR = "/camera/depth", "/camera/color"
 """Names of the sensors."""
 TRUTH_SITES = (
@@ -34,11 +34,11 @@ TRUTH_SITES = (
     *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")),
 )  # fmt: skip
 _EDGE = (0.06, 0.04)
-"""A pixel at a step in depth of more than these, metres and share of the depth, may return a mixture."""
+"""A pixel at a step in depth of more than these, meters and share of the depth, may return a mixture."""
 WIDER = 2
 """Who is partly out of the picture is counted in one so much wider, and as much coarser."""
-_SKIN: Colour = (120, 150, 200)
-_ROOM: Colour = (150, 155, 150)
+_SKIN: Color = (120, 150, 200)
+_ROOM: Color = (150, 155, 150)
 _BARE = ("head", "neck", "l_hand", "r_hand")
 
 
@@ -49,13 +49,13 @@ class Walker:
     Args:
         body: the true body.
         stops: where it is, in the order of time; it is in the scene from the first to the last of them.
-        shirt, trousers: colours of the clothes.
+        shirt, trousers: colors of the clothes.
     """
 
     body: Body
     stops: Sequence[Stop]
-    shirt: Colour = (60, 60, 170)
-    trousers: Colour = (110, 60, 50)
+    shirt: Color = (60, 60, 170)
+    trousers: Color = (110, 60, 50)
 
     def there(self, time: float) -> bool:
         """Whether the person is in the scene at a time [s]."""
@@ -67,7 +67,7 @@ class Noise:
     """What a made-up depth camera does to exact depths.
 
     Args:
-        sigma_m, sigma_square: standard deviation `sigma_m + sigma_square z^2` [m] at z metres.
+        sigma_m, sigma_square: standard deviation `sigma_m + sigma_square z^2` [m] at z meters.
         flying: share of the pixels at an edge that return something between both surfaces.
         lost: share of pixels without return.
         reach_m: nothing farther returns.
@@ -80,16 +80,16 @@ class Noise:
     reach_m: float = 6.0
 
     def image(self, depth: FloatArray, chance: np.random.Generator) -> npt.NDArray[np.uint16]:
-        """What is measured of exact depths (H, W) [m], in METRES_PER_UNIT."""
-        seen = np.where(np.isfinite(depth), depth, 2.0 * self.reach_m)
-        beside = np.roll(seen, 1, axis=1)
-        edge = np.abs(seen - beside) > np.maximum(_EDGE[0], _EDGE[1] * seen)
-        mixed = edge & (chance.random(seen.shape) < self.flying)
-        share = chance.random(seen.shape)
-        noise = (self.sigma_m + self.sigma_square * seen**2) * chance.standard_normal(seen.shape)
-        seen = np.where(mixed, share * seen + (1.0 - share) * beside, seen + noise)
-        gone = (seen > self.reach_m) | (seen < 0.3) | (chance.random(seen.shape) < self.lost)
-        return np.where(gone, 0.0, np.rint(seen / METRES_PER_UNIT)).astype(np.uint16)
+        """What is measured of exact depths (H, W) [m], in METERS_PER_UNIT."""
+        observed = np.where(np.isfinite(depth), depth, 2.0 * self.reach_m)
+        beside = np.roll(observed, 1, axis=1)
+        edge = np.abs(observed - beside) > np.maximum(_EDGE[0], _EDGE[1] * observed)
+        mixed = edge & (chance.random(observed.shape) < self.flying)
+        fraction = chance.random(observed.shape)
+        noise = (self.sigma_m + self.sigma_square * observed**2) * chance.standard_normal(observed.shape)
+        observed = np.where(mixed, fraction * observed + (1.0 - fraction) * beside, observed + noise)
+        gone = (observed > self.reach_m) | (observed < 0.3) | (chance.random(observed.shape) < self.lost)
+        return np.where(gone, 0.0, np.rint(observed / METERS_PER_UNIT)).astype(np.uint16)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +105,7 @@ class Scene:
         root_frame: its name.
         noise: of the camera.
         rate_hz: of the images.
-        color: whether there is a colour image with each depth image.
+        color: whether there is a color image with each depth image.
         seed: of the noise.
     """
 
@@ -122,7 +122,7 @@ class Scene:
 
 
 class MadeUpRecording(Recording):
-    """A recording in memory: depth and colour images of a scene, and `people`, the truth.
+    """A recording in memory: depth and color images of a scene, and `people`, the truth.
 
     Args:
         scene: what is rendered, once.
@@ -162,11 +162,11 @@ class MadeUpRecording(Recording):
                 continue
             poses, places = pose_at(person.body, person.stops, time)
             sites[number] = [places[name] for name in TRUTH_SITES]
-            seen = render_depth(person.body, poses, camera=CAMERA, world_from_sensor=pose)
-            nearest = (seen.depth > 0.0) & (seen.depth < depth)
-            depth = np.where(nearest, seen.depth, depth)
+            observed = render_depth(person.body, poses, camera=CAMERA, world_from_sensor=pose)
+            nearest = (observed.depth > 0.0) & (observed.depth < depth)
+            depth = np.where(nearest, observed.depth, depth)
             owner[nearest] = number
-            label[nearest] = labels_of(person.body.limb_names, number)[seen.limb[nearest]]
+            label[nearest] = labels_of(person.body.limb_names, number)[observed.limb[nearest]]
             wide = render_depth(person.body, poses, camera=wider(CAMERA), world_from_sensor=pose)
             whole[number] = WIDER**2 * np.count_nonzero(wide.depth)
         owner[depth > scene.noise.reach_m] = -1
@@ -180,9 +180,9 @@ class MadeUpRecording(Recording):
         return len(self._stamps)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
-        """The frames: a colour image, if there are any, and a depth image of one camera."""
+        """The frames: a color image, if there are any, and a depth image of one camera."""
         for index, (stamp, pose) in enumerate(self._frames()):
-            depth = DepthImage(DEPTH, stamp, self._depths[index], METRES_PER_UNIT, CAMERA, pose)
+            depth = DepthImage(DEPTH, stamp, self._depths[index], METERS_PER_UNIT, CAMERA, pose)
             if not self.scene.color:
                 yield RecordedFrame(stamp, (depth,))
                 continue
@@ -190,7 +190,7 @@ class MadeUpRecording(Recording):
             yield RecordedFrame(stamp, (color, depth))
 
     def picture(self, index: int) -> npt.NDArray[np.uint8]:
-        """Colours (H, W, 3) BGR of a frame: clothes, skin and grey furniture, with noise."""
+        """Colors (H, W, 3) BGR of a frame: clothes, skin and gray furniture, with noise."""
         return paint(self._labels[index], self.scene.people, (self.scene.seed, index))
 
     def info(self) -> RecordingInfo:
@@ -216,14 +216,14 @@ class MadeUpRecording(Recording):
 
 
 def paint(label: npt.NDArray[np.uint8], people: Sequence[Walker], seed: tuple[int, int]) -> npt.NDArray[np.uint8]:
-    """Colours (H, W, 3) BGR of labels (H, W), see `labels_of`; 0 is the room."""
-    colours = [_ROOM, _SKIN, *(colour for person in people for colour in (person.shirt, person.trousers))]
+    """Colors (H, W, 3) BGR of labels (H, W), see `labels_of`; 0 is the room."""
+    colors = [_ROOM, _SKIN, *(color for person in people for color in (person.shirt, person.trousers))]
     noise = np.random.default_rng(seed).integers(-4, 5, (*label.shape, 3))
-    return np.clip(np.array(colours, dtype=np.int64)[label] + noise, 0, 255).astype(np.uint8)
+    return np.clip(np.array(colors, dtype=np.int64)[label] + noise, 0, 255).astype(np.uint8)
 
 
 def labels_of(limbs: Sequence[str], number: int) -> npt.NDArray[np.uint8]:
-    """Index of the colour of each limb of a person."""
+    """Index of the color of each limb of a person."""
     legs = ("thigh", "calf", "foot", "pelvis")
     worn = [1 if name in _BARE else 3 + 2 * number if name.endswith(legs) else 2 + 2 * number for name in limbs]
     return np.array(worn, dtype=np.uint8)

@@ -30,9 +30,9 @@ class RenderedDepth:
 
     def __repr__(self) -> str:
         """Size, pixels that show the body, and limbs seen."""
-        seen = self.limb[self.limb >= 0]
+        observed = self.limb[self.limb >= 0]
         height, width = self.depth.shape
-        return f"RenderedDepth({width}x{height}, {seen.size} pixels of {len(np.unique(seen))} limbs)"
+        return f"RenderedDepth({width}x{height}, {observed.size} pixels of {len(np.unique(observed))} limbs)"
 
 
 def render_depth(
@@ -47,7 +47,7 @@ def render_depth(
     Args:
         body: its shapes; `tracker.body` has the current sizes.
         world_from_limb: pose of every limb, rigid (4, 4), as in `Estimate.world_from_limb`.
-        camera: where pixels look; lens distortion is honoured.
+        camera: where pixels look; lens distortion is honored.
         world_from_sensor: pose of the camera's optical frame, rigid (4, 4); identity by default.
 
     Raises:

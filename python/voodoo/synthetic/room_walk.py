@@ -12,7 +12,7 @@ from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.synthetic.gait import Stop, pose_at
 from voodoo.synthetic.render import render_depth
-from voodoo.synthetic.sequence import METRES_PER_UNIT, FloatArray, VirtualFrame
+from voodoo.synthetic.sequence import METERS_PER_UNIT, FloatArray, VirtualFrame
 
 CAMERA = Camera(320, 240, 275.0, 275.0, 159.5, 119.5)
 """60 degrees wide: 2.8 m at 2.4 m."""
@@ -82,19 +82,21 @@ class Walk:
             boxes = [*FURNITURE, *(box for start, box in self.appears if time >= start)]
             depth = _room(self.camera, boxes)
             if not any(start <= time < end for start, end in self.away):
-                seen = render_depth(self.body, poses, camera=self.camera, world_from_sensor=_WORLD_FROM_SENSOR).depth
-                depth = np.where((seen > 0.0) & (seen < depth), seen, depth)
+                observed = render_depth(
+                    self.body, poses, camera=self.camera, world_from_sensor=_WORLD_FROM_SENSOR
+                ).depth
+                depth = np.where((observed > 0.0) & (observed < depth), observed, depth)
             depth = depth + self.noise_m * (depth / _NOISE_AT_M) ** 2 * rng.standard_normal(depth.shape)
             if any(start <= time < end for start, end in self.covered):
                 depth = np.zeros_like(depth)
-            image = np.rint(np.nan_to_num(depth) / METRES_PER_UNIT).astype(np.uint16)
+            image = np.rint(np.nan_to_num(depth) / METERS_PER_UNIT).astype(np.uint16)
             yield VirtualFrame(time, image, sites, np.zeros(0), poses)
 
     def measurement(self, frame: VirtualFrame) -> _core.Frame:
         """The frame as a tracker takes it, with the floor known."""
         found = _core.Frame(frame.stamp)
         found.add_depth(
-            frame.image, camera=self.camera, metres_per_unit=METRES_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR
+            frame.image, camera=self.camera, meters_per_unit=METERS_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR
         )
         found.set_ground(normal=(0.0, 0.0, 1.0), offset=0.0)
         return found

@@ -24,7 +24,7 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 CAMERA = Camera(640, 480, 550.0, 550.0, 319.5, 239.5)
 """A depth camera like that of the recordings of its time: 60 degrees wide."""
-METRES_PER_UNIT = 0.001
+METERS_PER_UNIT = 0.001
 
 _WALL_M = 3.6
 _NOISE_AT_M = 2.4
@@ -37,7 +37,7 @@ _WORLD_FROM_STANDING = np.array(
     [[-1.0, 0.0, 0.0, 2.4], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.86], [0.0, 0.0, 0.0, 1.0]]
 )
 
-# Angle (without side): centre and amplitude, radians or metres, of the left side; the shoulder's and hip's second and third
+# Angle (without side): center and amplitude, radians or meters, of the left side; the shoulder's and hip's second and third
 # angles are mirrored on the right. Arms stay off the body, so that nothing but the noise is ambiguous.
 _MOTION: Mapping[str, tuple[float, float]] = {
     "root_x": (0.0, 0.10), "root_y": (0.0, 0.15), "root_z": (0.0, 0.04),
@@ -101,7 +101,7 @@ class VirtualSequence:
         if not (math.isfinite(self.speed) and self.speed >= 0.0):
             raise ValueError(f"speed: expected a number of at least zero, found {self.speed!r}")
         if not (math.isfinite(self.noise_m) and self.noise_m >= 0.0):
-            raise ValueError(f"noise_m: expected metres of at least zero, found {self.noise_m!r}")
+            raise ValueError(f"noise_m: expected meters of at least zero, found {self.noise_m!r}")
         if self.frames < 1:
             raise ValueError(f"frames: expected at least one, found {self.frames!r}")
 
@@ -127,9 +127,9 @@ class VirtualSequence:
         for index, name in enumerate(chain.angle_names):
             frequency, phase = _BASE_HZ * rng.uniform(0.75, 1.25), rng.uniform(0.0, math.tau)
             side, _, plain = name.partition("_")
-            centre, amplitude = _MOTION.get(plain if side in "lr" else name, (0.0, 0.05))
+            center, amplitude = _MOTION.get(plain if side in "lr" else name, (0.0, 0.05))
             sign = -1.0 if side == "r" and plain in _MIRRORED else 1.0
-            values[index] = sign * centre + amplitude * math.sin(math.tau * frequency * self.speed * time + phase)
+            values[index] = sign * center + amplitude * math.sin(math.tau * frequency * self.speed * time + phase)
         return values
 
     def truth(self, time: float) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
@@ -143,10 +143,10 @@ class VirtualSequence:
         for index in range(self.frames):
             time = index / _RATE_HZ
             poses, sites = self.truth(time)
-            seen = render_depth(self.body, poses, camera=self.camera, world_from_sensor=_WORLD_FROM_SENSOR).depth
-            depth = np.where(seen > 0.0, seen, _WALL_M)
+            observed = render_depth(self.body, poses, camera=self.camera, world_from_sensor=_WORLD_FROM_SENSOR).depth
+            depth = np.where(observed > 0.0, observed, _WALL_M)
             depth += self.noise_m * (depth / _NOISE_AT_M) ** 2 * rng.standard_normal(depth.shape)
-            image = np.rint(depth / METRES_PER_UNIT).astype(np.uint16)
+            image = np.rint(depth / METERS_PER_UNIT).astype(np.uint16)
             image[blind] = 0
             yield VirtualFrame(time, image, sites, self.angles(time), poses)
 
@@ -154,6 +154,6 @@ class VirtualSequence:
         """The frame as a tracker takes it."""
         found = _core.Frame(frame.stamp)
         found.add_depth(
-            frame.image, camera=self.camera, metres_per_unit=METRES_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR
+            frame.image, camera=self.camera, meters_per_unit=METERS_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR
         )
         return found

@@ -13,7 +13,7 @@ from voodoo.model.body import Body
 from voodoo.synthetic.boxes import Box
 from voodoo.synthetic.gait import path
 from voodoo.synthetic.grown import grown
-from voodoo.synthetic.people import Colour, MadeUpRecording, Noise, Scene, Walker
+from voodoo.synthetic.people import Color, MadeUpRecording, Noise, Scene, Walker
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Points: TypeAlias = Sequence[tuple[float, float, float]]
@@ -23,7 +23,7 @@ AWAY_S = 5.0
 """How long somebody is out of view in `returning`."""
 MOVES_M, TURNS_RAD = 1.5, math.radians(30.0)
 """How far the camera of `robot` moves and turns."""
-_CLOTHES: tuple[tuple[Colour, Colour], ...] = (
+_CLOTHES: tuple[tuple[Color, Color], ...] = (
     ((40, 40, 190), (60, 50, 40)),
     ((170, 90, 40), (70, 70, 75)),
     ((60, 150, 60), (100, 60, 30)),
@@ -117,12 +117,12 @@ def robot(seed: int, *, moving: bool = True) -> MadeUpRecording:
     ]
 
     def odom_from_base(time: float) -> FloatArray:
-        share = float(np.clip((time - 2.5) / 5.5, 0.0, 1.0)) if moving else 0.0
-        share = share * share * (3.0 - 2.0 * share)
-        turn = side * TURNS_RAD * share
+        fraction = float(np.clip((time - 2.5) / 5.5, 0.0, 1.0)) if moving else 0.0
+        fraction = fraction * fraction * (3.0 - 2.0 * fraction)
+        turn = side * TURNS_RAD * fraction
         pose = np.eye(4)
         pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
-        pose[:2, 3] = np.array([0.5, -side * math.sqrt(0.75)]) * MOVES_M * share
+        pose[:2, 3] = np.array([0.5, -side * math.sqrt(0.75)]) * MOVES_M * fraction
         return pose
 
     return _recorded(

@@ -39,9 +39,9 @@ class ThroughLens(Recording):
     def __iter__(self) -> Iterator[RecordedFrame]:
         """The frames in order."""
         for recorded in self._recording:
-            yield RecordedFrame(recorded.stamp, tuple(self._seen(item) for item in recorded.measurements))
+            yield RecordedFrame(recorded.stamp, tuple(self._rendered(item) for item in recorded.measurements))
 
-    def _seen(self, item: Measurement) -> Measurement:
+    def _rendered(self, item: Measurement) -> Measurement:
         if not isinstance(item, DepthImage):
             return item
         camera = self._lens(item.camera)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.model.body import Body
-from voodoo.model.projection import View, limb_outline, limb_rings, transform
+from voodoo.model.projection import View, limb_rings, limb_silhouette, transform
 from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, point, side_color
 
 _OPACITY = 0.62
@@ -36,21 +36,21 @@ def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View, *, c
     limbs = []
     for limb in body.limbs:
         root_from_limb = np.asarray(estimate.world_from_limb[limb.name], dtype=np.float64)
-        outline = limb_outline(limb.shape, root_from_limb, view)
-        if outline is not None:
-            centre = transform(root_from_limb, np.array([[0.0, 0.0, limb.shape.length / 2.0]]))
-            limbs.append((float(view.project(centre)[1][0]), limb, root_from_limb, outline))
+        contour = limb_silhouette(limb.shape, root_from_limb, view)
+        if contour is not None:
+            center = transform(root_from_limb, np.array([[0.0, 0.0, limb.shape.length / 2.0]]))
+            limbs.append((float(view.project(center)[1][0]), limb, root_from_limb, contour))
     layer, covered = picture.copy(), np.zeros(picture.shape[:2], dtype=np.uint8)
-    for _, limb, root_from_limb, outline in sorted(limbs, key=lambda item: -item[0]):
+    for _, limb, root_from_limb, contour in sorted(limbs, key=lambda item: -item[0]):
         _draw_solid(layer, limb.shape, root_from_limb, view, color or side_color(limb.name))
-        border = fixed(outline)
+        border = fixed(contour)
         cv2.polylines(layer, [border], True, PAPER, 1, cv2.LINE_AA, SUBPIXEL)
         cv2.fillConvexPoly(covered, border, 255, cv2.LINE_8, SUBPIXEL)
     inside = covered > 0
     mixed = cv2.addWeighted(layer, _OPACITY, picture, 1.0 - _OPACITY, 0.0)
     picture[inside] = mixed[inside]
-    for _, limb, _, outline in limbs:
-        cv2.polylines(picture, [fixed(outline)], True, color or side_color(limb.name), 1, cv2.LINE_AA, SUBPIXEL)
+    for _, limb, _, contour in limbs:
+        cv2.polylines(picture, [fixed(contour)], True, color or side_color(limb.name), 1, cv2.LINE_AA, SUBPIXEL)
     _draw_spread(picture, estimate, view, color)
     _draw_sites(picture, estimate, view, color)
 
@@ -102,17 +102,17 @@ def _draw_spread(picture: Picture, estimate: Estimate, view: View, color: Color 
     moved = np.stack([view.project(places + _STEP_M * axis)[0] for axis in np.eye(3)], axis=2)
     jacobians = (moved - pixels[:, :, None]) / _STEP_M
     layer = picture.copy()
-    shown = (depths > 0.0) & np.isfinite(jacobians).all(axis=(1, 2)) & (np.abs(pixels).max(axis=1) < 1e5)
+    visible = (depths > 0.0) & np.isfinite(jacobians).all(axis=(1, 2)) & (np.abs(pixels).max(axis=1) < 1e5)
     for index, name in enumerate(estimate.joints):
-        if shown[index]:
+        if visible[index]:
             spread = jacobians[index] @ covariances[index] @ jacobians[index].T
             variances, axes = np.linalg.eigh(spread)
             radii = _DEVIATIONS * np.sqrt(np.maximum(variances[::-1], 0.0))
             angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
             if radii[0] < max(picture.shape[:2]):
                 size = (max(1, round(radii[0] * 2**SUBPIXEL)), max(1, round(radii[1] * 2**SUBPIXEL)))
-                outline = (point(pixels[index]), size, angle, 0.0, 360.0)
-                cv2.ellipse(layer, *outline, color or side_color(name), 1, cv2.LINE_AA, SUBPIXEL)
+                contour = (point(pixels[index]), size, angle, 0.0, 360.0)
+                cv2.ellipse(layer, *contour, color or side_color(name), 1, cv2.LINE_AA, SUBPIXEL)
     picture[:] = cv2.addWeighted(layer, 0.7, picture, 0.3, 0.0)
 
 
@@ -122,7 +122,7 @@ def _draw_sites(picture: Picture, estimate: Estimate, view: View, color: Color |
     radius = max(3, round(picture.shape[0] / 160))
     for name, pixel in zip(estimate.joints, pixels, strict=True):
         if np.isfinite(pixel).all() and np.abs(pixel).max() < 1e5:
-            centre = point(pixel)
-            cv2.circle(picture, centre, (radius + 2) << SUBPIXEL, PAPER, -1, cv2.LINE_AA, SUBPIXEL)
-            cv2.circle(picture, centre, (radius + 1) << SUBPIXEL, color or side_color(name), -1, cv2.LINE_AA, SUBPIXEL)
-            cv2.circle(picture, centre, (radius - 1) << SUBPIXEL, INK, -1, cv2.LINE_AA, SUBPIXEL)
+            center = point(pixel)
+            cv2.circle(picture, center, (radius + 2) << SUBPIXEL, PAPER, -1, cv2.LINE_AA, SUBPIXEL)
+            cv2.circle(picture, center, (radius + 1) << SUBPIXEL, color or side_color(name), -1, cv2.LINE_AA, SUBPIXEL)
+            cv2.circle(picture, center, (radius - 1) << SUBPIXEL, INK, -1, cv2.LINE_AA, SUBPIXEL)

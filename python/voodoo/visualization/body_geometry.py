@@ -1,4 +1,4 @@
-"""The body as meshes, colours and bands for a 3-D viewer."""
+"""The body as meshes, colors and bands for a 3-D viewer."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def limb_mesh(
     return vertices.astype(np.float32), triangles.astype(np.uint32), normals.astype(np.float32)
 
 
-def limb_colours(body: Body) -> dict[str, tuple[int, int, int]]:
-    """A colour for each limb: hues evenly spread."""
+def limb_colors(body: Body) -> dict[str, tuple[int, int, int]]:
+    """A color for each limb: hues evenly spread."""
     count = len(body.limbs)
-    colours = {}
+    colors = {}
     for index, limb in enumerate(body.limbs):
         red, green, blue = colorsys.hsv_to_rgb(index / count, 0.75, 1.0)
-        colours[limb.name] = (round(255 * red), round(255 * green), round(255 * blue))
-    return colours
+        colors[limb.name] = (round(255 * red), round(255 * green), round(255 * blue))
+    return colors
 
 
 def nearest_limb(points: FloatArray, estimate: Estimate, body: Body) -> npt.NDArray[np.intp]:
@@ -74,7 +74,7 @@ def nearest_limb(points: FloatArray, estimate: Estimate, body: Body) -> npt.NDAr
 
 
 def bands(estimate: Estimate, body: Body) -> list[FloatArray]:
-    """The elastic band of each joint's centre as (2, 3): from the parent's half of the joint to the child's."""
+    """The elastic band of each joint's center as (2, 3): from the parent's half of the joint to the child's."""
     strips = []
     for name, parent, _, joint, _ in body.core.parts()[1]:
         if parent is None or joint is None:

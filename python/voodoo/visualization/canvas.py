@@ -79,8 +79,8 @@ class OverlayCanvas:
                 continue
             start, middle, end = (point(pixel) for pixel in pixels)
             cv2.line(self.picture, start, end, RAY, 1, cv2.LINE_AA, SUBPIXEL)
-            centre = tuple(value >> SUBPIXEL for value in middle)
-            cv2.drawMarker(self.picture, (centre[0], centre[1]), RAY, cv2.MARKER_TILTED_CROSS, 11, 1, cv2.LINE_AA)
+            center = tuple(value >> SUBPIXEL for value in middle)
+            cv2.drawMarker(self.picture, (center[0], center[1]), RAY, cv2.MARKER_TILTED_CROSS, 11, 1, cv2.LINE_AA)
 
     def finish(self) -> None:
         """Draw what belongs to the picture itself."""
@@ -88,8 +88,8 @@ class OverlayCanvas:
             for pixel, confidence in zip(pixels, strengths, strict=True):
                 strength = 0.3 + 0.7 * min(float(confidence), 1.0)
                 ring = tuple(strength * channel for channel in color)
-                centre = point((pixel + 0.5) * self.scale)
-                cv2.circle(self.picture, centre, 4 << SUBPIXEL, ring, 2, cv2.LINE_AA, SUBPIXEL)
+                center = point((pixel + 0.5) * self.scale)
+                cv2.circle(self.picture, center, 4 << SUBPIXEL, ring, 2, cv2.LINE_AA, SUBPIXEL)
         for mask, marks, names, color in self._regions.values():
             self._draw_regions(mask, marks, names, color)
 
@@ -97,8 +97,8 @@ class OverlayCanvas:
         self, mask: npt.NDArray[np.bool_], marks: FloatArray, names: Mapping[str, FloatArray], color: Color
     ) -> None:
         contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        outlines = [np.round((contour + 0.5) * self.scale).astype(np.int32) for contour in contours]
-        cv2.polylines(self.picture, outlines, True, color, 1, cv2.LINE_AA)
+        silhouettes = [np.round((contour + 0.5) * self.scale).astype(np.int32) for contour in contours]
+        cv2.polylines(self.picture, silhouettes, True, color, 1, cv2.LINE_AA)
         for mark in marks:
             cv2.circle(self.picture, point((mark + 0.5) * self.scale), 3 << SUBPIXEL, color, -1, 0, SUBPIXEL)
         for name, pixel in names.items():

@@ -1,4 +1,4 @@
-"""What all pictures share: their type, colours, and pixel coordinates as OpenCV draws them."""
+"""What all pictures share: their type, colors, and pixel coordinates as OpenCV draws them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Color: TypeAlias = tuple[int, int, int]
 
 INK, PAPER = (250, 250, 250), (24, 20, 18)
 LEFT, RIGHT, MIDDLE = (235, 170, 60), (60, 140, 250), (190, 205, 190)
-"""Blue, orange, grey."""
+"""Blue, orange, gray."""
 RAY = (120, 255, 60)
 SUBPIXEL = 4
 """Bits of a pixel's fraction in OpenCV's fixed-point numbers."""
@@ -33,7 +33,7 @@ def point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
 
 
 def side_color(name: str) -> Color:
-    """Blue for the person's left, orange for the right, grey for the middle."""
+    """Blue for the person's left, orange for the right, gray for the middle."""
     return LEFT if name.startswith("l_") else RIGHT if name.startswith("r_") else MIDDLE
 
 
@@ -44,5 +44,5 @@ _PERSONS: tuple[Color, ...] = (
 
 
 def person_color(person: int) -> Color:
-    """The colour of a person, from 1; the same in all pictures."""
+    """The color of a person, from 1; the same in all pictures."""
     return _PERSONS[(person - 1) % len(_PERSONS)]

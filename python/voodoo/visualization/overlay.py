@@ -31,11 +31,11 @@ __all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
 _LOOK_AHEAD, _MOST_PANELS = 5, 4
 _TARGET_HEIGHT, _TARGET_HEIGHT_OF_FOUR = 640, 480
-_TOP_SIZE, _TOP_METRES = 720, 6.0
+_TOP_SIZE, _TOP_METERS = 720, 6.0
 
 
 class Overlay:
-    """Draws the frames of one recording, all of them with the same colours for the same depth.
+    """Draws the frames of one recording, all of them with the same colors for the same depth.
 
     Args:
         recording: gives the number of frames and the root frame.
@@ -48,7 +48,7 @@ class Overlay:
         self._range: tuple[float, float] | None = None
         self._origin: float | None = None
         # What a view from above shows until somebody is found.
-        self._centre = (0.0, 0.0, 0.0)
+        self._center = (0.0, 0.0, 0.0)
         found: dict[str, Pictured] = {}
         for recorded in islice(paired(recording), _LOOK_AHEAD):
             for item in _pictured(recorded):
@@ -83,8 +83,8 @@ class Overlay:
         if not pictures:
             if estimate.joints:
                 x, y, z = (float(value) for value in np.median(list(estimate.joints.values()), axis=0))
-                self._centre = x, y, z
-            top = TopView(self._centre, _TOP_METRES / _TOP_SIZE, _TOP_SIZE, self._axes)
+                self._center = x, y, z
+            top = TopView(self._center, _TOP_METERS / _TOP_SIZE, _TOP_SIZE, self._axes)
             pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
         picture = in_rows(pictures, columns=self._columns)
         caption(picture, self._when(index, estimate.stamp), estimate)
@@ -93,7 +93,7 @@ class Overlay:
     def draw_people(
         self, recorded: RecordedFrame, estimate: PeopleEstimate, bodies: Mapping[int, Body], *, index: int
     ) -> Picture:
-        """Draw everybody in a frame, each in a colour of their own and with their number.
+        """Draw everybody in a frame, each in a color of their own and with their number.
 
         Args:
             recorded: the measurements; needs the picture of a camera.
@@ -107,8 +107,8 @@ class Overlay:
             canvas.finish()
             pictures.append(canvas.picture)
         picture = in_rows(pictures, columns=self._columns)
-        told = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
-        write_parts(picture, [(self._when(index, estimate.stamp), INK), *told])
+        captions = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
+        write_parts(picture, [(self._when(index, estimate.stamp), INK), *captions])
         return picture
 
     def _canvases(self, recorded: RecordedFrame) -> Iterator[OverlayCanvas]:
@@ -116,8 +116,8 @@ class Overlay:
         current = {item.sensor: item for item in _pictured(recorded)}
         for sensor, first in self._panels.items():
             scale = _scale(first, self._height)
-            seen = self._background(current.get(sensor), first)
-            resized = cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+            observed = self._background(current.get(sensor), first)
+            resized = cv2.resize(observed, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
             item = current.get(sensor, first)
             view = CameraView(item.camera, item.root_from_sensor, scale)
             yield OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
@@ -129,22 +129,22 @@ class Overlay:
 
     def _background(self, item: Pictured | None, first: Pictured) -> Picture:
         """What the camera saw; dark paper when it saw nothing new, or only its keypoints are known."""
-        seen = None if item is None else adapter_of(item).picture(item)
-        if seen is None:
+        observed = None if item is None else adapter_of(item).picture(item)
+        if observed is None:
             return np.full((first.camera.height, first.camera.width, 3), PAPER, dtype=np.uint8)
-        return np.array(seen) if seen.ndim == 3 else self._depth_picture(seen)
+        return np.array(observed) if observed.ndim == 3 else self._depth_picture(observed)
 
-    def _depth_picture(self, metres: npt.NDArray[np.float32]) -> Picture:
-        """Depth as colour: near is bright; nothing measured is dark."""
-        seen = np.isfinite(metres) & (metres > 0.0)
-        if self._range is None and seen.any():
-            near, far = np.percentile(metres[seen], [1.0, 97.0])
+    def _depth_picture(self, meters: npt.NDArray[np.float32]) -> Picture:
+        """Depth as color: near is bright; nothing measured is dark."""
+        observed = np.isfinite(meters) & (meters > 0.0)
+        if self._range is None and observed.any():
+            near, far = np.percentile(meters[observed], [1.0, 97.0])
             self._range = float(near) - 0.3, float(far) + 0.6
         near, far = self._range or (0.5, 5.0)
-        level = np.where(seen, 1.0 - np.clip((metres - near) / (far - near), 0.0, 1.0), 0.0)
+        level = np.where(observed, 1.0 - np.clip((meters - near) / (far - near), 0.0, 1.0), 0.0)
         tone = (40.0 + 190.0 * level**1.3).astype(np.uint8)
         picture = np.asarray(cv2.applyColorMap(tone, cv2.COLORMAP_BONE), dtype=np.uint8)
-        picture[~seen] = PAPER
+        picture[~observed] = PAPER
         return picture
 
 
@@ -176,7 +176,7 @@ def caption(picture: Picture, text: str, estimate: Estimate) -> None:
 
 
 def write_parts(picture: Picture, parts: Sequence[tuple[str, Color]]) -> None:
-    """Write words of several colours into the top left corner."""
+    """Write words of several colors into the top left corner."""
     size = picture.shape[0] / 1100.0
     x, y = round(22 * size), round(42 * size)
     for part, color in parts:
@@ -193,14 +193,14 @@ def _scale(item: Pictured, target: int) -> float:
 
 
 def _grid(view: TopView) -> Picture:
-    """Dark paper with a line every metre."""
+    """Dark paper with a line every meter."""
     picture = np.full((view.size, view.size, 3), PAPER, dtype=np.uint8)
-    half = view.size * view.metres_per_pixel / 2.0
-    centre = np.array(view.centre)
+    half = view.size * view.meters_per_pixel / 2.0
+    center = np.array(view.center)
     horizontal = (0, 1) if view.axes == "rep103" else (0, 2)
     for along, across in (horizontal, horizontal[::-1]):
-        for value in np.arange(np.ceil(centre[along] - half), centre[along] + half):
-            ends = np.repeat(centre[None], 2, axis=0)
+        for value in np.arange(np.ceil(center[along] - half), center[along] + half):
+            ends = np.repeat(center[None], 2, axis=0)
             ends[:, along] = value
             ends[:, across] += (-half, half)
             a, b = (point(pixel) for pixel in view.project(ends)[0])

@@ -1,4 +1,4 @@
-"""Several people drawn into a picture: each in a colour of their own, with their number."""
+"""Several people drawn into a picture: each in a color of their own, with their number."""
 
 from __future__ import annotations
 

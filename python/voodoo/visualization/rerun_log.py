@@ -13,9 +13,9 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
-from voodoo.model.projection import CameraView, limb_outline
+from voodoo.model.projection import CameraView, limb_silhouette
 from voodoo.sensors.adapters.drawing import Pictured, every, grown
-from voodoo.visualization.body_geometry import limb_colours, nearest_limb
+from voodoo.visualization.body_geometry import limb_colors, nearest_limb
 
 _BODY_POINTS = 400
 """Points of a depth image that are shown on the body: enough to see on which limbs they lie."""
@@ -25,7 +25,7 @@ _DEPTH_STEP = 0.005
 _NEAREST_M = 0.05
 _POINT_FILL = 0.3
 """In space a pixel of a depth image fills this share of its place: between them the model shows."""
-_OUTLINE_PX = 0.3
+_SILHOUETTE_PX = 0.3
 """Outlines are drawn with as few corners as keep them within this."""
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6]
 if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # of few different depths whole ones repeat, their differences do not
@@ -81,26 +81,26 @@ class StepLog:
         )
         return path
 
-    def outlines(self, path: str, item: Pictured) -> None:
+    def silhouettes(self, path: str, item: Pictured) -> None:
         """See Log."""
-        outlines, colours = [], []
+        silhouettes, colors = [], []
         for limb in self.body.limbs if self.estimate.joints else ():
             view = CameraView(item.camera, item.root_from_sensor)
-            outline = limb_outline(limb.shape, self.estimate.world_from_limb[limb.name], view)
-            if outline is not None:
-                corners = cv2.approxPolyDP(outline, _OUTLINE_PX, closed=True).reshape(-1, 2)
-                outlines.append(np.vstack([corners, corners[:1]]) + 0.5)
-                colours.append(limb_colours(self.body)[limb.name])
-        self.send(f"{path}/picture/model", self.rr.LineStrips2D(outlines, radii=0.5, colors=colours))
+            contour = limb_silhouette(limb.shape, self.estimate.world_from_limb[limb.name], view)
+            if contour is not None:
+                corners = cv2.approxPolyDP(contour, _SILHOUETTE_PX, closed=True).reshape(-1, 2)
+                silhouettes.append(np.vstack([corners, corners[:1]]) + 0.5)
+                colors.append(limb_colors(self.body)[limb.name])
+        self.send(f"{path}/picture/model", self.rr.LineStrips2D(silhouettes, radii=0.5, colors=colors))
 
-    def depth(self, path: str, image: npt.NDArray[Any], metres_per_unit: float) -> None:
+    def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:
         """See Log."""
         rr = self.rr
         step = 1 if self.whole else every(image.size, self.most_points)
-        millimetres = grown(rounded_millimetres(image[::step, ::step], metres_per_unit), step, image.shape)
-        done, blob = cv2.imencode(".png", millimetres, _PNG)
+        millimeters = grown(rounded_millimeters(image[::step, ::step], meters_per_unit), step, image.shape)
+        done, blob = cv2.imencode(".png", millimeters, _PNG)
         if not done or not hasattr(rr, "EncodedDepthImage"):  # Rerun before 0.29
-            self.send(path, rr.DepthImage(millimetres, meter=1000.0, point_fill_ratio=_POINT_FILL))
+            self.send(path, rr.DepthImage(millimeters, meter=1000.0, point_fill_ratio=_POINT_FILL))
             return
         about = {"media_type": "image/png", "meter": 1000.0, "point_fill_ratio": _POINT_FILL}
         self.send(path, rr.EncodedDepthImage(blob.tobytes(), **about))
@@ -110,24 +110,24 @@ class StepLog:
     ) -> npt.NDArray[np.intp]:
         """See Log."""
         world = np.asarray(points, dtype=np.float64) @ pose[:3, :3].T + pose[:3, 3]
-        colours = np.array([*limb_colours(self.body).values(), _BACKGROUND], dtype=np.uint8)
+        colors = np.array([*limb_colors(self.body).values(), _BACKGROUND], dtype=np.uint8)
         limbs = nearest_limb(world, self.estimate, self.body)
-        shown = np.arange(len(limbs)) if background else np.flatnonzero(limbs < self.limbs)
+        displayed = np.arange(len(limbs)) if background else np.flatnonzero(limbs < self.limbs)
         if not background:
-            shown = shown[:: max(math.ceil(len(shown) / _BODY_POINTS), 1)]
-            shown = shown[np.argsort(limbs[shown], kind="stable")]  # equal colours in a row take no room
-        positions = world[shown].astype(np.float32)
-        self.send(path, self.rr.Points3D(positions, radii=0.006, colors=colours[limbs[shown]]))
+            displayed = displayed[:: max(math.ceil(len(displayed) / _BODY_POINTS), 1)]
+            displayed = displayed[np.argsort(limbs[displayed], kind="stable")]  # equal colors in a row take no room
+        positions = world[displayed].astype(np.float32)
+        self.send(path, self.rr.Points3D(positions, radii=0.006, colors=colors[limbs[displayed]]))
         return limbs
 
 
-def rounded_millimetres(image: npt.NDArray[Any], metres_per_unit: float) -> npt.NDArray[np.uint16]:
+def rounded_millimeters(image: npt.NDArray[Any], meters_per_unit: float) -> npt.NDArray[np.uint16]:
     """Depths [mm] in steps of their own size, up to 65 m; 0 where nothing was seen, or nearer than any camera sees."""
-    metres = image.astype(np.float64) * metres_per_unit
-    seen = np.isfinite(metres) & (metres >= _NEAREST_M)
-    steps = np.round(np.log(metres, where=seen, out=np.zeros_like(metres)) / _DEPTH_STEP)
+    meters = image.astype(np.float64) * meters_per_unit
+    observed = np.isfinite(meters) & (meters >= _NEAREST_M)
+    steps = np.round(np.log(meters, where=observed, out=np.zeros_like(meters)) / _DEPTH_STEP)
     rounded = np.minimum(np.round(1000.0 * np.exp(_DEPTH_STEP * steps)), 65535.0)
-    return np.where(seen, rounded, 0.0).astype(np.uint16)
+    return np.where(observed, rounded, 0.0).astype(np.uint16)
 
 
 def entity(name: str) -> str:

@@ -24,7 +24,7 @@ from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.search import nobody
 from voodoo.sensors.adapters import Memory, adapters_of
-from voodoo.visualization.body_geometry import bands, limb_colours, limb_mesh
+from voodoo.visualization.body_geometry import bands, limb_colors, limb_mesh
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
 from voodoo.visualization.rerun_server import Server
@@ -32,14 +32,14 @@ from voodoo.visualization.rerun_server import Server
 _MOST_POINTS = 40_000
 _EPOCH_S = 1e9
 _CHUNK_BYTES = 8_000_000
-_SEEN_M = 0.002
+_VISIBLE_M = 0.002
 
 
 class Viewer:
     """Writes what happens in a step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
     Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
-    deviation of each joint), `world/body/bands`, `world/points/<source>` (coloured by
+    deviation of each joint), `world/body/bands`, `world/points/<source>` (colored by
     the limb they lie on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
     (pictures with the outlines of the projected limbs, skin candidates and keypoints; in depth images the person's
     silhouette, limb by limb), `plots/...`; the timeline is `time`.
@@ -134,9 +134,9 @@ class Viewer:
             seconds: time the step took.
         """
         self._set_time(estimate.stamp)
-        colours = limb_colours(body)
-        self._log_classes(body, colours)
-        self._log_body("world/body", estimate, body, colours)
+        colors = limb_colors(body)
+        self._log_classes(body, colors)
+        self._log_body("world/body", estimate, body, colors)
         memory = Memory() if front_end is None else front_end.memory
         log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS, self._whole)
         for item in () if recorded is None else recorded.measurements:
@@ -154,7 +154,7 @@ class Viewer:
         recorded: RecordedFrame | None = None,
         seconds: float | None = None,
     ) -> None:
-        """Show a step of several people: `world/people/<id>/...`, each in a colour of their own and with their number.
+        """Show a step of several people: `world/people/<id>/...`, each in a color of their own and with their number.
 
         Args:
             estimate: who is there.
@@ -177,12 +177,12 @@ class Viewer:
         for person in estimate:
             if person.id in there:
                 path, blue_green_red = f"world/people/{person.id}", person_color(person.id)
-                colour = (blue_green_red[2], blue_green_red[1], blue_green_red[0])
+                color = (blue_green_red[2], blue_green_red[1], blue_green_red[0])
                 body = bodies[person.id]
-                self._log_body(path, person.estimate, body, dict.fromkeys(body.limb_names, colour))
+                self._log_body(path, person.estimate, body, dict.fromkeys(body.limb_names, color))
                 head = person.estimate.joint_positions[person.estimate.joint_positions[:, 2].argmax()]
                 words = [f"{person.id} {person.status}"]
-                self._stream.log(f"{path}/number", rr.Points3D([head], labels=words, colors=[colour], radii=0.02))
+                self._stream.log(f"{path}/number", rr.Points3D([head], labels=words, colors=[color], radii=0.02))
             self._stream.log(f"plots/status/{person.id}", rr.TextLog(str(person.status)))
         self._stream.log("plots/people", rr.Scalars(float(len(there))))
         if seconds is not None:
@@ -198,25 +198,25 @@ class Viewer:
         self._stream.log(path, self._rr.Clear(recursive=True))
         self._shapes = {name: shape for name, shape in self._shapes.items() if not name.startswith(f"{path}/")}
 
-    def _log_classes(self, body: Body, colours: Mapping[str, tuple[int, int, int]]) -> None:
-        """Names and colours of the silhouette's values; 0 is the background."""
+    def _log_classes(self, body: Body, colors: Mapping[str, tuple[int, int, int]]) -> None:
+        """Names and colors of the silhouette's values; 0 is the background."""
         if self._classes != body.limb_names:
             self._classes = body.limb_names
             rows = [(0, "background", (0, 0, 0, 0))]
-            rows += [(index, name, (*colours[name], 255)) for index, name in enumerate(self._classes, start=1)]
+            rows += [(index, name, (*colors[name], 255)) for index, name in enumerate(self._classes, start=1)]
             self._stream.log("world", self._rr.AnnotationContext(rows), static=True)
 
-    def _log_body(self, path: str, estimate: Estimate, body: Body, colours: Mapping[str, tuple[int, int, int]]) -> None:
+    def _log_body(self, path: str, estimate: Estimate, body: Body, colors: Mapping[str, tuple[int, int, int]]) -> None:
         rr = self._rr
         if not estimate.joints:
             self._clear(path)
             return
         for limb in body.limbs:
             place = f"{path}/limbs/{limb.name}"
-            shown = self._shapes.get(place)
-            if not _alike(shown, limb.shape):
+            logged = self._shapes.get(place)
+            if not _alike(logged, limb.shape):
                 self._shapes[place] = limb.shape
-                self._stream.log(place, self._mesh(limb.shape, colours[limb.name], known=shown is not None))
+                self._stream.log(place, self._mesh(limb.shape, colors[limb.name], known=logged is not None))
             pose = estimate.world_from_limb[limb.name]
             self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
         self._stream.log(
@@ -226,13 +226,13 @@ class Viewer:
         self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
-    def _mesh(self, shape: TaperedEllipticCylinder, colour: tuple[int, int, int], *, known: bool) -> object:
+    def _mesh(self, shape: TaperedEllipticCylinder, color: tuple[int, int, int], *, known: bool) -> object:
         """A limb's surface; of one that is `known` only where its corners are now."""
         vertices, triangles, normals = limb_mesh(shape)
         if known and hasattr(self._rr.Mesh3D, "from_fields"):
             return self._rr.Mesh3D.from_fields(vertex_positions=vertices)
         return self._rr.Mesh3D(
-            vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=(*colour, 150)
+            vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=(*color, 150)
         )
 
     def _log_spread(self, path: str, estimate: Estimate) -> None:
@@ -255,14 +255,14 @@ class Viewer:
         )
 
     def _log_rays(self, front_end: FrontEnd, estimate: Estimate) -> None:
-        strips, colours, labels = [], [], []
+        strips, colors, labels = [], [], []
         for ray in front_end.rays:
             reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
             strips.append(np.array([ray.origin, ray.origin + ray.direction * (reach + 0.3)]))
-            colours.append((0, 255, 120, round(60 + 195 * ray.trust)))
+            colors.append((0, 255, 120, round(60 + 195 * ray.trust)))
             labels.append(f"{ray.site} ({ray.source})")
         self._stream.log(
-            "world/rays", self._rr.LineStrips3D(strips, radii=0.004, colors=colours, labels=labels, show_labels=False)
+            "world/rays", self._rr.LineStrips3D(strips, radii=0.004, colors=colors, labels=labels, show_labels=False)
         )
 
     def _log_plots(self, estimate: Estimate, seconds: float | None) -> None:
@@ -282,7 +282,7 @@ class Viewer:
 def _alike(one: TaperedEllipticCylinder | None, other: TaperedEllipticCylinder) -> bool:
     """Whether nobody sees a difference: sizes are refined in every frame, and a mesh takes kilobytes."""
     sizes = ("length", "a0", "b0", "a1", "b1")
-    return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _SEEN_M for name in sizes)
+    return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _VISIBLE_M for name in sizes)
 
 
 def _large_chunks(rr: ModuleType) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Makes the recordings beside this file with librealsense's own software device and recorder: depth and colour, extrinsics
+"""Makes the recordings beside this file with librealsense's own software device and recorder: depth and color, extrinsics
 that are not the identity.
 
     pip install pyrealsense2==2.55.1.6486 && python tests/data/realsense/make.py tests/data/realsense/recorded_2_55.bag

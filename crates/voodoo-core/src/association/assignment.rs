@@ -1,7 +1,7 @@
 //! Steps 2-4: which candidate belongs to which limb, fewer of them, and the closest points (K06 IV-B.2-4).
 
 use crate::association::correspondence::LimbMatches;
-use crate::association::nearest_limb::{NONE, Nearest};
+use crate::association::nearest_limb::{NONE, NearestLimb};
 use crate::body::{Body, Limb};
 use crate::config::{Config, Overlap};
 use crate::math::{Points, Pose, widest};
@@ -13,7 +13,7 @@ use crate::shape::Region;
 pub(crate) struct Assignment {
     /// Candidates of each limb, ascending.
     members: Vec<Vec<u32>>,
-    search: Nearest,
+    search: NearestLimb,
     /// The nearest limb of each candidate.
     nearest: Vec<u32>,
     /// Which limbs' boxes hold each candidate, where the policy asks for it.
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn sampling_keeps_what_the_configuration_says() {
+    fn sampling_keeps_what_the_configuration_reports() {
         let config = Config { sampling_factor: 4, min_limb_points: 20, max_limb_points: 60, ..Config::default() };
         for (members, kept) in [(0, 0), (10, 10), (40, 20), (100, 25), (1000, 60)] {
             assert_eq!(sampled_count(members, &config), kept, "of {members}");

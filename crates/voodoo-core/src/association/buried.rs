@@ -8,7 +8,7 @@ use crate::math::{Pose, Vec3};
 
 /// Places on a limb's axis, as shares of its length.
 const ON_AXIS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-/// A place that lies so deep in another limb is inside it, metres: limbs are soft, and thinner or thicker than their models.
+/// A place that lies so deep in another limb is inside it, meters: limbs are soft, and thinner or thicker than their models.
 const DEEP: f64 = 0.03;
 
 /// Which limbs of a body lie inside others.
@@ -29,13 +29,13 @@ impl Buried {
         spheres.extend(parts.iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         limbs.clear();
         limbs.extend((0..poses.len()).map(|limb| {
-            let inside = |share: &&f64| {
-                let place = poses[limb] * (**share * parts[limb].shape.length() * Vec3::Z);
+            let inside = |fraction: &&f64| {
+                let place = poses[limb] * (**fraction * parts[limb].shape.length() * Vec3::Z);
                 (0..poses.len()).any(|other| {
                     let (middle, reach) = spheres[other];
                     let depth =
                         || -parts[other].shape.approximate_distance(poses[other].inverse_transform_point(place));
-                    (place - middle).length_squared() < reach * reach && body.apart(limb, other) && depth() > DEEP
+                    (place - middle).length_squared() < reach * reach && body.are_apart(limb, other) && depth() > DEEP
                 })
             };
             2 * ON_AXIS.iter().filter(inside).count() > ON_AXIS.len()

@@ -5,60 +5,60 @@ use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3, widest};
 use crate::observation::depth_view::{DepthView, Pixel};
 
-/// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbours as well.
+/// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbors as well.
 const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
-/// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, metres.
+/// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, meters.
 const DEPTH_REACH: f64 = 0.12;
 /// A limb whose axis makes an angle with the line of sight of less than this sine (30 degrees) shows no sides: what ends there
 /// is the next limb.
 const ASLANT: f64 = 0.5;
-/// How far beyond the limb's rim its edge is looked for, metres: clothes, and the error of a predicted pose.
+/// How far beyond the limb's rim its edge is looked for, meters: clothes, and the error of a predicted pose.
 const EDGE_REACH: f64 = 0.08;
-/// The same beyond a free limb's tip, metres: along its axis a limb slides farther than across.
+/// The same beyond a free limb's tip, meters: along its axis a limb slides farther than across.
 const TIP_REACH: f64 = 0.20;
-/// An edge with the surface of another limb this near, metres, may be that limb's: it tells nothing of girths.
+/// An edge with the surface of another limb this near, meters, may be that limb's: it tells nothing of girths.
 const OTHERS_EDGE: f32 = 0.03;
-/// Edges are approached in strides of about this length, metres: a fraction of what is fitted, for speed.
+/// Edges are approached in strides of about this length, meters: a fraction of what is fitted, for speed.
 const STRIDE: f64 = 0.008;
 /// A stride is so many steps of half a pixel at most: in a coarse image it would pass over a thin limb.
 const MOST_STEPS: f64 = 4.0;
 /// The first look after the axis is at this share of the rim's distance: what lies well inside the limb is no edge.
-const FIRST_LOOK: f64 = 0.4;
+const FIRST_STEP: f64 = 0.4;
 /// The edge lies between the last look at the body and the first past it; so often is what lies between them halved: to a
 /// sixteenth of a pixel. Else the model would follow where the looks fell, not the edge.
 const HALVINGS: usize = 5;
-/// Steps are no shorter than those of half a pixel at this depth, metres.
+/// Steps are no shorter than those of half a pixel at this depth, meters.
 const NEAREST_STEP: f64 = 0.1;
 
 /// One place on the rim of a limb and the edge seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Edge {
+pub(crate) struct DepthEdge {
     /// Direction in which the edge was looked for, limb frame, length one: across the limb at right angles to the line of
     /// sight, or along its axis.
     pub side: Vec3,
-    /// Distance of the model's rim in that direction from the axis, or from the proximal end, metres.
+    /// Distance of the model's rim in that direction from the axis, or from the proximal end, meters.
     pub rim: f64,
     /// The rim's point nearest to the edge, limb frame.
     pub foot: Vec3,
-    /// Distance of the seen edge, likewise, metres.
-    pub seen: f64,
+    /// Distance of the seen edge, likewise, meters.
+    pub reach: f64,
     /// The last place seen on the body, working frame.
     pub place: Vec3,
 }
 
 /// Looks for the edges on both sides of a limb, and at its tip when it ends free.
-pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(Edge)) {
+pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(DepthEdge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    let mut look = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
+    let mut search = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let search = ContourSearch { start, along, rim, thickness, reach };
         let edge = widest(
             #[inline(always)]
             || search.edge(view),
         );
-        if let Some((seen, place)) = edge {
-            found(Edge { side, rim, foot, seen, place: view.working_from_camera * place });
+        if let Some((found_at, place)) = edge {
+            found(DepthEdge { side, rim, foot, reach: found_at, place: view.working_from_camera * place });
         }
     };
     for t in STATIONS {
@@ -70,7 +70,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
         }
         let thickness = section.extent(facing.ahead);
         for side in [facing.side, -facing.side] {
-            look(section.centre(), side, section.extent(side), thickness, section.farthest_point(side), EDGE_REACH);
+            search(section.center(), side, section.extent(side), thickness, section.farthest_point(side), EDGE_REACH);
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
@@ -82,11 +82,11 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
         let radius = (shape.a1() * ahead.x).hypot(shape.b1() * ahead.y);
         let foot = tip - ahead * (radius * sight.z.signum());
         let rim = shape.length() + radius * sight.z.abs() / across;
-        look(Vec3::ZERO, Vec3::Z, rim, shape.a1().max(shape.b1()), foot, TIP_REACH);
+        search(Vec3::ZERO, Vec3::Z, rim, shape.a1().max(shape.b1()), foot, TIP_REACH);
     }
 }
 
-/// A way across an image: from a point along a direction (camera frame), metres.
+/// A way across an image: from a point along a direction (camera frame), meters.
 struct ContourSearch {
     start: Vec3,
     along: Vec3,
@@ -120,7 +120,7 @@ impl ContourSearch {
                     return Some(self.halved(view, on?, r));
                 }
             }
-            r = if r == 0.0 { (FIRST_LOOK * self.rim).max(step) } else { r + stride };
+            r = if r == 0.0 { (FIRST_STEP * self.rim).max(step) } else { r + stride };
         }
         None
     }
@@ -144,22 +144,22 @@ impl ContourSearch {
 /// The contours of all limbs in all depth images of a frame, and working memory.
 #[derive(Debug, Default)]
 pub(crate) struct Contours {
-    edges: Vec<Found>,
+    edges: Vec<LimbEdge>,
     places: Points,
     distance: Vec<f32>,
     least: Vec<f32>,
     closest: Vec<usize>,
-    strangers: Vec<f32>,
+    others: Vec<f32>,
 }
 
 /// The edge of a limb, and where it stands in the working frame.
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct LimbEdge {
     limb: usize,
-    edge: Edge,
+    edge: DepthEdge,
     target: Vec3,
-    /// Distance of the edge to the nearest other limb, metres.
-    stranger: f32,
+    /// Distance of the edge to the nearest other limb, meters.
+    others: f32,
 }
 
 impl Contours {
@@ -176,19 +176,19 @@ impl Contours {
             for (limb, (part, pose)) in body.limbs().iter().zip(poses).enumerate() {
                 edges(&view, part, pose, |edge| {
                     self.places.push(edge.place.to_array().map(|value| value as f32));
-                    let target = *pose * (edge.foot + edge.side * (edge.seen - edge.rim));
-                    self.edges.push(Found { limb, edge, target, stranger: f32::INFINITY });
+                    let target = *pose * (edge.foot + edge.side * (edge.reach - edge.rim));
+                    self.edges.push(LimbEdge { limb, edge, target, others: f32::INFINITY });
                 });
             }
         }
         self.find_closest(body, poses);
         let mut closest = self.closest.iter();
-        let mut strangers = self.strangers.iter();
+        let mut others = self.others.iter();
         self.edges.retain_mut(|found| {
             let closest = closest.next();
-            found.stranger = strangers.next().copied().unwrap_or(f32::INFINITY);
+            found.others = others.next().copied().unwrap_or(f32::INFINITY);
             // Beyond the rim, the edge may be another limb's.
-            found.edge.seen <= found.edge.rim || closest == Some(&found.limb)
+            found.edge.reach <= found.edge.rim || closest == Some(&found.limb)
         });
     }
 
@@ -199,8 +199,8 @@ impl Contours {
         self.least.resize(count, f32::INFINITY);
         self.closest.clear();
         self.closest.resize(count, 0);
-        self.strangers.clear();
-        self.strangers.resize(count, f32::INFINITY);
+        self.others.clear();
+        self.others.resize(count, f32::INFINITY);
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
             for ((least, closest), distance) in self.least.iter_mut().zip(&mut self.closest).zip(&self.distance) {
@@ -208,25 +208,25 @@ impl Contours {
                     (*least, *closest) = (*distance, index);
                 }
             }
-            for ((found, stranger), distance) in self.edges.iter().zip(&mut self.strangers).zip(&self.distance) {
+            for ((found, others), distance) in self.edges.iter().zip(&mut self.others).zip(&self.distance) {
                 if found.limb != index {
-                    *stranger = stranger.min(*distance);
+                    *others = others.min(*distance);
                 }
             }
         }
     }
 
     /// The edges on the sides of a limb that were found apart from other limbs.
-    pub(crate) fn sides(&self, limb: usize) -> impl Iterator<Item = Edge> {
+    pub(crate) fn sides(&self, limb: usize) -> impl Iterator<Item = DepthEdge> {
         let own =
-            move |found: &&Found| found.limb == limb && found.stranger >= OTHERS_EDGE && found.edge.side != Vec3::Z;
+            move |found: &&LimbEdge| found.limb == limb && found.others >= OTHERS_EDGE && found.edge.side != Vec3::Z;
         self.edges.iter().filter(own).map(|found| found.edge)
     }
 
     /// The rims at `poses` and the edges that were found, as pairs.
     pub(crate) fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
         pairs.clear();
-        pairs.extend(self.edges.iter().map(|Found { limb, edge, target, .. }| {
+        pairs.extend(self.edges.iter().map(|LimbEdge { limb, edge, target, .. }| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
             ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
         }));
@@ -268,7 +268,7 @@ mod tests {
         ask(views.iter().next().unwrap())
     }
 
-    /// A forearm across the picture, two metres away, at right angles to the line of sight.
+    /// A forearm across the picture, two meters away, at right angles to the line of sight.
     fn forearm() -> (Limb, Pose) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let mut limb = body.limbs()[body.limb_index("l_forearm").unwrap()].clone();
@@ -285,32 +285,32 @@ mod tests {
         for wider in [-0.01, 0.0, 0.015] {
             let [a0, b0, a1, b1] =
                 [limb.shape.a0(), limb.shape.b0(), limb.shape.a1(), limb.shape.b1()].map(|axis| axis + wider);
-            let seen = TaperedEllipticCylinder::new(limb.shape.length() + wider, a0, b0, a1, b1).unwrap();
+            let observed = TaperedEllipticCylinder::new(limb.shape.length() + wider, a0, b0, a1, b1).unwrap();
             let mut found = Vec::new();
-            with_view(&shoot(&seen, &pose), |view| edges(&view, &limb, &pose, |edge| found.push(edge)));
+            with_view(&shoot(&observed, &pose), |view| edges(&view, &limb, &pose, |edge| found.push(edge)));
             assert_eq!(found.len(), 2 * STATIONS.len() + 1, "both sides, and the tip");
             for edge in found {
-                let off = edge.seen - edge.rim - wider;
+                let off = edge.reach - edge.rim - wider;
                 assert!(off.abs() < pixel, "{wider} wider: off by {off} m at {edge:?}");
             }
         }
     }
 
     #[test]
-    fn an_edge_stays_where_it_is_seen_when_the_model_moves_a_little() {
+    fn an_edge_stays_where_it_is_visible_when_the_model_moves_a_little() {
         let (limb, pose) = forearm();
         let pixels = shoot(&limb.shape, &pose);
         let step = 0.5 * 2.0 / FOCAL;
-        let seen = |off: f64| {
+        let observed = |off: f64| {
             let moved = Pose::from_parts(pose.translation + Vec3::new(0.0, off * step, 0.0), pose.rotation);
             let mut found = Vec::new();
             with_view(&pixels, |view| {
-                edges(&view, &limb, &moved, |edge| found.push((moved * (edge.side * edge.seen)).y));
+                edges(&view, &limb, &moved, |edge| found.push((moved * (edge.side * edge.reach)).y));
             });
             found.truncate(2 * STATIONS.len());
             found
         };
-        let all: Vec<Vec<f64>> = (0..8).map(|eighth| seen(f64::from(eighth) / 8.0)).collect();
+        let all: Vec<Vec<f64>> = (0..8).map(|eighth| observed(f64::from(eighth) / 8.0)).collect();
         for edge in 0..2 * STATIONS.len() {
             let places = all.iter().map(|found| found[edge]);
             let spread = places.clone().fold(f64::MIN, f64::max) - places.fold(f64::MAX, f64::min);

@@ -33,7 +33,7 @@ pub(crate) struct SitePair {
     pub weight: f64,
     /// Scalar weight of the measurement, before its bias is taken off.
     pub base_weight: f64,
-    /// The measurement may always be this far off, metres.
+    /// The measurement may always be this far off, meters.
     pub bias: f64,
     /// What of a difference counts: the identity for a position, `I - d d^T` for a ray along `d`.
     pub across: Mat3,
@@ -52,11 +52,11 @@ pub(crate) struct ContourPair {
     pub x: Vec3,
     /// Direction across the limb and the line of sight.
     pub normal: Vec3,
-    /// The edge lies so far out along it, metres; negative when the image shows less than the model.
+    /// The edge lies so far out along it, meters; negative when the image shows less than the model.
     pub distance: f64,
 }
 
-/// A point of a limb's contour and the edge of its colours in a picture: a distance along one direction.
+/// A point of a limb's contour and the edge of its colors in a picture: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RegionPair {
     /// The limb.
@@ -65,9 +65,9 @@ pub(crate) struct RegionPair {
     pub x: Vec3,
     /// Direction in which the point is seen to move across the contour, outward, length one.
     pub normal: Vec3,
-    /// The edge lies so far out along it, metres.
+    /// The edge lies so far out along it, meters.
     pub distance: f64,
-    /// What the colours say of it, 1/m^2.
+    /// What the colors say of it, 1/m^2.
     pub information: f64,
     /// Number of the source.
     pub source: u16,
@@ -76,13 +76,13 @@ pub(crate) struct RegionPair {
 /// What pictures say of a limb, by its lines: shares of those that can tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct RegionSupport {
-    /// Its colours end at its contour: of the whole limb, each line weighted with its distance from the proximal joint, and of
+    /// Its colors end at its contour: of the whole limb, each line weighted with its distance from the proximal joint, and of
     /// its outer part.
     pub own: [f64; 2],
-    /// The colours of its surroundings are seen within it, likewise.
+    /// The colors of its surroundings are seen within it, likewise.
     pub against: [f64; 2],
     /// Lines that can tell, as a share of all.
-    pub shown: f64,
+    pub visible: f64,
     /// Number of lines.
     pub lines: f64,
     /// What a limb of an arm or leg explains of the pictures, and no limb of another one or of the trunk, patches.
@@ -117,7 +117,7 @@ pub(crate) struct Correspondences {
     pub sites: Vec<SitePair>,
     /// Rims of limbs and the contour of the body in depth images.
     pub contour: Vec<ContourPair>,
-    /// Contours of limbs and edges of colours.
+    /// Contours of limbs and edges of colors.
     pub regions: Vec<RegionPair>,
     /// What they say of each limb; empty without pictures.
     pub region_support: Vec<RegionSupport>,
@@ -200,16 +200,16 @@ impl Correspondences {
         self.limbs[limb].total_weight() + sites
     }
 
-    /// Mean squared distance of the surface points that fit, metres squared: Geman-McClure's weights of `scale` leave out those
+    /// Mean squared distance of the surface points that fit, meters squared: Geman-McClure's weights of `scale` leave out those
     /// that belong to something else.
     pub(crate) fn scatter(&self, scale: f64) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);
         let inverse_square = 1.0 / (scale * scale);
         for limb in &self.limbs {
-            let fitting = |share, distance| {
+            let fitting = |fraction, distance| {
                 let square = f64::from(distance) * f64::from(distance);
                 let falloff = 1.0 / (1.0 + square * inverse_square);
-                let fits = f64::from(share) * (falloff * falloff);
+                let fits = f64::from(fraction) * (falloff * falloff);
                 [fits, fits * square]
             };
             let [fits, squares] = widest(
@@ -237,7 +237,7 @@ impl Correspondences {
         (weight > 0.0).then(|| sum / weight)
     }
 
-    /// Mean of the squared distances of the edges of colour regions by what they tell, `None` without any.
+    /// Mean of the squared distances of the edges of color regions by what they tell, `None` without any.
     pub(crate) fn mean_squared_edge(&self) -> Option<f64> {
         let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
         let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();

@@ -79,15 +79,15 @@ impl Correspondences {
         }
         for (child, limb) in body.limbs().iter().enumerate() {
             let Some((parent, joint)) = &limb.parent else { continue };
-            let share = joint.weight / joint.band_count() as f64;
+            let fraction = joint.weight / joint.band_count() as f64;
             for point in joint.band_points() {
                 self.bands.push(Band {
                     parent: *parent,
                     child,
                     on_parent: poses[*parent] * (joint.parent_from_joint * point),
                     on_child: poses[child] * (joint.limb_from_joint * point),
-                    parent_weight: share * measured[*parent],
-                    child_weight: share * measured[child],
+                    parent_weight: fraction * measured[*parent],
+                    child_weight: fraction * measured[child],
                 });
             }
         }
@@ -102,7 +102,7 @@ mod tests {
     use crate::observation::frame::{PositionRelation, RayRelation};
 
     #[test]
-    fn the_bands_of_a_limb_weigh_a_fixed_share_of_its_measurements() {
+    fn the_bands_of_a_limb_weigh_a_fixed_fraction_of_its_measurements() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = body.rest_pose(Pose::IDENTITY);
         let mut all = Correspondences::default();
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_position_within_its_bias_says_nothing() {
+    fn a_position_within_its_bias_reports_nothing() {
         let body = Body::human(1.75, HumanModel::Papers).unwrap();
         let poses = body.rest_pose(Pose::IDENTITY);
         let site = body.site_index("r_hip").unwrap();

@@ -11,27 +11,27 @@ use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
 pub(crate) const NONE: u32 = u32::MAX;
 /// Squared distance of a point that lies outside a limb's box.
 const OUTSIDE: f32 = f32::INFINITY;
-/// What single precision may err in the place of a box, metres, and as a share of the coordinates it was computed from; bounds
+/// What single precision may err in the place of a box, meters, and as a share of the coordinates it was computed from; bounds
 /// are that much wider.
 const SINGLE_PRECISION: (f32, f32) = (1e-4, 1e-6);
 
-/// Semi-axes are taken for no less than this, metres, near a tip: their product divides.
+/// Semi-axes are taken for no less than this, meters, near a tip: their product divides.
 const THINNEST: f32 = 1e-4;
 
-type Lanes = [f32; LANES];
+type LimbLanes = [f32; LANES];
 type Squares = [f32; CLUSTER];
 
 /// The limbs in their poses, and working memory.
 #[derive(Debug, Default)]
-pub(crate) struct Nearest {
+pub(crate) struct NearestLimb {
     limbs: Vec<LimbBox>,
     groups: Vec<Group>,
-    least: Vec<Lanes>,
+    least: Vec<LimbLanes>,
     /// The limbs that were nearest to two points of each cluster the last time: probably they are again.
     expected: Vec<[u32; 2]>,
 }
 
-impl Nearest {
+impl NearestLimb {
     /// Puts the limbs where they are, their boxes enlarged by `margin`; those that are `buried` hold no point. Empty: none is.
     pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
         self.limbs.clear();
@@ -81,17 +81,17 @@ impl Nearest {
                 best.offer(second as u32, &limbs[second].squares(cluster));
             }
             for (start, least) in (0..).step_by(LANES).zip(least.iter()) {
-                let mut wanted = within(least, best.worst());
+                let mut remaining = within(least, best.worst());
                 for limb in [first, second] {
-                    wanted &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
+                    remaining &= !(1_u32.checked_shl((limb as u32).wrapping_sub(start)).unwrap_or(0));
                 }
-                while wanted != 0 {
-                    let limb = start + wanted.trailing_zeros();
+                while remaining != 0 {
+                    let limb = start + remaining.trailing_zeros();
                     best.offer(limb, &limbs[limb as usize].squares(cluster));
-                    wanted &= wanted - 1;
-                    if wanted != 0 {
+                    remaining &= remaining - 1;
+                    if remaining != 0 {
                         // It may have left less to those that follow.
-                        wanted &= within(least, best.worst());
+                        remaining &= within(least, best.worst());
                     }
                 }
             }
@@ -116,7 +116,7 @@ impl Nearest {
 
 /// Which values are at most `worst`, one bit each; [`OUTSIDE`] never is.
 #[inline(always)]
-fn within(values: &Lanes, worst: f32) -> u32 {
+fn within(values: &LimbLanes, worst: f32) -> u32 {
     let mut bits = 0;
     for lane in 0..LANES {
         bits |= u32::from(values[lane] <= worst) << lane;
@@ -158,13 +158,13 @@ impl Best {
 #[derive(Debug)]
 struct Group {
     /// Columns of the rotations, and the shifts, from the working frame to the limbs'.
-    axes: [[Lanes; 3]; 3],
-    shift: [Lanes; 3],
-    low: [Lanes; 3],
-    high: [Lanes; 3],
-    length: Lanes,
-    radius: Lanes,
-    flatness: Lanes,
+    axes: [[LimbLanes; 3]; 3],
+    shift: [LimbLanes; 3],
+    low: [LimbLanes; 3],
+    high: [LimbLanes; 3],
+    length: LimbLanes,
+    radius: LimbLanes,
+    flatness: LimbLanes,
 }
 
 impl Group {
@@ -187,8 +187,8 @@ impl Group {
     /// Squares that [`LimbBox::squares`] does not fall below for any point inside the bounds, [`OUTSIDE`] when no such point
     /// lies in the limb's box.
     #[inline(always)]
-    fn least_squares(&self, bounds: &Bounds) -> Lanes {
-        let (c, h) = (bounds.centre, bounds.half);
+    fn least_squares(&self, bounds: &Bounds) -> LimbLanes {
+        let (c, h) = (bounds.center, bounds.half);
         let slack = SINGLE_PRECISION.0
             + SINGLE_PRECISION.1 * [c, h].as_flattened().iter().map(|value| value.abs()).sum::<f32>();
         let at_least = |value: f32, least: f32| if value > least { value } else { least };
@@ -317,7 +317,7 @@ mod tests {
     #[test]
     fn what_is_passed_over_is_not_the_nearest() -> Result<(), Box<dyn std::error::Error>> {
         let body = Body::human(1.75, HumanModel::Full)?;
-        let (mut search, mut clusters) = (Nearest::default(), Clusters::default());
+        let (mut search, mut clusters) = (NearestLimb::default(), Clusters::default());
         for (seed, margin) in [(0, 0.0), (1, 0.12), (2, 0.3)] {
             let poses = body.rest_pose(Pose::new(Vec3::ZERO, Vec3::new(0.1, 0.2, 0.3) * seed as f64));
             let points = around(seed);

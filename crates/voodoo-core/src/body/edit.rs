@@ -49,7 +49,7 @@ impl Body {
         Ok(body)
     }
 
-    /// Moves the surface of a limb across its axis by `shift` (limb frame, metres) and multiplies its semi-axes (a0, b0, a1, b1) by `axes`.
+    /// Moves the surface of a limb across its axis by `shift` (limb frame, meters) and multiplies its semi-axes (a0, b0, a1, b1) by `axes`.
     /// The limb frame moves with the surface; joints and sites stay where they are in space. A change that makes no solid is
     /// not made.
     pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, axes: [f64; 4]) -> bool {

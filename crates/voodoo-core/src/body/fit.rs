@@ -7,9 +7,9 @@ use crate::math::{Mat3, Moments, Pose, Quat, Vec3, is_place};
 
 /// A hinge bent by less than this does not tell its axis: sine of the angle between its limbs.
 const BENT: f64 = 0.3;
-/// Squares of coordinates up to these metres leave enough digits for a body; those of a map (UTM) do not.
+/// Squares of coordinates up to these meters leave enough digits for a body; those of a map (UTM) do not.
 const NEAR_ORIGIN: f64 = 1e4;
-/// Nobody means a body so many times larger or smaller than the reference body: the positions are not in metres.
+/// Nobody means a body so many times larger or smaller than the reference body: the positions are not in meters.
 const LARGEST: f64 = 10.0;
 /// A landmark this share of a limb's length from its joint shows where the limb points.
 const FAR_END: f64 = 0.5;
@@ -18,12 +18,12 @@ const STEADY: f64 = 2.5;
 /// A limb whose joint turns by less than this about any axis carries its landmarks for its parent: a clavicle for the chest.
 const RIGID: f64 = 1.0;
 /// Nobody's limb is shorter than this share of its pair: it was foreshortened, or one of its joints was set along it.
-const UNLIKE: f64 = 0.75;
+const UNEQUAL: f64 = 0.75;
 /// Limbs whose axes are no farther apart than 30 degrees (cosine) are in line: where their joint is along it is hard to see.
 const STRAIGHT: f64 = 0.866;
 /// Weight of the prior orientation against landmarks of weight one: it decides only what they leave open.
 const PRIOR_WEIGHT: f64 = 0.01;
-/// Lever of the prior orientation, metres: about the distance of landmarks on a limb.
+/// Lever of the prior orientation, meters: about the distance of landmarks on a limb.
 const PRIOR_LEVER: f64 = 0.1;
 
 /// Landmarks that lie this share of a limb's length apart along it tell how long it is.
@@ -33,7 +33,7 @@ const MOST_STRETCH: f64 = 2.0;
 /// Points lie on a line when the products of pairs of their scatter's eigenvalues are this share of its squared trace: as broad
 /// as a hundredth of their length.
 const ON_A_LINE: f64 = 1e-4;
-/// Points whose scatter has no larger trace than this, square metres, are one point.
+/// Points whose scatter has no larger trace than this, square meters, are one point.
 const ON_A_POINT: f64 = 1e-8;
 
 impl Body {
@@ -49,7 +49,7 @@ impl Body {
                 let name = &self.sites()[*site].name;
                 return Err(TrackError::measurement(
                     format!("joints[{name}]"),
-                    "finite metres, 1e9 at most",
+                    "finite meters, 1e9 at most",
                     format!("{position:?}"),
                 ));
             }
@@ -75,7 +75,7 @@ impl Body {
         if !(1.0 / LARGEST..=LARGEST).contains(&scale) {
             return Err(TrackError::measurement(
                 "joints",
-                "metres, between a tenth and ten times the body's own distances",
+                "meters, between a tenth and ten times the body's own distances",
                 format!("{scale:.4} times"),
             ));
         }
@@ -86,9 +86,9 @@ impl Body {
                 None => (world_from_rest * rest[0], None),
                 Some((parent, joint)) => {
                     let prior = poses[*parent] * joint.parent_from_limb_at_rest();
-                    let centre = measured(body.roles.joint_site(limb), positions)
+                    let center = measured(body.roles.joint_site(limb), positions)
                         .unwrap_or_else(|| poses[*parent] * joint.parent_from_joint.translation);
-                    (prior, Some((joint.limb_from_joint.translation, centre)))
+                    (prior, Some((joint.limb_from_joint.translation, center)))
                 }
             };
             let pairs = body.known_landmarks(limb, positions);
@@ -150,19 +150,19 @@ impl Body {
         self.limbs()[limb].parent.as_ref().is_some_and(|(_, joint)| little(joint))
     }
 
-    /// Scale of the whole body: measured over modelled distances between landmarks of the same limb.
+    /// Scale of the whole body: measured over modeled distances between landmarks of the same limb.
     fn scale_to(&self, positions: &[(usize, Vec3)]) -> f64 {
-        let (mut measured, mut modelled) = (0.0, 0.0);
+        let (mut measured, mut modeled) = (0.0, 0.0);
         for limb in 0..self.limbs().len() {
             let pairs = self.known_landmarks(limb, positions);
             for (index, first) in pairs.iter().enumerate() {
                 for second in &pairs[..index] {
-                    modelled += (first.0 - second.0).length();
+                    modeled += (first.0 - second.0).length();
                     measured += (first.1 - second.1).length();
                 }
             }
         }
-        if modelled > 0.0 && measured > 0.0 { measured / modelled } else { 1.0 }
+        if modeled > 0.0 && measured > 0.0 { measured / modeled } else { 1.0 }
     }
 
     /// Orientation of the whole body: the landmarks of the trunk (the root and what its joints hold nearly upright on it)
@@ -218,7 +218,7 @@ impl Body {
             rotation = twist_towards(rotation, axis, hinge);
         }
         let translation = match anchor {
-            Some((local, centre)) => centre - rotation * local,
+            Some((local, center)) => center - rotation * local,
             None if !pairs.is_empty() => {
                 let count = pairs.len() as f64;
                 let local = pairs.iter().map(|pair| pair.0).sum::<Vec3>() / count;
@@ -265,9 +265,9 @@ impl Body {
         };
         let shape = self.limbs[limb].shape;
         let ratio = |axis: usize, enough: f64| {
-            let (modelled, measured) = (spread(axis, |pair| pair.0), spread(axis, |pair| pair.1));
-            if modelled > enough && measured > 0.0 {
-                (measured / modelled).clamp(1.0 / MOST_STRETCH, MOST_STRETCH)
+            let (modeled, measured) = (spread(axis, |pair| pair.0), spread(axis, |pair| pair.1));
+            if modeled > enough && measured > 0.0 {
+                (measured / modeled).clamp(1.0 / MOST_STRETCH, MOST_STRETCH)
             } else {
                 1.0
             }
@@ -302,7 +302,7 @@ impl Body {
             pair.and_then(|pair| pair.iter().copied().find(|one| *one != limb))
         };
         let sum = |bones: [usize; 2]| bones.map(length).iter().sum::<f64>();
-        let unlike = |bones: [usize; 2]| {
+        let is_unequal = |bones: [usize; 2]| {
             let [first, second] = bones.map(|limb| (length(limb) / reference.limbs[limb].shape.length()).ln());
             (first - second).abs()
         };
@@ -312,19 +312,19 @@ impl Body {
         };
         let mut factors: Vec<(usize, f64)> = Vec::new();
         for limb in 0..self.limbs.len() {
-            let Some(other) = twin(limb).filter(|other| length(*other) * UNLIKE > length(limb)) else { continue };
+            let Some(other) = twin(limb).filter(|other| length(*other) * UNEQUAL > length(limb)) else { continue };
             let parent = self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
             let next = parent.into_iter().chain(self.children(limb)).find_map(|next| Some((next, twin(next)?)));
             let sides = next.filter(|(next, beside)| length(*next) > length(*beside)).map(|(next, beside)| {
                 let (own, opposite) = ([limb, next], [other, beside]);
-                if unlike(own) < unlike(opposite) { (opposite, own) } else { (own, opposite) }
+                if is_unequal(own) < is_unequal(opposite) { (opposite, own) } else { (own, opposite) }
             });
             match sides.filter(|(wrong, _)| straight(*wrong)) {
                 // Both limbs of a side may find this out.
                 Some((wrong, _)) if factors.iter().any(|(limb, _)| wrong.contains(limb)) => {}
                 Some((wrong, right)) => {
-                    let share = sum(wrong) / sum(right);
-                    factors.extend(wrong.into_iter().zip(right).map(|(a, b)| (a, share * length(b) / length(a))));
+                    let ratio = sum(wrong) / sum(right);
+                    factors.extend(wrong.into_iter().zip(right).map(|(a, b)| (a, ratio * length(b) / length(a))));
                 }
                 None => factors.push((limb, length(other) / length(limb))),
             }
@@ -345,12 +345,12 @@ impl Body {
         }
     }
 
-    /// Moves every limb so that the centres of its joint coincide.
+    /// Moves every limb so that the centers of its joint coincide.
     pub(crate) fn close_joints(&self, poses: &mut [Pose]) {
         for (index, limb) in self.limbs().iter().enumerate() {
             if let Some((parent, joint)) = &limb.parent {
-                let centre = poses[*parent] * joint.parent_from_joint.translation;
-                poses[index].translation = centre - poses[index].rotation * joint.limb_from_joint.translation;
+                let center = poses[*parent] * joint.parent_from_joint.translation;
+                poses[index].translation = center - poses[index].rotation * joint.limb_from_joint.translation;
             }
         }
     }
@@ -363,8 +363,8 @@ fn measured(site: Option<usize>, positions: &[(usize, Vec3)]) -> Option<Vec3> {
 
 /// Turns about the limb's own z axis so that `local` points towards `world` as closely as it can.
 fn twist_towards(rotation: Quat, local: Vec3, world: Vec3) -> Quat {
-    let wanted = rotation.inverse() * world;
-    let angle = wanted.y.atan2(wanted.x) - local.y.atan2(local.x);
+    let target = rotation.inverse() * world;
+    let angle = target.y.atan2(target.x) - local.y.atan2(local.x);
     rotation * Quat::from_axis_angle(Vec3::Z, angle)
 }
 

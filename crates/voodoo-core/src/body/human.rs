@@ -15,24 +15,24 @@ pub enum HumanModel {
     Full,
 }
 
-// Heights of joint centres and segment lengths as shares of the stature: Drillis and Contini as tabulated in Winter,
-// "Biomechanics and Motor Control of Human Movement", 4th ed., fig. 4.1. Hip joint centres: Bell, Pedersen and Brand, 1990.
+// Heights of joint centers and segment lengths as shares of the stature: Drillis and Contini as tabulated in Winter,
+// "Biomechanics and Motor Control of Human Movement", 4th ed., fig. 4.1. Hip joint centers: Bell, Pedersen and Brand, 1990.
 const HIP: [f64; 2] = [0.052, 0.530];
 const KNEE: f64 = 0.285;
 const ANKLE: f64 = 0.039;
 const SHOULDER: [f64; 2] = [0.112, 0.818];
-/// Forward, outward and height of the sternoclavicular joint's centre.
+/// Forward, outward and height of the sternoclavicular joint's center.
 const STERNOCLAVICULAR: [f64; 3] = [0.015, 0.030, 0.800];
 /// Where the slope of the shoulder begins beside the neck, outward and height.
 const SLOPE: [f64; 2] = [0.025, 0.838];
 const UPPER_ARM: f64 = 0.186;
-/// The shoulder's muscle rises above the joint's centre.
+/// The shoulder's muscle rises above the joint's center.
 const DELTOID: f64 = 0.022;
 const FOREARM: f64 = 0.146;
 const HAND: f64 = 0.095;
 /// From the wrist to the knuckles.
 const KNUCKLES: f64 = 0.075;
-const HAND_CENTRE: f64 = 0.045;
+const HAND_CENTER: f64 = 0.045;
 const WAIST: f64 = 0.630;
 const VC7: f64 = 0.860;
 const SKULLBASE: f64 = 0.912;
@@ -57,19 +57,19 @@ const CALF_AXES: [f64; 4] = [0.034, 0.034, 0.022, 0.022];
 const FOOT_AXES: [f64; 4] = [0.020, 0.022, 0.014, 0.017];
 
 /// One limb in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
-struct Part {
+struct LimbSpec {
     name: String,
     standing_from_limb: Pose,
     length: f64,
     axes: [f64; 4],
-    parent: Option<(usize, Link)>,
+    parent: Option<(usize, JointSpec)>,
     match_caps: [bool; 2],
 }
 
 /// A joint in the standing frame. Its frame has x along `flexion` and z along `along`; limits and motion in radians.
-struct Link {
+struct JointSpec {
     name: String,
-    centre: Vec3,
+    center: Vec3,
     flexion: Vec3,
     along: Vec3,
     semi_axes: [f64; 2],
@@ -79,7 +79,7 @@ struct Link {
 
 #[derive(Default)]
 struct Builder {
-    parts: Vec<Part>,
+    parts: Vec<LimbSpec>,
     sites: Vec<(String, usize, Vec3)>,
 }
 
@@ -91,11 +91,11 @@ impl Builder {
         rotation: Quat,
         length: f64,
         axes: [f64; 4],
-        parent: Option<(usize, Link)>,
+        parent: Option<(usize, JointSpec)>,
         match_caps: [bool; 2],
     ) -> usize {
         let standing_from_limb = Pose::from_parts(start, rotation);
-        self.parts.push(Part { name: name.into(), standing_from_limb, length, axes, parent, match_caps });
+        self.parts.push(LimbSpec { name: name.into(), standing_from_limb, length, axes, parent, match_caps });
         self.parts.len() - 1
     }
 
@@ -106,9 +106,9 @@ impl Builder {
     /// Pelvis or torso, and all above the shoulders. Returns the limbs that carry the legs and the arms.
     fn trunk(&mut self, model: HumanModel) -> (usize, usize) {
         let up = Quat::IDENTITY;
-        let link = |name: &str, height: f64, semi_axes: [f64; 2], limits, motion| Link {
+        let link = |name: &str, height: f64, semi_axes: [f64; 2], limits, motion| JointSpec {
             name: name.into(),
-            centre: Vec3::Z * height,
+            center: Vec3::Z * height,
             flexion: Vec3::Y,
             along: Vec3::Z,
             semi_axes,
@@ -192,7 +192,7 @@ impl Builder {
         };
         self.site(named("elbow"), forearm, elbow);
         self.site(named("wrist"), last, wrist);
-        self.site(named("hand"), last, wrist - Vec3::Z * HAND_CENTRE);
+        self.site(named("hand"), last, wrist - Vec3::Z * HAND_CENTER);
     }
 
     /// Carries the arm and moves a little on the chest: a raised arm raises its shoulder.
@@ -203,9 +203,9 @@ impl Builder {
         let up = (Vec3::Z - outward * outward.z).normalize();
         let rotation = Quat::from_mat3(&Mat3::from_cols(up, outward.cross(up), outward));
         let [x, y, z] = STERNOCLAVICULAR;
-        let link = Link {
+        let link = JointSpec {
             name: format!("{prefix}_sternoclavicular"),
-            centre: Vec3::new(x, side * y, z),
+            center: Vec3::new(x, side * y, z),
             // The joint's x axis points forward: the left shoulder is raised by positive turns about it.
             flexion: Vec3::X,
             along: Vec3::Z,
@@ -224,9 +224,9 @@ impl Builder {
         let knee = Vec3::new(0.0, hip.y, KNEE);
         let ankle = Vec3::new(0.0, hip.y, ANKLE);
         let hip_limits = [[-0.6, 2.3], mirrored([-1.0, 0.5], side), mirrored([-0.8, 0.8], side)];
-        let link_hip = Link {
+        let link_hip = JointSpec {
             name: named("hip"),
-            centre: hip,
+            center: hip,
             flexion: -Vec3::Y,
             along: -Vec3::Z,
             semi_axes: [0.02, 0.005],
@@ -236,9 +236,9 @@ impl Builder {
         let thigh =
             self.limb(named("thigh"), hip, down, HIP[1] - KNEE, THIGH_AXES, Some((pelvis, link_hip)), [false; 2]);
         // A hanging calf bends backward: about the axis to the left.
-        let link_knee = Link {
+        let link_knee = JointSpec {
             name: named("knee"),
-            centre: knee,
+            center: knee,
             flexion: Vec3::Y,
             along: -Vec3::Z,
             semi_axes: [0.028, 0.0],
@@ -257,9 +257,9 @@ impl Builder {
             // z forward, x up.
             let forward = Quat::from_mat3(&Mat3::from_cols(Vec3::Z, -Vec3::Y, Vec3::X));
             let start = Vec3::new(-HEEL, hip.y, 0.022);
-            let link = Link {
+            let link = JointSpec {
                 name: named("ankle"),
-                centre: ankle,
+                center: ankle,
                 flexion: -Vec3::Y,
                 along: -Vec3::Z,
                 semi_axes: [0.012; 2],
@@ -281,7 +281,7 @@ impl Builder {
                 .map_err(|source| BodyError::Shape { key: format!("limbs.{}", part.name), source })?;
             let parent = part.parent.map(|(parent, link)| {
                 let axes = Mat3::from_cols(link.flexion, link.along.cross(link.flexion), link.along);
-                let standing_from_joint = Pose::from_parts(link.centre, Quat::from_mat3(&axes));
+                let standing_from_joint = Pose::from_parts(link.center, Quat::from_mat3(&axes));
                 let joint = Joint {
                     name: link.name,
                     parent_from_joint: poses[parent].inv_mul(&standing_from_joint),
@@ -310,8 +310,8 @@ fn hanging() -> Quat {
 }
 
 /// A joint of a hanging arm.
-fn arm_link(name: String, centre: Vec3, semi_axes: [f64; 2], limits: [[f64; 2]; 3], motion: f64) -> Link {
-    Link { name, centre, flexion: -Vec3::Y, along: -Vec3::Z, semi_axes, limits, motion }
+fn arm_link(name: String, center: Vec3, semi_axes: [f64; 2], limits: [[f64; 2]; 3], motion: f64) -> JointSpec {
+    JointSpec { name, center, flexion: -Vec3::Y, along: -Vec3::Z, semi_axes, limits, motion }
 }
 
 /// A range for the left side (`side` = 1), mirrored for the right one.
@@ -320,7 +320,7 @@ fn mirrored([low, high]: [f64; 2], side: f64) -> [f64; 2] {
 }
 
 impl Body {
-    /// A human of a stature in metres, standing with hanging arms at rest.
+    /// A human of a stature in meters, standing with hanging arms at rest.
     ///
     /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges turn about
     /// the joint frame's x axis; a positive angle is flexion.
@@ -328,7 +328,7 @@ impl Body {
         if !(0.3..=3.0).contains(&stature) {
             return Err(BodyError::Value {
                 key: "stature".into(),
-                expected: "metres from 0.3 to 3.0",
+                expected: "meters from 0.3 to 3.0",
                 found: stature.to_string(),
             });
         }

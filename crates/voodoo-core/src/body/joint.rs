@@ -9,13 +9,13 @@ use crate::math::{Pose, Vec3};
 /// Longer axes make the joint stiffer, a larger weight makes it tighter (K07 4.2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Name, usually that of the site at its centre (`l_elbow`).
+    /// Name, usually that of the site at its center (`l_elbow`).
     pub name: String,
     /// The ellipse on the parent.
     pub parent_from_joint: Pose,
     /// The ellipse on the limb itself.
     pub limb_from_joint: Pose,
-    /// Semi-axes along x and y of the joint frame, metres.
+    /// Semi-axes along x and y of the joint frame, meters.
     pub semi_axes: [f64; 2],
     /// Strength relative to the other joints of a limb.
     pub weight: f64,

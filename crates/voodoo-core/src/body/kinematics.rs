@@ -60,9 +60,9 @@ pub(crate) fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3],
     }
 }
 
-/// The spatial twist of a turn about `axis` through `centre` (a screw without pitch, R07 eq. 14).
-pub(crate) fn screw(axis: Vec3, centre: Vec3) -> Vector6<f64> {
-    let v = centre.cross(axis);
+/// The spatial twist of a turn about `axis` through `center` (a screw without pitch, R07 eq. 14).
+pub(crate) fn screw(axis: Vec3, center: Vec3) -> Vector6<f64> {
+    let v = center.cross(axis);
     Vector6::new(axis.x, axis.y, axis.z, v.x, v.y, v.z)
 }
 

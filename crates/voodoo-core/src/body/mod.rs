@@ -16,7 +16,7 @@ pub(crate) use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub(crate) use model::Model;
-pub(crate) use pose_prior::unusual;
+pub(crate) use pose_prior::squared_mahalanobis;
 pub(crate) use roles::{JointRole, LimbRole, Roles, Side};
 
 use crate::error::BodyError;
@@ -45,7 +45,7 @@ pub struct Site {
     pub name: String,
     /// Index of its limb.
     pub limb: usize,
-    /// Position in the limb frame, metres.
+    /// Position in the limb frame, meters.
     pub position: Vec3,
 }
 
@@ -105,7 +105,7 @@ impl Body {
     }
 
     /// True when two limbs are neither joined nor joined to the same parent: others overlap at their joints in any pose.
-    pub fn apart(&self, first: usize, second: usize) -> bool {
+    pub fn are_apart(&self, first: usize, second: usize) -> bool {
         let parent = |limb: usize| self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
         first != second && !self.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
     }
@@ -129,7 +129,7 @@ impl Body {
         poses
     }
 
-    /// Position of a site in the world. A site at the centre of a joint lies midway between the two limbs' ends of it.
+    /// Position of a site in the world. A site at the center of a joint lies midway between the two limbs' ends of it.
     pub fn site_position(&self, world_from_limb: &[Pose], site: usize) -> Vec3 {
         let Site { limb, position, .. } = self.sites[site];
         let position = world_from_limb[limb].transform_point(position);
@@ -203,7 +203,7 @@ impl Body {
             if !is_place(site.position) {
                 return Err(BodyError::Value {
                     key: format!("{key}.position"),
-                    expected: "finite metres, 1e9 at most",
+                    expected: "finite meters, 1e9 at most",
                     found: format!("{:?}", site.position.to_array()),
                 });
             }

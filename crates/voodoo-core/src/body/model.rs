@@ -20,12 +20,12 @@ pub(crate) struct Model {
 impl Model {
     /// The model of `body`.
     pub(crate) fn new(body: Body) -> Self {
-        Self { reference_body: body.clone(), extremities: TwoBone::of(&body), body }
+        Self { reference_body: body.clone(), extremities: TwoBone::from_body(&body), body }
     }
 
     /// Takes the body in other sizes, or with other limbs.
     pub(crate) fn adopt(&mut self, body: Body) {
-        self.extremities = TwoBone::of(&body);
+        self.extremities = TwoBone::from_body(&body);
         self.body = body;
     }
 

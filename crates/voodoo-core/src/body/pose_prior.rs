@@ -1,6 +1,6 @@
 //! How people move: how usual the turns of their joints are together.
 //!
-//! A normal distribution of the turns of the human's arms, legs and waist, learnt from motion capture (`training/pose_prior.py`).
+//! A normal distribution of the turns of the human's arms, legs and waist, learned from motion capture (`training/pose_prior.py`).
 //! Of other bodies nothing is known.
 
 use super::pose_statistics::{MEAN, PRECISION};
@@ -23,7 +23,7 @@ const JOINTS: [(JointRole, usize, usize); 9] = [
 /// Number of components of all joints.
 const SIZE: usize = MEAN.len();
 /// How unusual a pose is: the squared Mahalanobis distance from the mean; 0 for bodies of which nothing is known.
-pub(crate) fn unusual(body: &Body, poses: &[Pose]) -> f64 {
+pub(crate) fn squared_mahalanobis(body: &Body, poses: &[Pose]) -> f64 {
     let mut off = [0.0; SIZE];
     each_turn(body, poses, |component, value| off[component] = value);
     let mut rest = PRECISION.as_slice();
@@ -83,12 +83,12 @@ mod tests {
             (0..count).for_each(|k| turn[k] = MEAN[first + k]);
             mean[limb] = place(joint, &mean[parent], Quat::from_scaled_axis(turn));
         }
-        assert!(unusual(&body, &mean) < 1e-12, "{}", unusual(&body, &mean));
+        assert!(squared_mahalanobis(&body, &mean) < 1e-12, "{}", squared_mahalanobis(&body, &mean));
         let bent = |role| {
             let (_, mut poses) = human();
             let (limb, parent, joint) = joint(&body, role);
             poses[limb] = place(joint, &poses[parent], Quat::from_axis_angle(Vec3::X, 1.2));
-            unusual(&body, &poses)
+            squared_mahalanobis(&body, &poses)
         };
         for role in [JointRole::Shoulder, JointRole::Elbow, JointRole::Hip, JointRole::Knee] {
             let [left, right] = Side::BOTH.map(|side| bent(role(side)));
@@ -99,18 +99,18 @@ mod tests {
     #[test]
     fn an_arm_in_the_chest_is_less_usual_than_one_that_hangs() {
         let (body, mut poses) = human();
-        let hanging = unusual(&body, &poses);
+        let hanging = squared_mahalanobis(&body, &poses);
         let (limb, parent, shoulder) = joint(&body, JointRole::Shoulder(Side::Left));
         poses[limb] = place(shoulder, &poses[parent], Quat::from_scaled_axis(Vec3::new(-0.3, 1.2, 0.5)));
         let (fore, _, elbow) = joint(&body, JointRole::Elbow(Side::Left));
         poses[fore] = place(elbow, &poses[limb], Quat::from_axis_angle(hinge_axis(elbow), 2.0));
-        assert!(unusual(&body, &poses) > hanging + 6.0, "{} {hanging}", unusual(&body, &poses));
+        assert!(squared_mahalanobis(&body, &poses) > hanging + 6.0, "{} {hanging}", squared_mahalanobis(&body, &poses));
     }
 
     #[test]
     fn of_another_body_nothing_is_known() {
         let (body, poses) = human();
         let other = Body::new("robot", body.limbs().to_vec(), Vec::new()).unwrap();
-        assert_eq!(unusual(&other, &poses), 0.0);
+        assert_eq!(squared_mahalanobis(&other, &poses), 0.0);
     }
 }

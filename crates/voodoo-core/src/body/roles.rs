@@ -74,7 +74,7 @@ pub(crate) enum JointRole {
 }
 
 impl LimbRole {
-    fn of(name: &str) -> Option<Self> {
+    fn from_name(name: &str) -> Option<Self> {
         let (side, stem) = split(name);
         Some(match (stem, side) {
             ("pelvis", None) => Self::Pelvis,
@@ -108,7 +108,7 @@ impl LimbRole {
 }
 
 impl JointRole {
-    fn of(name: &str) -> Option<Self> {
+    fn from_name(name: &str) -> Option<Self> {
         let (side, stem) = split(name);
         Some(match (stem, side) {
             ("vl3", None) => Self::Waist,
@@ -180,11 +180,11 @@ impl Roles {
         let site = |name: &str| sites.iter().position(|site| site.name == name);
         let mut roles = Self {
             human: body == "human",
-            limbs: limbs.iter().map(|limb| LimbRole::of(&limb.name)).collect(),
-            joints: limbs.iter().map(|limb| joint_name(limb).and_then(JointRole::of)).collect(),
+            limbs: limbs.iter().map(|limb| LimbRole::from_name(&limb.name)).collect(),
+            joints: limbs.iter().map(|limb| joint_name(limb).and_then(JointRole::from_name)).collect(),
             joint_sites: limbs.iter().map(|limb| joint_name(limb).and_then(site)).collect(),
             groups: groups(limbs),
-            sites: sites.iter().map(|site| JointRole::of(&site.name)).collect(),
+            sites: sites.iter().map(|site| JointRole::from_name(&site.name)).collect(),
             clavicles: Vec::new(),
         };
         roles.check(limbs, sites)?;

@@ -6,10 +6,10 @@ use crate::math::{Mat3, Pose, Quat, Vec3};
 
 /// The chain ends at this share of what hangs on its lower limb: in the middle of a fist.
 const GRASP: f64 = 0.6;
-/// A chain is stretched and folded to within this, metres: at the limit its bend has no direction.
+/// A chain is stretched and folded to within this, meters: at the limit its bend has no direction.
 const SLACK: f64 = 1e-3;
 /// The same as a share of the shorter bone, where that is less: a toy body may be smaller.
-const SLACK_SHARE: f64 = 0.1;
+const SLACK_FRACTION: f64 = 0.1;
 /// A chain bent by less than this (sine) is straight and keeps its hinge axis.
 const STRETCHED: f64 = 0.05;
 
@@ -22,7 +22,7 @@ pub(crate) struct TwoBone {
     pub lower: usize,
     /// What hangs on the lower limb.
     pub ends: Vec<usize>,
-    /// Lengths of the two bones, the second with what hangs on it, metres.
+    /// Lengths of the two bones, the second with what hangs on it, meters.
     pub lengths: [f64; 2],
     /// It hangs on the near end of the body's root limb: the body stands on it.
     pub leg: bool,
@@ -30,7 +30,7 @@ pub(crate) struct TwoBone {
 
 impl TwoBone {
     /// All arms and legs of a body.
-    pub(crate) fn of(body: &Body) -> Vec<Self> {
+    pub(crate) fn from_body(body: &Body) -> Vec<Self> {
         let limbs = body.limbs();
         let mut found = Vec::new();
         for (lower, limb) in limbs.iter().enumerate() {
@@ -64,7 +64,7 @@ impl TwoBone {
         [self.upper, self.lower].into_iter().chain(self.ends.iter().copied())
     }
 
-    /// Centre of the ball joint.
+    /// Center of the ball joint.
     pub(crate) fn root(&self, body: &Body, poses: &[Pose]) -> Vec3 {
         match &body.limbs()[self.upper].parent {
             Some((parent, joint)) => poses[*parent] * joint.parent_from_joint.translation,
@@ -83,7 +83,7 @@ impl TwoBone {
         let root = self.root(body, poses);
         let [first, second] = self.lengths;
         let line = target - root;
-        let slack = SLACK.min(SLACK_SHARE * first.min(second));
+        let slack = SLACK.min(SLACK_FRACTION * first.min(second));
         let distance = line.length().max((first - second).abs() + slack).min(first + second - slack);
         let direction = line.try_normalize().unwrap_or(-Vec3::Z);
         let along = (first * first - second * second + distance * distance) / (2.0 * distance);
@@ -91,7 +91,7 @@ impl TwoBone {
         let side = Quat::from_axis_angle(direction, swivel) * direction.any_orthonormal_vector();
         let bend = root + direction * along + side * off;
         let end = root + direction * distance;
-        self.put(body, poses, bend, end);
+        self.place_between(body, poses, bend, end);
     }
 
     /// Where the chain ends.
@@ -100,7 +100,7 @@ impl TwoBone {
     }
 
     /// Puts the chain so that it bends towards one place and ends in the direction of another one; the joints stay closed.
-    pub(crate) fn put(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
+    pub(crate) fn place_between(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
         let root = self.root(body, poses);
         let (Some((_, ball)), Some((_, hinge))) = (&body.limbs()[self.upper].parent, &body.limbs()[self.lower].parent)
         else {
@@ -142,7 +142,7 @@ mod tests {
         for scale in [1.0, 1e-3] {
             let body = Body::human(1.75, HumanModel::Full).unwrap().scaled(scale).unwrap();
             let rest = body.rest_pose(Pose::IDENTITY);
-            for chain in TwoBone::of(&body) {
+            for chain in TwoBone::from_body(&body) {
                 let target = chain.root(&body, &rest) + Vec3::new(0.6, 0.2, -0.3) * chain.stretched_length();
                 for swivel in 0..6 {
                     let mut poses = rest.clone();

@@ -24,7 +24,7 @@ pub enum Lens {
 /// Iterations of Newton's method at most; some ten are needed near the border of a lens's domain, three elsewhere.
 const MOST_STEPS: usize = 60;
 /// A step is halved at most to this share.
-const LEAST_SHARE: f64 = 1e-4;
+const LEAST_FRACTION: f64 = 1e-4;
 /// Error up to which an inverse counts as found: a millionth of a pixel at a focal length of 1e6 pixels, of coordinates up to one.
 const ACCEPTED: f64 = 1e-12;
 /// A ray lies so far within the border of the domain, of its squared radius, that it still does when it is rounded to single precision.
@@ -193,10 +193,10 @@ fn bend_derivative<const N: usize>(k: &[f64; N], [x, y]: [f64; 2]) -> [[f64; 2];
         let mut flat = *k;
         (flat[N - 2], flat[N - 1]) = (0.0, 0.0);
         let [u, v] = bend(&flat, [x, y]);
-        let [seen_x, seen_y, w] = tilt.map(|row| row[0] * u + row[1] * v + row[2]);
+        let [image_x, image_y, w] = tilt.map(|row| row[0] * u + row[1] * v + row[2]);
         let [by_x, by_y] = [0, 1].map(|axis| tilt.map(|row| row[0] * rows[0][axis] + row[1] * rows[1][axis]));
-        let of = |seen: f64, coordinate: usize| [by_x, by_y].map(|by| (by[coordinate] - seen / w * by[2]) / w);
-        rows = [of(seen_x, 0), of(seen_y, 1)];
+        let of = |observed: f64, coordinate: usize| [by_x, by_y].map(|by| (by[coordinate] - observed / w * by[2]) / w);
+        rows = [of(image_x, 0), of(image_y, 1)];
     }
     rows
 }
@@ -220,7 +220,7 @@ fn tilt<const N: usize>(k: &[f64; N]) -> Option<[[f64; 3]; 3]> {
     Some([row(0), row(1), turn[2]])
 }
 
-/// Whether neighbours of a place keep their order there.
+/// Whether neighbors of a place keep their order there.
 fn grows<const N: usize>(k: &[f64; N], at: [f64; 2]) -> bool {
     let [[a, b], [c, d]] = bend_derivative(k, at);
     a > 0.0 && a * d - b * c > 0.0
@@ -245,15 +245,15 @@ fn unbend<const N: usize>(k: &[f64; N], target: [f64; 2], domain: f64) -> Option
         let [[a, b], [c, d]] = bend_derivative(k, at);
         let determinant = a * d - b * c;
         let step = [(d * off[0] - b * off[1]) / determinant, (a * off[1] - c * off[0]) / determinant];
-        let mut share = 1.0;
-        while share > LEAST_SHARE {
-            let next = [at[0] - share * step[0], at[1] - share * step[1]];
+        let mut fraction = 1.0;
+        while fraction > LEAST_FRACTION {
+            let next = [at[0] - fraction * step[0], at[1] - fraction * step[1]];
             let left = miss(next);
             if next[0] * next[0] + next[1] * next[1] <= domain && size(left) < size(off) {
                 (at, off) = (next, left);
                 continue 'newton;
             }
-            share *= 0.5;
+            fraction *= 0.5;
         }
         break;
     }
@@ -279,7 +279,7 @@ fn first_root(polynomial: &[f64]) -> f64 {
     positive_roots(polynomial).first().copied().unwrap_or(f64::INFINITY)
 }
 
-/// Where a polynomial changes its sign, ascending: at most once between neighbouring roots of its derivative.
+/// Where a polynomial changes its sign, ascending: at most once between neighboring roots of its derivative.
 fn positive_roots(polynomial: &[f64]) -> Vec<f64> {
     /// No lens is asked beyond this squared radius: a degree off the camera's plane is 57.
     const FARTHEST: f64 = 1e9;

@@ -12,12 +12,12 @@ pub use lens::Lens;
 
 /// Pixels of an image at most, those of an 8K picture: more would be a mistyped size, and memory by the gigabyte.
 pub(crate) const MOST_PIXELS: usize = 1 << 25;
-/// A place nearer to the camera plane than this, metres, is in no pixel: no sensor measures there, and the projection blows up.
-pub(crate) const NEAREST_SEEN: f64 = 0.05;
+/// A place nearer to the camera plane than this, meters, is in no pixel: no sensor measures there, and the projection blows up.
+pub(crate) const NEAREST_RETURN: f64 = 0.05;
 /// Parts into which a side of a rectangle is cut to follow its picture through a lens.
 const SIDE_PARTS: usize = 16;
 
-/// A calibrated camera in its optical frame: x right, y down, z forward, metres. Integer pixel coordinates are pixel centres.
+/// A calibrated camera in its optical frame: x right, y down, z forward, meters. Integer pixel coordinates are pixel centers.
 ///
 /// The one camera model of the tracker: images carry a reference to theirs. A point `(x, y, z)` is seen in the pixel
 /// `(fx X + cx, fy Y + cy)`, where `(X, Y)` is where the [`Lens`] puts `(x/z, y/z)`.
@@ -236,7 +236,7 @@ impl Camera {
         [x, y]
     }
 
-    /// How far a point is seen to move along the direction `along` of the image with its place: pixels a metre, camera frame. With the
+    /// How far a point is seen to move along the direction `along` of the image with its place: pixels a meter, camera frame. With the
     /// image's axes these are the rows of the projection's Jacobian. None where [`Camera::project`] has none.
     #[inline]
     pub fn gradient(&self, point: Vec3, along: [f64; 2]) -> Option<Vec3> {
@@ -253,7 +253,7 @@ impl Camera {
     }
 
     /// Columns and rows that can show anything within the convex hull of `corners`, camera frame: the whole image when one of them is
-    /// nearer than [`NEAREST_SEEN`].
+    /// nearer than [`NEAREST_RETURN`].
     pub fn window(&self, corners: impl IntoIterator<Item = Vec3>) -> [Range<usize>; 2] {
         let whole = [0..self.width, 0..self.height];
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
@@ -263,7 +263,7 @@ impl Camera {
             }
         };
         for corner in corners {
-            if !(corner.z >= NEAREST_SEEN) {
+            if !(corner.z >= NEAREST_RETURN) {
                 return whole;
             }
             let bend = self.distorts();
@@ -298,8 +298,8 @@ impl Camera {
             let (from, to) = (corners[side], corners[(side + 1) % 4]);
             let mut before: [Option<[f64; 2]>; 2] = [None; 2];
             for part in 0..=SIDE_PARTS {
-                let share = part as f64 / SIDE_PARTS as f64;
-                let place = self.pixel([0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])))?;
+                let fraction = part as f64 / SIDE_PARTS as f64;
+                let place = self.pixel([0, 1].map(|axis| from[axis] + fraction * (to[axis] - from[axis])))?;
                 for axis in 0..2 {
                     (least[axis], most[axis]) = (least[axis].min(place[axis]), most[axis].max(place[axis]));
                     if let [Some(first), Some(second)] = before {

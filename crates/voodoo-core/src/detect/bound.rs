@@ -10,7 +10,7 @@ use crate::observation::frame::DepthImage;
 pub(crate) struct PlacedDetection {
     /// Its number among those of its image, for [`Detect::reject`].
     pub index: usize,
-    /// The body's root, world frame, metres.
+    /// The body's root, world frame, meters.
     pub root: Vec3,
     /// The detection.
     pub detection: Detection,
@@ -67,7 +67,7 @@ impl BoundDetector {
 
     /// The persons that it reports of an image; of [`DetectionQuery::Near`] the nearest alone. Nobody where it fails or reports what
     /// cannot be meant, see [`Self::error`].
-    pub(crate) fn look(
+    pub(crate) fn detect(
         &mut self,
         body: &Body,
         image: &DepthImage,
@@ -139,10 +139,10 @@ fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage
     }
     for (number, joint) in joints.iter().enumerate().filter_map(|(number, joint)| Some((number, joint.as_ref()?))) {
         if !is_place(joint.position) {
-            return wrong(&format!("joints[{number}]"), "finite metres".into(), format!("{:?}", joint.position));
+            return wrong(&format!("joints[{number}]"), "finite meters".into(), format!("{:?}", joint.position));
         }
         if !(joint.sigma > 0.0 && joint.sigma.is_finite()) {
-            return wrong(&format!("joints[{number}].sigma"), "finite metres > 0".into(), joint.sigma.to_string());
+            return wrong(&format!("joints[{number}].sigma"), "finite meters > 0".into(), joint.sigma.to_string());
         }
     }
     if let Some(pair) = lengths.iter().find(|pair| !pair.iter().all(|value| *value > 0.0 && value.is_finite())) {
@@ -152,7 +152,7 @@ fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage
         return wrong("person and facing", "log odds".into(), "no number".into());
     }
     if !(is_place(*low) && is_place(*high)) {
-        return wrong("low and high", "finite metres".into(), format!("{low:?} and {high:?}"));
+        return wrong("low and high", "finite meters".into(), format!("{low:?} and {high:?}"));
     }
     if let Some(floor) = floor.filter(|floor| !floor.normal.is_finite() || !floor.offset.is_finite()) {
         return wrong("floor", "finite numbers".into(), format!("{floor:?}"));

@@ -10,19 +10,19 @@ mod skeleton;
 
 pub(crate) use bound::{BoundDetector, PlacedDetection};
 pub(crate) use joint_map::{Detected, JointMap};
-pub(crate) use placement::{is_sized_like, place, posed, sized};
+pub(crate) use placement::{fit_body, fit_pose, is_sized_like, place};
 
 use crate::body::Body;
 use crate::math::{Aabb, Pose, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Ground};
-use crate::observation::share::NOBODY;
+use crate::observation::ownership::NO_OWNER;
 use std::fmt::Debug;
 
 /// Why a detector could not look at an image. The frame is processed without detections.
 pub type DetectError = Box<dyn std::error::Error + Send + Sync>;
 
-/// A box about joints is this much larger than they span, metres: limbs are thicker than their joints.
+/// A box about joints is this much larger than they span, meters: limbs are thicker than their joints.
 const AROUND_JOINTS: f64 = 0.2;
 
 /// Finds persons in depth images.
@@ -120,16 +120,16 @@ pub enum DetectionQuery {
     Any,
     /// Anybody, but nothing that was found to be nobody a few images ago.
     New,
-    /// The person at this place of the world, metres.
+    /// The person at this place of the world, meters.
     Near(Vec3),
 }
 
 /// A joint of a detected person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectedJoint {
-    /// Position in the world, metres.
+    /// Position in the world, meters.
     pub position: Vec3,
-    /// Standard deviation along each axis, metres.
+    /// Standard deviation along each axis, meters.
     pub sigma: f64,
     /// Probability that it is in the image and not hidden.
     pub visible: f64,
@@ -140,13 +140,13 @@ pub struct DetectedJoint {
 pub struct Detection {
     /// The joints of [`Detect::joints`], in that order; `None` for one that was not found.
     pub joints: Vec<Option<DetectedJoint>>,
-    /// Length (metres) and relative standard deviation of everything in [`Detect::lengths`], in that order; or empty.
+    /// Length (meters) and relative standard deviation of everything in [`Detect::lengths`], in that order; or empty.
     pub lengths: Vec<[f64; 2]>,
     /// Log odds that the trunk faces the camera; `None` where the detector does not tell.
     pub facing: Option<f64>,
     /// Log odds that it is a person. About 4, over one look or several, make a person: `ln(p / (1 - p))` of a probability `p`.
     pub person: f64,
-    /// What the image shows of it: corners of its box in the world, metres.
+    /// What the image shows of it: corners of its box in the world, meters.
     pub low: Vec3,
     /// The other corner.
     pub high: Vec3,
@@ -174,7 +174,7 @@ pub struct Surroundings<'a> {
     pub ground: Option<Ground>,
     /// Direction upwards where no floor is known, world frame, unit length.
     pub up: Option<Vec3>,
-    /// Depth of the learnt background at every pixel, metres; empty where none was learnt.
+    /// Depth of the learned background at every pixel, meters; empty where none was learned.
     pub background: &'a [f32],
     /// Boxes of the world that hold nobody.
     pub excluded: &'a [Aabb],
@@ -185,10 +185,10 @@ pub struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Whether a pixel with a depth of `z` metres shows the background, or somebody who is tracked already.
+    /// Whether a pixel with a depth of `z` meters shows the background, or somebody who is tracked already.
     pub fn explains(&self, index: usize, z: f32) -> bool {
-        let others = self.owners.get(index).is_some_and(|owner| *owner != NOBODY && Some(*owner) != self.own);
-        others || self.background.get(index).is_some_and(|depth| Background::holds(*depth, z))
+        let others = self.owners.get(index).is_some_and(|owner| *owner != NO_OWNER && Some(*owner) != self.own);
+        others || self.background.get(index).is_some_and(|depth| Background::contains(*depth, z))
     }
 
     /// Whether a place of the world is in one of the boxes that hold nobody.
@@ -196,12 +196,12 @@ impl Surroundings<'_> {
         self.excluded.iter().any(|bounds| bounds.contains(point))
     }
 
-    /// The depth of every pixel of an image, metres; 0 where nothing returned, and where it is known that what returned is nobody who
+    /// The depth of every pixel of an image, meters; 0 where nothing returned, and where it is known that what returned is nobody who
     /// is asked for.
     pub fn open_depth(&self, image: &DepthImage, depth: &mut Vec<f32>) {
         depth.clear();
         depth.extend((0..image.pixels.len()).map(|index| {
-            let z = image.pixels.get(index) * image.metres_per_unit as f32;
+            let z = image.pixels.get(index) * image.meters_per_unit as f32;
             let open = z > 0.0 && z.is_finite() && !self.explains(index, z);
             let excluded = || self.excludes(world_point(image, index, z));
             if open && (self.excluded.is_empty() || !excluded()) { z } else { 0.0 }
@@ -209,7 +209,7 @@ impl Surroundings<'_> {
     }
 }
 
-/// The place in the world that a pixel shows at a depth of `z` metres.
+/// The place in the world that a pixel shows at a depth of `z` meters.
 fn world_point(image: &DepthImage, index: usize, z: f32) -> Vec3 {
     let world_from_sensor: &Pose = &image.world_from_sensor;
     *world_from_sensor * image.back_project(index, z)

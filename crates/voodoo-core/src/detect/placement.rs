@@ -5,14 +5,14 @@ use crate::body::{Body, Model};
 use crate::math::{Pose, Vec3};
 
 /// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
-pub(crate) fn sized(model: &Model, detected: Detected) -> Option<(Body, Vec<Pose>)> {
+pub(crate) fn fit_body(model: &Model, detected: Detected) -> Option<(Body, Vec<Pose>)> {
     let body = with_sizes(&model.reference_body, detected)?;
-    let poses = posed(&body, detected)?;
+    let poses = fit_pose(&body, detected)?;
     Some((body, poses))
 }
 
 /// The pose of a body that fits a detected person's joints best, world frame.
-pub(crate) fn posed(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
+pub(crate) fn fit_pose(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
     let mut joints = positions_of(detected);
     let skeleton = &detected.map.skeleton;
     skeleton.take_lengths(&mut joints, &skeleton.measure(&at_rest(body, &detected.map.sites)));
@@ -23,7 +23,7 @@ pub(crate) fn posed(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
 pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
     match detected.map.root().and_then(|root| detected.joint(root)) {
         Some(root) => Some(root.position),
-        None => posed(body, detected).and_then(|poses| poses.first().map(|root| root.translation)),
+        None => fit_pose(body, detected).and_then(|poses| poses.first().map(|root| root.translation)),
     }
 }
 
@@ -31,8 +31,10 @@ pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
 pub(crate) fn is_sized_like(body: &Body, detected: Detected, sigmas: f64) -> bool {
     let skeleton = &detected.map.skeleton;
     let own = skeleton.measure(&at_rest(body, &detected.map.sites));
-    let both =
-        own.into_iter().zip(skeleton.reported(&detected.detection.lengths)).filter_map(|(own, seen)| own.zip(seen));
+    let both = own
+        .into_iter()
+        .zip(skeleton.reported(&detected.detection.lengths))
+        .filter_map(|(own, observed)| own.zip(observed));
     both.into_iter().all(|(own, [length, sigma])| (own / length).ln().abs() <= sigmas * sigma)
 }
 

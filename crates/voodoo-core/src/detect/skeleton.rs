@@ -8,8 +8,8 @@ const LENGTHS: [&str; COUNT] =
     ["upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck"];
 const COUNT: usize = 8;
 
-/// Some of [`LENGTHS`], metres.
-pub(super) type Lengths = [Option<f64>; COUNT];
+/// Some of [`LENGTHS`], meters.
+pub(super) type OptionalLengths = [Option<f64>; COUNT];
 
 /// Numbers of a detector's joints and lengths; none of those that it does not report.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +44,7 @@ impl Skeleton {
     }
 
     /// The distances of joints: the mean of both sides, or that of the one that is known.
-    pub(super) fn measure(&self, joints: &[Option<Vec3>]) -> Lengths {
+    pub(super) fn measure(&self, joints: &[Option<Vec3>]) -> OptionalLengths {
         let at = |index: Option<usize>| joints.get(index?).copied().flatten();
         let apart = |from: Option<usize>, to: Option<usize>| Some(at(from)?.distance(at(to)?));
         let mean = |sides: [Option<f64>; 2]| match sides {
@@ -66,7 +66,7 @@ impl Skeleton {
     }
 
     /// Gives limbs these lengths, in directions that stay. The trunk's middle stays where it is.
-    pub(super) fn take_lengths(&self, joints: &mut [Option<Vec3>], lengths: &Lengths) {
+    pub(super) fn take_lengths(&self, joints: &mut [Option<Vec3>], lengths: &OptionalLengths) {
         let [upper_arm, forearm, thigh, shank, shoulders, hips, trunk, neck] = *lengths;
         let at = |index: Option<usize>| joints.get(index?).copied().flatten();
         let (root, top, head) = (at(self.root), at(self.top), at(self.head));

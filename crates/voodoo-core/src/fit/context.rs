@@ -18,7 +18,7 @@ pub(crate) struct Context<'a> {
     /// What is tracked.
     pub model: &'a Model,
     /// What the frame shows of it.
-    pub seen: Observation<'a>,
+    pub observation: Observation<'a>,
     /// Poses of the frame before, working frame; empty where nothing is known of the motion.
     pub previous: &'a [Pose],
     /// Seconds since the last frame, as multiples of 1/30 s.
@@ -27,12 +27,12 @@ pub(crate) struct Context<'a> {
 
 impl Context<'_> {
     /// The same with fewer points, where there are many.
-    pub(crate) fn roughly(self) -> Self {
-        Self { seen: self.seen.with(self.seen.candidates.rough()), ..self }
+    pub(crate) fn subsampled(self) -> Self {
+        Self { observation: self.observation.with(self.observation.candidates.subsampled()), ..self }
     }
 
-    /// Whether edges of colours tell more of a limb than what else there is: depth blurs arms, and knows legs better.
-    pub(crate) fn wants_edges(&self, limb: usize) -> bool {
+    /// Whether edges of colors tell more of a limb than what else there is: depth blurs arms, and knows legs better.
+    pub(crate) fn uses_edges(&self, limb: usize) -> bool {
         self.pictures_alone() || {
             let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
             arms.flat_map(TwoBone::limbs).any(|own| own == limb)
@@ -44,9 +44,9 @@ impl Context<'_> {
         self.time_scale > LATE
     }
 
-    /// Whether colours are all that shows the body.
+    /// Whether colors are all that shows the body.
     pub(crate) fn pictures_alone(&self) -> bool {
-        let frame = self.seen.frame();
+        let frame = self.observation.frame();
         self.config.regions && !frame.colors.is_empty() && frame.images.is_empty() && frame.clouds.is_empty()
     }
 }
@@ -57,7 +57,7 @@ pub(crate) struct Setting<'a> {
     /// As in [`Context`].
     pub config: &'a Config,
     /// As in [`Context`].
-    pub seen: Observation<'a>,
+    pub observation: Observation<'a>,
     /// As in [`Context`].
     pub previous: &'a [Pose],
     /// As in [`Context`].
@@ -66,12 +66,12 @@ pub(crate) struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     /// The frame of this model.
-    pub(crate) fn of<'b>(self, model: &'b Model) -> Context<'b>
+    pub(crate) fn with_model<'b>(self, model: &'b Model) -> Context<'b>
     where
         'a: 'b,
     {
-        let Self { config, seen, previous, time_scale } = self;
-        Context { config, model, seen, previous, time_scale }
+        let Self { config, observation, previous, time_scale } = self;
+        Context { config, model, observation, previous, time_scale }
     }
 }
 

@@ -33,8 +33,8 @@ pub(crate) struct Fit {
     buried: Buried,
     correspondences: Correspondences,
     contours: Contours,
-    regions: regions::Regions,
-    /// Edges of colours are looked for far away.
+    regions: regions::ColorRegions,
+    /// Edges of colors are looked for far away.
     far: bool,
     band_weights: Vec<f64>,
     threads: Option<ThreadPool>,
@@ -55,7 +55,7 @@ impl Fit {
             buried: Buried::default(),
             correspondences: Correspondences::default(),
             contours: Contours::default(),
-            regions: regions::Regions::default(),
+            regions: regions::ColorRegions::default(),
             far: false,
             band_weights: Vec::new(),
             threads,
@@ -78,7 +78,7 @@ impl Fit {
     }
 
     /// Exchanges what was matched last: another pose can be tried in between.
-    pub(crate) fn exchange(&mut self, matched: &mut Correspondences) {
+    pub(crate) fn swap_matches(&mut self, matched: &mut Correspondences) {
         std::mem::swap(&mut self.correspondences, matched);
     }
 
@@ -122,7 +122,7 @@ impl Fit {
         steps
     }
 
-    /// The same where nobody knows how the body moves: edges of colours are looked for farther away at first.
+    /// The same where nobody knows how the body moves: edges of colors are looked for farther away at first.
     pub(crate) fn run_far(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.far = true;
         let steps = self.run(context, predicted, poses);
@@ -164,7 +164,7 @@ impl Fit {
         self.contours.clear();
         self.match_assigned(context, poses, &gate, anew);
         self.find_regions(context, poses, context.config.max_steps);
-        self.claim_regions(context, poses);
+        self.measure_pixel_gains(context, poses);
     }
 
     /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.
@@ -201,7 +201,7 @@ impl Fit {
 
     /// Lets the solver follow the named sites before the frame's steps.
     fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
-        let frame = context.seen.frame();
+        let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
         let points = self.schedule(context.config).warm_start == WarmStartInput::SitesAndPoints;
         let mut round = 0;
@@ -235,28 +235,28 @@ impl Fit {
     }
 
     fn match_sites(&mut self, context: Context, poses: &[Pose]) {
-        let (frame, origin) = (context.seen.frame(), context.seen.origin());
+        let (frame, origin) = (context.observation.frame(), context.observation.origin());
         self.correspondences.add_sites(&context.model.body, poses, frame, origin);
     }
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
-        let Context { config, model, seen, .. } = context;
+        let Context { config, model, observation, .. } = context;
         // The published solver takes points wherever its limbs are.
         let buried = if self.schedule(config).whole_body { self.buried.find(&model.body, poses) } else { &[] };
-        self.assignment.assign(&model.body, poses, seen.candidates, config.overlap, gate.box_margin, buried);
+        self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin, buried);
     }
 
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
-        if context.config.outline {
-            self.contours.find(&context.model.body, poses, context.seen.views.iter());
+        if context.config.depth_contour {
+            self.contours.find(&context.model.body, poses, context.observation.views.iter());
         }
     }
 
     /// Closest points of the limbs' candidates; `anew` says whether those are others than the last time.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
-        let Context { config, model, seen, .. } = context;
+        let Context { config, model, observation, .. } = context;
         let Self { assignment, correspondences, threads, .. } = self;
-        let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), seen.candidates);
+        let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), observation.candidates);
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {
@@ -293,8 +293,8 @@ fn problem<'a>(
     predicted: &'a [Pose],
     step: usize,
 ) -> Problem<'a> {
-    let Context { config, model, seen, time_scale, .. } = context;
-    let floor = seen.floor();
+    let Context { config, model, observation, time_scale, .. } = context;
+    let floor = observation.floor();
     Problem { body: &model.body, correspondences, predicted, floor, step, time_scale, config }
 }
 
@@ -306,7 +306,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, moved, standing, turned, with_context};
 
-    /// The solvers, and how near they come in the steps of one frame, metres: the published one leaves limbs aslant.
+    /// The solvers, and how near they come in the steps of one frame, meters: the published one leaves limbs aslant.
     const SOLVERS: [(SolverKind, f64); 3] =
         [(SolverKind::Chain, 0.007), (SolverKind::Tree, 0.007), (SolverKind::Limbwise, 0.025)];
     const GATE: Gate = Gate { box_margin: 0.1, distance: 0.1 };
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_set_a_little_off_is_drawn_to_where_it_is_seen() {
+    fn a_body_set_a_little_off_is_drawn_to_where_it_is_visible() {
         for (solver, reached) in SOLVERS {
             let (_, off, _) = found(&Config { solver, ..Config::default() });
             assert!(off < reached, "{solver:?}: {off} m off");
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn an_exchange_gives_back_exactly_what_was_matched() {
+    fn an_swap_gives_back_exactly_what_was_matched() {
         let (model, poses) = standing();
         let (pixels, config) = (before_wall(&model.body, &poses), Config::default());
         with_context(&pixels, &config, &model, &poses, |context| {
@@ -352,10 +352,10 @@ mod tests {
             fit.match_all(context, &poses, config.max_steps);
             let written = |fit: &Fit| format!("{:?}", fit.correspondences());
             let (before, mut matched) = (written(&fit), Correspondences::default());
-            fit.exchange(&mut matched);
+            fit.swap_matches(&mut matched);
             fit.match_all(context, &moved(&poses, 0.05 * Vec3::X), config.max_steps);
             assert_ne!(written(&fit), before);
-            fit.exchange(&mut matched);
+            fit.swap_matches(&mut matched);
             assert_eq!(written(&fit), before);
             fit.clear();
             assert_eq!(fit.correspondences().mean_squared_distance(), None);
@@ -372,7 +372,7 @@ mod tests {
                 fit.match_points(context, poses, &Gate { distance, ..GATE });
                 assert!(fit.correspondences().sites.is_empty() && fit.correspondences().contour.is_empty());
                 let limbs = fit.correspondences().limbs.iter();
-                limbs.map(|limb| limb.accepted().0).sum::<usize>() as f64 / context.seen.candidates.len() as f64
+                limbs.map(|limb| limb.accepted().0).sum::<usize>() as f64 / context.observation.candidates.len() as f64
             };
             assert!(matched(0.1, &poses) > 0.95);
             let deeper = moved(&poses, 0.06 * Vec3::Z);

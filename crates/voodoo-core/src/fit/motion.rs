@@ -117,7 +117,7 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
         let pose = match &limb.parent {
             None => {
                 let (before, now) = (&previous[0], &current[0]);
-                let rotation = go_on(before.rotation, now.rotation, factor);
+                let rotation = extrapolate(before.rotation, now.rotation, factor);
                 Pose::from_parts(now.translation + factor * (now.translation - before.translation), rotation)
             }
             Some((parent, joint)) => {
@@ -125,7 +125,7 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
                 let now = joint_turn(joint, &current[*parent], &current[index]);
                 // A clavicle moves with its arm.
                 let factor = if body.roles().is_clavicle(index) { 0.0 } else { factor };
-                place(joint, &predicted[*parent], go_on(before, now, factor))
+                place(joint, &predicted[*parent], extrapolate(before, now, factor))
             }
         };
         predicted.push(Pose::from_parts(pose.translation, pose.rotation.normalize()));
@@ -133,7 +133,7 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
     raise_shoulders(body, previous, current, predicted);
 }
 
-fn go_on(before: Quat, now: Quat, factor: f64) -> Quat {
+fn extrapolate(before: Quat, now: Quat, factor: f64) -> Quat {
     let motion = (now * before.inverse()).to_scaled_axis_shortest();
     Quat::from_scaled_axis(factor * motion) * now
 }

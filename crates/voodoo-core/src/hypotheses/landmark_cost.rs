@@ -5,7 +5,7 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::Matched;
 use crate::math::{Pose, Vec3};
 
-/// What is this far from where it was seen, or expected, is not there, metres: about a hand's length.
+/// What is this far from where it was seen, or expected, is not there, meters: about a hand's length.
 pub(crate) const APART: f64 = 0.10;
 
 /// Cost of the sites on an arm or leg that are not where they were seen, in unexplained patches: one for each unit of weight.
@@ -37,7 +37,7 @@ mod tests {
     use crate::testing::{first_arm, moved, standing};
 
     /// A site in the middle of a limb that was seen `off` from there.
-    fn seen(poses: &[Pose], limb: usize, off: Vec3) -> SitePair {
+    fn truth(poses: &[Pose], limb: usize, off: Vec3) -> SitePair {
         let x = poses[limb].translation;
         let (across, information) = (Mat3::IDENTITY, 2.0 * Mat3::IDENTITY);
         SitePair { limb, x, p: x + off, weight: 2.0, base_weight: 2.0, bias: 0.0, across, information, source: 0 }
@@ -56,23 +56,23 @@ mod tests {
             assert_eq!(body_landmark_cost(matched), own);
             own
         };
-        let right = seen(&poses, arm.lower, Vec3::ZERO);
+        let right = truth(&poses, arm.lower, Vec3::ZERO);
         assert_eq!(cost(right), 0.0);
-        assert!((cost(seen(&poses, arm.lower, 0.5 * APART * Vec3::Y)) - 2.0 * 0.25).abs() < 1e-9);
-        assert_eq!(cost(seen(&poses, arm.lower, 3.0 * APART * Vec3::Y)), 2.0, "wholly contradicted, no more");
+        assert!((cost(truth(&poses, arm.lower, 0.5 * APART * Vec3::Y)) - 2.0 * 0.25).abs() < 1e-9);
+        assert_eq!(cost(truth(&poses, arm.lower, 3.0 * APART * Vec3::Y)), 2.0, "wholly contradicted, no more");
         // Within its bias nothing is said, and along a ray neither.
-        let off = seen(&poses, arm.lower, 0.5 * APART * Vec3::Z);
+        let off = truth(&poses, arm.lower, 0.5 * APART * Vec3::Z);
         assert_eq!(cost(SitePair { bias: APART, ..off }), 0.0);
         assert_eq!(cost(SitePair { across: Mat3::from_diagonal(Vec3::new(1.0, 1.0, 0.0)), ..off }), 0.0);
     }
 
     #[test]
-    fn a_site_is_looked_at_where_other_poses_would_put_it() {
+    fn a_site_is_checked_where_other_poses_would_put_it() {
         let (model, poses) = standing();
         let arm = &model.extremities[first_arm(&model)];
         let shift = 0.5 * APART * Vec3::X;
         let correspondences =
-            Correspondences { sites: vec![seen(&poses, arm.upper, shift)], ..Correspondences::default() };
+            Correspondences { sites: vec![truth(&poses, arm.upper, shift)], ..Correspondences::default() };
         let matched = Matched { correspondences: &correspondences, poses: &poses };
         assert!(extremity_landmark_cost(matched, arm, &moved(&poses, shift)) < 1e-12);
         assert!((extremity_landmark_cost(matched, arm, &moved(&poses, -shift)) - 2.0).abs() < 1e-9);

@@ -1,15 +1,15 @@
 //! Trying other configurations of arms and legs where the frame speaks against the current ones, and keeping the best by one
 //! score.
 
-mod exchange;
+mod branch;
 mod history;
 mod landmark_cost;
+mod leg_swap;
 mod persistence;
 mod proposals;
 mod refined;
 mod rough;
 mod score;
-mod second;
 mod suspicion;
 mod unexplained;
 
@@ -26,17 +26,17 @@ use crate::detect::Detected;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, shifted};
 use crate::visibility::LITTLE;
-use exchange::Exchange;
+use branch::Branch;
 use history::History;
+use leg_swap::LegSwap;
 use persistence::Times;
 use proposals::{
-    CarriedByParent, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, ShownByColors, TrunkLean,
+    CarriedByParent, ColorDirections, DetectedBody, DetectedEnd, LastGoodEnd, LastProposal, Pool, Propose, TrunkLean,
     UnexplainedCluster,
 };
 use refined::{Outcome, Present, Refined};
 use rough::{Extremity, RoughSearch};
 use score::CLEAR_GAIN;
-use second::Second;
 use suspicion::Suspicion;
 use unexplained::Unexplained;
 
@@ -49,11 +49,11 @@ pub(crate) struct Hypotheses {
     rough: RoughSearch,
     clusters: UnexplainedCluster,
     lean: TrunkLean,
-    shown: ShownByColors,
-    exchange: Exchange,
+    color_directions: ColorDirections,
+    leg_swap: LegSwap,
     pool: Pool,
     refined: Refined,
-    second: Second,
+    branch: Branch,
     /// Time of the last frame, seconds; none after a restart.
     stamp: Option<f64>,
 }
@@ -71,21 +71,21 @@ impl Hypotheses {
         // Room at once, not when the first hard frame comes.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
-        self.exchange.prepare(limbs);
+        self.leg_swap.prepare(limbs);
         self.lean.prepare(model);
-        self.second.prepare(limbs);
+        self.branch.prepare(limbs);
         self.refined.poses.clear();
         self.refined.poses.reserve(limbs);
     }
 
     /// Follows a second body in what few cameras see, before the first one is. Returns the number of ICP steps.
-    pub(crate) fn follow_second(&mut self, context: Context, fit: &mut Fit) -> usize {
-        self.second.follow(context, fit)
+    pub(crate) fn follow_branch(&mut self, context: Context, fit: &mut Fit) -> usize {
+        self.branch.follow(context, fit)
     }
 
-    /// How far from the far end of the body's limb, world frame, that of a second body lies, metres; none without a second body.
-    pub(crate) fn differs(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
-        self.second.differs(limb, body.limbs()[limb].shape.length(), world_from_limb)
+    /// How far from the far end of the body's limb, world frame, that of a second body lies, meters; none without a second body.
+    pub(crate) fn branch_distance(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
+        self.branch.end_distance(limb, body.limbs()[limb].shape.length(), world_from_limb)
     }
 
     /// Looks at every arm and leg; where the frame speaks against it, tries others, and takes what explains the frame better.
@@ -101,7 +101,7 @@ impl Hypotheses {
         detected: &[Pose],
     ) -> usize {
         self.make_room(context, fit);
-        let now = context.seen.frame().stamp;
+        let now = context.observation.frame().stamp;
         let times = Times { before: self.stamp.replace(now).unwrap_or(f64::NEG_INFINITY), now };
         self.unexplained.collect(context, fit.matched(poses));
         let mut steps = 0;
@@ -112,7 +112,7 @@ impl Hypotheses {
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
-            if !self.doubts(at, detection.is_some(), times) {
+            if !self.is_suspect(at, detection.is_some(), times) {
                 continue;
             }
             self.propose(at, detection, detected);
@@ -123,11 +123,11 @@ impl Hypotheses {
             steps += taken;
         }
         if pictures {
-            let doubtful = |index: usize| !self.history[index].persistence.is_clear();
-            steps += self.exchange.attempt(context, doubtful, &mut self.refined, fit, poses, predicted);
+            let is_suspect = |index: usize| !self.history[index].persistence.is_clear();
+            steps += self.leg_swap.attempt(context, is_suspect, &mut self.refined, fit, poses, predicted);
         }
         if pictures {
-            steps += self.second.compare(context, &mut self.refined, fit, poses, predicted);
+            steps += self.branch.compare(context, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
             // What was looked at last was tried.
@@ -149,31 +149,32 @@ impl Hypotheses {
     }
 
     /// The body, world, as this frame wants it where the next one has to ask for it as well.
-    pub(crate) fn rivals(&self) -> impl Iterator<Item = &[Pose]> {
-        let asking = self.history.iter().filter(|own| own.persistence.asks() && !own.last_proposal.is_empty());
+    pub(crate) fn alternatives(&self) -> impl Iterator<Item = &[Pose]> {
+        let asking =
+            self.history.iter().filter(|own| own.persistence.requests_change() && !own.last_proposal.is_empty());
         asking.map(|own| &own.last_proposal[..])
     }
 
     /// Room for the worst case at once, not when the first hard frame comes.
     fn make_room(&mut self, context: Context, fit: &Fit) {
-        let most = context.seen.candidates.len();
+        let most = context.observation.candidates.len();
         self.suspicion.make_room(most);
         self.rough.score.make_room(most);
         self.clusters.make_room(most);
         self.lean.make_room(most);
         if context.pictures_alone() {
-            let (frame, limbs) = (context.seen.frame(), context.model.body.limbs().len());
+            let (frame, limbs) = (context.observation.frame(), context.model.body.limbs().len());
             for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
                 backdrop.make_room(frame, limbs);
             }
-            self.shown.make_room(limbs);
+            self.color_directions.make_room(limbs);
         }
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
     /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others; where a detector
-    /// `looked`, there are new ones.
-    fn doubts(&mut self, at: Extremity, looked: bool, times: Times) -> bool {
+    /// `detector_ran`, there are new ones.
+    fn is_suspect(&mut self, at: Extremity, detector_ran: bool, times: Times) -> bool {
         let chain = at.chain();
         if at.regions.is_some() {
             let supports = &at.matched.correspondences.region_support;
@@ -188,15 +189,15 @@ impl Hypotheses {
         let unexplained = near.total();
         // Nothing else than the arm is expected about an arm, but furniture stays open beside legs.
         let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= CLEAR_GAIN;
-        let suspect = unexplained >= GAIN && self.suspicion.of(at.context, at.matched, chain, false) != [false; 2];
+        let suspect = unexplained >= GAIN && self.suspicion.assess(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
         // Of a leg that was refused for long a detector may tell something new.
-        self.history[at.index].persistence.observe(patience, looked && chain.leg, times)
+        self.history[at.index].persistence.observe(patience, detector_ran && chain.leg, times)
     }
 
     /// Fills the pool with other configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
-        let Self { history, suspicion, rough, clusters, lean, shown, pool, .. } = self;
+        let Self { history, suspicion, rough, clusters, lean, color_directions, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
@@ -207,7 +208,7 @@ impl Hypotheses {
             &mut CarriedByParent,
             &mut LastProposal,
             lean,
-            shown,
+            color_directions,
             &mut DetectedEnd(detection),
             &mut DetectedBody(detected),
         ];
@@ -248,14 +249,14 @@ impl Hypotheses {
                 predicted.clone_from(&proposal.poses);
             } else {
                 own.last_basis = proposal.basis;
-                let origin = context.seen.origin();
+                let origin = context.observation.origin();
                 own.last_proposal.extend(refined.poses.iter().map(|pose| shifted(pose, -origin)));
-                fit.exchange(&mut refined.matched);
+                fit.swap_matches(&mut refined.matched);
             }
             break;
         }
         if hopeless {
-            own.persistence.rest();
+            own.persistence.pause();
         }
         steps
     }
@@ -278,8 +279,8 @@ mod tests {
         let (mut hypotheses, mut fit) = (Hypotheses::default(), Fit::new(&config).unwrap());
         hypotheses.restart(&model);
         let mut found = Vec::new();
-        for seen in frames {
-            let (pixels, previous) = (before_wall(&model.body, seen), poses.clone());
+        for truth in frames {
+            let (pixels, previous) = (before_wall(&model.body, truth), poses.clone());
             let mut predicted = previous.clone();
             with_context(&pixels, &config, &model, &previous, |context| {
                 fit.match_last(context, &poses);
@@ -302,19 +303,19 @@ mod tests {
     #[test]
     fn a_raised_arm_is_found_when_two_frames_in_a_row_ask_for_it() {
         let (model, poses) = standing();
-        let (seen, _) = raised(&model, &poses, 0.2);
-        let found = improved(&[&seen; 5]);
+        let (truth, _) = raised(&model, &poses, 0.2);
+        let found = improved(&[&truth; 5]);
         let steps: Vec<usize> = found.iter().map(|(_, steps)| *steps).collect();
         assert_eq!(steps, [0, REFINE, REFINE, 0, 0], "one frame is waited for, two ask, and then all is well");
         assert!(found[..2].iter().all(|(found, _)| *found == poses));
-        assert!(farthest(&found[2].0, &seen) < 0.01, "{}", farthest(&found[2].0, &seen));
+        assert!(farthest(&found[2].0, &truth) < 0.01, "{}", farthest(&found[2].0, &truth));
     }
 
     #[test]
     fn two_disturbed_frames_before_one_in_order_change_nothing() {
         let (model, poses) = standing();
-        let (seen, _) = raised(&model, &poses, 0.2);
-        for (found, _) in improved(&[&seen, &seen, &poses, &seen, &seen, &poses]) {
+        let (truth, _) = raised(&model, &poses, 0.2);
+        for (found, _) in improved(&[&truth, &truth, &poses, &truth, &truth, &poses]) {
             assert_eq!(found, poses);
         }
     }

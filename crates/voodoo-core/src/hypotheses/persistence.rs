@@ -61,7 +61,7 @@ impl Persistence {
     }
 
     /// Nothing that was tried in this frame came near to what it shows: the next frames will hardly think otherwise.
-    pub(super) fn rest(&mut self) {
+    pub(super) fn pause(&mut self) {
         self.rests = true;
     }
 
@@ -78,7 +78,7 @@ impl Persistence {
     }
 
     /// This frame asks for a change.
-    pub(super) fn asks(&self) -> bool {
+    pub(super) fn requests_change(&self) -> bool {
         self.voted
     }
 
@@ -143,11 +143,11 @@ mod tests {
         for first in 0..REST {
             let mut persistence = Persistence::default();
             assert!(persistence.observe(Some(1), false, frame(first)));
-            persistence.rest();
+            persistence.pause();
             let tried = |number: usize| persistence.observe(Some(1), false, frame(number));
             let found: Vec<bool> = (first + 1..=REST).map(tried).collect();
             assert_eq!(found, (first + 1..=REST).map(|number| number >= REST).collect::<Vec<_>>());
-            persistence.rest();
+            persistence.pause();
             assert!(!persistence.observe(None, false, frame(1)) && persistence.observe(Some(1), false, frame(2)));
         }
     }
@@ -177,10 +177,10 @@ mod tests {
         };
         for number in 1..2 * long {
             let [whole, damaged] = &mut persistence;
-            let seen = tried(whole, number, number - 1);
+            let truth = tried(whole, number, number - 1);
             if number != missing {
                 let last = if number == missing + 1 { missing - 1 } else { number - 1 };
-                let same = tried(damaged, number, last) == seen;
+                let same = tried(damaged, number, last) == truth;
                 assert!(same || number < long + 2, "frame {number}");
             }
         }

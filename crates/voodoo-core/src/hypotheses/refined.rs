@@ -2,10 +2,10 @@
 
 use super::history::Basis;
 use super::proposals::Proposal;
-use super::score::{Cost, SEEN_GAIN, SURE_GAIN, overall_cost};
+use super::score::{Cost, REFUTED_GAIN, SURE_GAIN, overall_cost};
 use super::suspicion::Suspicion;
 use crate::association::correspondence::Correspondences;
-use crate::body::unusual;
+use crate::body::squared_mahalanobis;
 use crate::fit::{Context, Fit, Matched};
 use crate::math::Pose;
 use crate::regions::{self, Backdrop, Posed};
@@ -62,21 +62,22 @@ impl Refined {
     ) -> (usize, Outcome) {
         let chain = &context.model.extremities[index];
         let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
-        // What colours alone tell on the way says little.
-        let most = if pictures { f64::INFINITY } else { present.cost.total + SEEN_GAIN };
+        // What colors alone tell on the way says little.
+        let most = if pictures { f64::INFINITY } else { present.cost.total + REFUTED_GAIN };
         let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
         let hopeless = cost.total > most;
         if steps == REFINE && !hopeless && cost.is_better_than(&present.cost) {
             let matched = fit.matched(&self.poses);
             // What is as suspect as before is not worth a jump, unless people rather move that way.
             let mut sure =
-                |matched: Matched| pictures || !suspicion.of(context, matched, chain, basis == Basis::Points)[0];
-            let [tried, now] = [&self.poses, present.poses].map(|poses| unusual(&context.model.body, poses));
+                |matched: Matched| pictures || !suspicion.assess(context, matched, chain, basis == Basis::Points)[0];
+            let [tried, now] =
+                [&self.poses, present.poses].map(|poses| squared_mahalanobis(&context.model.body, poses));
             if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) || tried < now - MORE_USUAL {
                 return (steps, Outcome::Better);
             }
         }
-        fit.exchange(&mut self.matched);
+        fit.swap_matches(&mut self.matched);
         (steps, if hopeless { Outcome::Hopeless } else { Outcome::Refused })
     }
 
@@ -89,11 +90,11 @@ impl Refined {
     fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, Cost) {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
-        fit.exchange(&mut self.matched);
+        fit.swap_matches(&mut self.matched);
         let last = if context.pictures_alone() { regions::steps(true) } else { context.config.max_steps };
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
-            let here = if step < ROUGH_STEPS { context.roughly() } else { context };
+            let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
             // As in a frame's own steps, points mostly stay with the limbs they have, once it has come near.
             if step.is_multiple_of(2) || 2 * step < REFINE {
                 fit.match_all(here, &self.poses, at);
@@ -138,14 +139,14 @@ impl Refined {
         let mut tried = std::mem::take(&mut self.poses);
         tried.clear();
         tried.extend_from_slice(predicted);
-        fit.exchange(&mut self.matched);
+        fit.swap_matches(&mut self.matched);
         let steps = fit.run_far(context, predicted, &mut tried);
         let cost = self.cost(context, fit, &tried);
         self.poses = tried;
         if cost.is_better_than(&before) {
             poses.clone_from(&self.poses);
         } else {
-            fit.exchange(&mut self.matched);
+            fit.swap_matches(&mut self.matched);
         }
         steps
     }
@@ -154,10 +155,10 @@ impl Refined {
     pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
         let mut cost = overall_cost(context, fit.matched(poses));
         if context.pictures_alone() {
-            let Context { model, seen, previous, .. } = context;
-            let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
-            fit.regions().draw(seen.frame(), posed, |_| true, &mut self.backdrop);
-            let explained = fit.regions().explained(seen.frame(), posed, &self.backdrop);
+            let Context { model, observation, previous, .. } = context;
+            let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
+            fit.regions().draw(observation.frame(), posed, |_| true, &mut self.backdrop);
+            let explained = fit.regions().explained(observation.frame(), posed, &self.backdrop);
             (cost.evidence, cost.total) = (cost.evidence - explained, cost.total - explained);
         }
         cost

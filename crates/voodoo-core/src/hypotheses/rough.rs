@@ -7,7 +7,7 @@ use super::suspicion::distances_to_others;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Pose, Vec3, WeightedPoints};
-use crate::regions::{Backdrop, Claim, Posed, Regions};
+use crate::regions::{Backdrop, ColorRegions, PixelGain, Posed};
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
 /// The arm or leg that is looked at, and where everything else is.
@@ -16,8 +16,8 @@ pub(super) struct Extremity<'a> {
     pub(super) context: Context<'a>,
     /// The current poses, and what was matched there.
     pub(super) matched: Matched<'a>,
-    /// What colours tell, where nothing but pictures shows the body.
-    pub(super) regions: Option<&'a Regions>,
+    /// What colors tell, where nothing but pictures shows the body.
+    pub(super) regions: Option<&'a ColorRegions>,
     /// Its number among the extremities.
     pub(super) index: usize,
 }
@@ -27,7 +27,7 @@ impl<'a> Extremity<'a> {
         &self.context.model.extremities[self.index]
     }
 
-    /// Centre of its ball joint, working frame.
+    /// Center of its ball joint, working frame.
     pub(super) fn root(&self) -> Vec3 {
         self.chain().root(&self.context.model.body, self.matched.poses)
     }
@@ -69,27 +69,27 @@ impl RoughScore {
     }
 
     /// Draws everything else before what pictures show.
-    fn draw(&mut self, at: Extremity) {
+    fn draw_others(&mut self, at: Extremity) {
         let Some(regions) = at.regions else { return };
-        let (chain, frame, poses) = (at.chain(), at.context.seen.frame(), at.matched.poses);
+        let (chain, frame, poses) = (at.chain(), at.context.observation.frame(), at.matched.poses);
         let Context { model, previous, .. } = at.context;
-        let posed = Posed { body: &model.body, poses, previous, origin: at.context.seen.origin() };
+        let posed = Posed { body: &model.body, poses, previous, origin: at.context.observation.origin() };
         regions.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut self.backdrop);
     }
 
     /// What pictures say of some of its limbs at `poses`.
-    pub(super) fn claimed(&self, at: Extremity, poses: &[Pose], limbs: impl Iterator<Item = usize>) -> Claim {
-        let mut claim = Claim::default();
-        let Some(regions) = at.regions else { return claim };
-        let Context { model, seen, previous, .. } = at.context;
-        let posed = Posed { body: &model.body, poses, previous, origin: seen.origin() };
-        limbs.for_each(|limb| claim += regions.claim(seen.frame(), posed, limb, &self.backdrop));
-        claim
+    pub(super) fn pixel_gain(&self, at: Extremity, poses: &[Pose], limbs: impl Iterator<Item = usize>) -> PixelGain {
+        let mut gain = PixelGain::default();
+        let Some(regions) = at.regions else { return gain };
+        let Context { model, observation, previous, .. } = at.context;
+        let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
+        limbs.for_each(|limb| gain += regions.pixel_gain(observation.frame(), posed, limb, &self.backdrop));
+        gain
     }
 
     /// Takes the points that count: what is unexplained near by, and what it explains itself.
     pub(super) fn begin(&mut self, at: Extremity, own: &WeightedPoints) {
-        self.draw(at);
+        self.draw_others(at);
         let Self { unexplained, sample, others, distances, .. } = self;
         sample.clear();
         sample.extend(unexplained);
@@ -108,8 +108,8 @@ impl RoughScore {
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
         let points = rough_cost(nearest, &sample.weights);
         if at.regions.is_some() {
-            // What colours explain is the only part that may be negative.
-            return strain(context, at.matched, chain, poses) - self.claimed(at, poses, chain.limbs()).gained;
+            // What colors explain is the only part that may be negative.
+            return strain(context, at.matched, chain, poses) - self.pixel_gain(at, poses, chain.limbs()).gained;
         }
         if points >= least {
             return points;
@@ -117,9 +117,9 @@ impl RoughScore {
         let mut visible = Visibility::default();
         chain
             .limbs()
-            .for_each(|limb| visible += limb_visibility(context.seen.views, &body.limbs()[limb], &poses[limb]));
-        let seen = points + visible.cost();
-        if seen >= least { seen } else { seen + strain(context, at.matched, chain, poses) }
+            .for_each(|limb| visible += limb_visibility(context.observation.views, &body.limbs()[limb], &poses[limb]));
+        let evidence = points + visible.cost();
+        if evidence >= least { evidence } else { evidence + strain(context, at.matched, chain, poses) }
     }
 }
 
@@ -185,7 +185,7 @@ mod tests {
     use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
 
     #[test]
-    fn an_arm_is_bent_the_way_it_is_seen() {
+    fn an_arm_is_bent_the_way_it_is_visible() {
         let (model, poses) = standing();
         let (stretched, end) = raised(&model, &poses, 0.2);
         let (config, index) = (without_background(), first_arm(&model));
@@ -193,9 +193,9 @@ mod tests {
         let root = arm.root(&model.body, &stretched);
         let place = root + 0.6 * (end - root);
         for bend in [0, 2, 5] {
-            let mut seen = poses.clone();
-            arm.reach(&model.body, &mut seen, place, TAU * f64::from(bend) / 6.0);
-            with_context(&before_wall(&model.body, &seen), &config, &model, &poses, |context| {
+            let mut raised_pose = poses.clone();
+            arm.reach(&model.body, &mut raised_pose, place, TAU * f64::from(bend) / 6.0);
+            with_context(&before_wall(&model.body, &raised_pose), &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses);
                 let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
@@ -205,7 +205,7 @@ mod tests {
                 rough.score.begin(at, &WeightedPoints::default());
                 let mut best = Vec::new();
                 rough.end_at(at, place, 6, f64::INFINITY, &mut best);
-                let elbow = best[arm.lower].translation.distance(seen[arm.lower].translation);
+                let elbow = best[arm.lower].translation.distance(raised_pose[arm.lower].translation);
                 assert!(elbow < 1e-6, "bend {bend}: the elbow is {elbow} m off");
             });
         }
@@ -214,8 +214,8 @@ mod tests {
     #[test]
     fn the_raised_hand_is_where_an_arm_ends_at_least_cost() {
         let (model, poses) = standing();
-        let (seen, end) = raised(&model, &poses, 0.2);
-        let (pixels, config) = (before_wall(&model.body, &seen), without_background());
+        let (raised_pose, end) = raised(&model, &poses, 0.2);
+        let (pixels, config) = (before_wall(&model.body, &raised_pose), without_background());
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &poses);
@@ -226,7 +226,7 @@ mod tests {
             unexplained.near(at.root(), at.chain().stretched_length(), &mut rough.score.unexplained);
             rough.score.begin(at, &WeightedPoints::default());
             let hanging = rough.score.cost(at, &poses, f64::INFINITY);
-            let truth = rough.score.cost(at, &seen, f64::INFINITY);
+            let truth = rough.score.cost(at, &raised_pose, f64::INFINITY);
             let mut best = Vec::new();
             let least = rough.end_at(at, end, 6, hanging, &mut best);
             assert!(truth < 0.3 * hanging && least < 0.5 * hanging, "{truth} and {least} of {hanging}");
@@ -239,8 +239,8 @@ mod tests {
             // Another change is taken only where it costs less.
             assert_eq!(rough.changed(at, |_| (), least, &mut best), least);
             assert_eq!(best, before);
-            assert_eq!(rough.changed(at, |trial| trial.copy_from_slice(&seen), hanging, &mut best), truth);
-            assert_eq!(best, seen);
+            assert_eq!(rough.changed(at, |trial| trial.copy_from_slice(&raised_pose), hanging, &mut best), truth);
+            assert_eq!(best, raised_pose);
         });
     }
 }

@@ -16,13 +16,13 @@ use crate::visibility::{ALONG_LIMB, OVERLAP};
 /// are soft; a joint may turn by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// A hypothesis must cost so many patches less than the current pose: an area of six by six centimetres. As many unexplained ones
+/// A hypothesis must cost so many patches less than the current pose: an area of six by six centimeters. As many unexplained ones
 /// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
 pub(crate) const GAIN: f64 = 25.0;
 /// So many of them it must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump. Fewer
 /// flicker: so many more than the current pose a hypothesis may cost on its way.
-pub(super) const SEEN_GAIN: f64 = 10.0;
-/// An area of eight by eight centimetres makes an arm suspect whatever else speaks for it.
+pub(super) const REFUTED_GAIN: f64 = 10.0;
+/// An area of eight by eight centimeters makes an arm suspect whatever else speaks for it.
 pub(super) const CLEAR_GAIN: f64 = 40.0;
 /// Of one direction over the opposite one so many are asked.
 pub(crate) const SURE_GAIN: f64 = 100.0;
@@ -41,19 +41,19 @@ pub(crate) struct Cost {
 impl Cost {
     /// Whether a hypothesis that costs so much is worth a jump.
     pub(crate) fn is_better_than(&self, current: &Self) -> bool {
-        self.total < current.total - GAIN && self.evidence < current.evidence - SEEN_GAIN
+        self.total < current.total - GAIN && self.evidence < current.evidence - REFUTED_GAIN
     }
 }
 
 /// What the matched poses cost.
 pub(crate) fn overall_cost(context: Context, matched: Matched) -> Cost {
-    let Context { model, seen, .. } = context;
+    let Context { model, observation, .. } = context;
     let mut visible = Visibility::default();
     for (limb, pose) in model.body.limbs().iter().zip(matched.poses) {
-        visible += limb_visibility(seen.views, limb, pose);
+        visible += limb_visibility(observation.views, limb, pose);
     }
     let strain: f64 = model.extremities.iter().map(|chain| strain(context, matched, chain, matched.poses)).sum();
-    let total: f64 = seen.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
+    let total: f64 = observation.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
     let points = unexplained(matched.correspondences, total);
     Cost { evidence: points + visible.image.free_space, total: points + visible.cost() + strain }
 }
@@ -73,7 +73,8 @@ pub(super) fn strain(context: Context, matched: Matched, chain: &TwoBone, poses:
             cost += moved * moved;
         }
     }
-    cost + overlap_cost(body, context.seen.floor(), chain, poses) + extremity_landmark_cost(matched, chain, poses)
+    cost + overlap_cost(body, context.observation.floor(), chain, poses)
+        + extremity_landmark_cost(matched, chain, poses)
 }
 
 /// Patches of an arm or leg whose axis lies inside another limb or below the floor: there is no room for it.
@@ -166,9 +167,9 @@ mod tests {
     };
 
     /// Costs of poses before an image of the standing body.
-    fn costs(model: &Model, seen: &[Pose], tried: &[Vec<Pose>]) -> Vec<Cost> {
-        let (pixels, config) = (before_wall(&model.body, seen), without_background());
-        with_context(&pixels, &config, model, seen, |context| {
+    fn costs(model: &Model, truth: &[Pose], tried: &[Vec<Pose>]) -> Vec<Cost> {
+        let (pixels, config) = (before_wall(&model.body, truth), without_background());
+        with_context(&pixels, &config, model, truth, |context| {
             let mut fit = Fit::new(&config).unwrap();
             let mut cost = |poses: &Vec<Pose>| {
                 fit.match_last(context, poses);
@@ -211,7 +212,7 @@ mod tests {
             with_context(pixels, &config, &model, &poses, |context| {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses);
-                let all: f32 = context.seen.candidates.weight.iter().sum();
+                let all: f32 = context.observation.candidates.weight.iter().sum();
                 (overall_cost(context, fit.matched(&poses)), f64::from(all))
             })
         };
@@ -246,9 +247,12 @@ mod tests {
                 let mut bent = poses.clone();
                 let turn = Quat::from_axis_angle(hinge_axis(joint), least - beyond);
                 bent[chain.lower] = place(joint, &poses[chain.upper], turn);
-                let wanted = (beyond / LIMIT_STRAIN).powi(2);
+                let expected = (beyond / LIMIT_STRAIN).powi(2);
                 let (limit, all) = (limit_strain(&model.body, &bent, chain.lower), own(&bent) - own(&poses));
-                assert!((limit - wanted).abs() < 1e-6 && (all - wanted).abs() < 1e-6, "{limit} and {all} for {beyond}");
+                assert!(
+                    (limit - expected).abs() < 1e-6 && (all - expected).abs() < 1e-6,
+                    "{limit} and {all} for {beyond}"
+                );
             }
         });
     }

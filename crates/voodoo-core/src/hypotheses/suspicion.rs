@@ -1,6 +1,6 @@
 //! Whether the frame speaks against an arm or leg where it is.
 
-use super::score::{GAIN, SEEN_GAIN, bounds, explain, may_explain};
+use super::score::{GAIN, REFUTED_GAIN, bounds, explain, may_explain};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Points, Pose, WeightedPoints};
@@ -36,7 +36,7 @@ impl Suspicion {
     /// What cameras see past counts by its area in the image. Where unexplained points have drawn it there (`drawn`), it counts
     /// as if seen from the side, too: a thing that appears draws a calf along the ray, where nothing of it is seen. And it has
     /// to show itself: an arm behind the trunk may end at anything that comes into view there.
-    pub(super) fn of(&mut self, context: Context, matched: Matched, chain: &TwoBone, drawn: bool) -> [bool; 2] {
+    pub(super) fn assess(&mut self, context: Context, matched: Matched, chain: &TwoBone, drawn: bool) -> [bool; 2] {
         let upper = self.collect_own(matched, chain);
         let Self { own, others, distances } = self;
         distances_to_others(context, matched.poses, chain, &own.points, others, distances);
@@ -45,20 +45,20 @@ impl Suspicion {
             weighted.filter(|(other, _)| f64::from(**other) > EXPLAINED).map(|(_, weight)| *weight).sum()
         };
         let body = &context.model.body;
-        let mut seen = Visibility::default();
+        let mut visibility = Visibility::default();
         let mut against = |limb: usize, exclusive: f64| {
-            seen += limb_visibility(context.seen.views, &body.limbs()[limb], &matched.poses[limb]);
-            exclusive <= LITTLE * (seen.image.front_facing - seen.image.occluded).max(GAIN)
-                || seen.image.free_space > (REFUTED * seen.image.front_facing).max(SEEN_GAIN)
+            visibility += limb_visibility(context.observation.views, &body.limbs()[limb], &matched.poses[limb]);
+            exclusive <= LITTLE * (visibility.image.front_facing - visibility.image.occluded).max(GAIN)
+                || visibility.image.free_space > (REFUTED * visibility.image.front_facing).max(REFUTED_GAIN)
         };
         chain.ends.iter().for_each(|end| {
             against(*end, 0.0);
         });
         let lower = against(chain.lower, exclusive(upper));
         let upper = against(chain.upper, exclusive(0));
-        let shown = seen.image.front_facing - seen.image.occluded - seen.image.free_space;
-        let past = seen.side.free_space > (REFUTED * seen.side.front_facing).max(GAIN);
-        let drawn = drawn && (past || shown < GAIN);
+        let visible = visibility.image.front_facing - visibility.image.occluded - visibility.image.free_space;
+        let past = visibility.side.free_space > (REFUTED * visibility.side.front_facing).max(GAIN);
+        let drawn = drawn && (past || visible < GAIN);
         [upper || drawn, lower || drawn]
     }
 
@@ -114,19 +114,19 @@ mod tests {
     use crate::math::{Quat, Vec3};
     use crate::testing::{before_wall, first_arm, raised, standing, turned, with_context, without_background};
 
-    /// What is said of the first arm at `poses` when the body is seen in `seen`: all of it, and beyond its hinge.
-    fn suspect(seen: &[Pose], poses: &[Pose], drawn: bool) -> [bool; 2] {
+    /// What is said of the first arm at `poses` when the body is seen in `truth`: all of it, and beyond its hinge.
+    fn suspect(truth: &[Pose], poses: &[Pose], drawn: bool) -> [bool; 2] {
         let (model, _) = standing();
-        let (pixels, config) = (before_wall(&model.body, seen), without_background());
+        let (pixels, config) = (before_wall(&model.body, truth), without_background());
         with_context(&pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, poses);
-            Suspicion::default().of(context, fit.matched(poses), &model.extremities[first_arm(&model)], drawn)
+            Suspicion::default().assess(context, fit.matched(poses), &model.extremities[first_arm(&model)], drawn)
         })
     }
 
     #[test]
-    fn an_arm_where_it_is_seen_is_not_suspect() {
+    fn an_arm_where_it_is_visible_is_not_suspect() {
         let (model, poses) = standing();
         let (raised, _) = raised(&model, &poses, 0.2);
         for pose in [&poses, &raised] {
@@ -155,11 +155,11 @@ mod tests {
     fn a_forearm_alone_may_be_wrong() {
         let (model, poses) = standing();
         let arm = &model.extremities[first_arm(&model)];
-        let (seen, _) = raised(&model, &poses, 0.2);
-        let all = turned(&seen, seen[arm.lower].translation, Vec3::Z, -1.6);
-        let mut bent = seen.clone();
+        let (truth, _) = raised(&model, &poses, 0.2);
+        let all = turned(&truth, truth[arm.lower].translation, Vec3::Z, -1.6);
+        let mut bent = truth.clone();
         arm.limbs().skip(1).for_each(|limb| bent[limb] = all[limb]);
-        assert_eq!(suspect(&seen, &bent, false), [false, true]);
+        assert_eq!(suspect(&truth, &bent, false), [false, true]);
     }
 
     #[test]

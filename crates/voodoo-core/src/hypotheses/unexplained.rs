@@ -20,7 +20,7 @@ pub(super) struct Unexplained {
 impl Unexplained {
     /// Collects them anew.
     pub(super) fn collect(&mut self, context: Context, matched: Matched) {
-        let candidates = context.seen.candidates;
+        let candidates = context.observation.candidates;
         let Self { points, cluttered, nearest } = self;
         points.clear();
         // Room for the worst case at once, not when the first hard frame comes.
@@ -44,7 +44,7 @@ impl Unexplained {
         *cluttered = points.total() > CLUTTER * all;
     }
 
-    /// Those within `reach` metres of a place, into `near`.
+    /// Those within `reach` meters of a place, into `near`.
     pub(super) fn near(&self, place: Vec3, reach: f64, near: &mut WeightedPoints) {
         near.clear();
         for index in 0..self.points.len() {
@@ -64,16 +64,16 @@ mod tests {
     use crate::math::Pose;
     use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
 
-    /// What the hanging arms leave unexplained when the body is seen in `seen`.
-    fn collected(seen: &[Pose], look: impl FnOnce(&Unexplained)) {
+    /// What the hanging arms leave unexplained when the body is seen in `truth`.
+    fn collected(truth: &[Pose], check: impl FnOnce(&Unexplained)) {
         let (model, poses) = standing();
-        let (pixels, config) = (before_wall(&model.body, seen), without_background());
+        let (pixels, config) = (before_wall(&model.body, truth), without_background());
         with_context(&pixels, &config, &model, &poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &poses);
             let mut unexplained = Unexplained::default();
             unexplained.collect(context, fit.matched(&poses));
-            look(&unexplained);
+            check(&unexplained);
         });
     }
 
@@ -88,10 +88,10 @@ mod tests {
     #[test]
     fn a_raised_arm_is_what_the_hanging_one_leaves_and_lies_about_the_shoulder() {
         let (model, poses) = standing();
-        let (seen, end) = raised(&model, &poses, 0.2);
+        let (truth, end) = raised(&model, &poses, 0.2);
         let chain = &model.extremities[first_arm(&model)];
         let root = chain.root(&model.body, &poses);
-        collected(&seen, |unexplained| {
+        collected(&truth, |unexplained| {
             let all = unexplained.points.total();
             let mut near = WeightedPoints::default();
             unexplained.near(end, 0.15, &mut near);

@@ -35,7 +35,7 @@ impl Moments {
 
     /// The rigid motion `p_from_x` with the least weighted sum of squared distances, `None` without weight.
     ///
-    /// `stay` (metres) is the lever of a faint wish not to turn: pairs that fix no rotation (one point, points on a line)
+    /// `stay` (meters) is the lever of a faint wish not to turn: pairs that fix no rotation (one point, points on a line)
     /// turn the free directions not at all, and the others by less than `1e-6` of their due when the points spread farther
     /// than `stay`.
     pub(crate) fn absolute_orientation(&self, stay: f64) -> Option<Pose> {
@@ -44,9 +44,9 @@ impl Moments {
         }
         let (mean_x, mean_p) = (self.x / self.weight, self.p / self.weight);
         // Cross-covariance sum w (x - mx)(p - mp)^T, transposed to S[row x][column p] as Horn writes it.
-        let centred = self.px - Mat3::from_cols(mean_x.x * self.p, mean_x.y * self.p, mean_x.z * self.p);
+        let centerd = self.px - Mat3::from_cols(mean_x.x * self.p, mean_x.y * self.p, mean_x.z * self.p);
         let stay = 1e-6 * self.weight * stay * stay;
-        let s = |x: usize, p: usize| centred.col(x)[p] + if x == p { stay } else { 0.0 };
+        let s = |x: usize, p: usize| centerd.col(x)[p] + if x == p { stay } else { 0.0 };
         // Horn's symmetric matrix N; the eigenvector of its largest eigenvalue is the quaternion (w, x, y, z).
         let n = Matrix4::new(
             s(0, 0) + s(1, 1) + s(2, 2),

@@ -4,7 +4,7 @@
 //!
 //! Conventions, fixed here for the whole project:
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
-//! * a twist is `(omega, v)`, radians and metres, and perturbs on the left: `T' = exp(xi) T`.
+//! * a twist is `(omega, v)`, radians and meters, and perturbs on the left: `T' = exp(xi) T`.
 
 pub use glam::{DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
 use std::ops::Mul;
@@ -14,7 +14,7 @@ use std::ops::Mul;
 pub struct Pose {
     /// A unit quaternion.
     pub rotation: Quat,
-    /// Where the origin goes, metres.
+    /// Where the origin goes, meters.
     pub translation: Vec3,
 }
 
@@ -28,7 +28,7 @@ impl Pose {
         Self { rotation, translation }
     }
 
-    /// A translation alone, metres.
+    /// A translation alone, meters.
     #[inline]
     pub fn from_translation(translation: Vec3) -> Self {
         Self::from_parts(translation, Quat::IDENTITY)
@@ -40,7 +40,7 @@ impl Pose {
         Self::from_parts(Vec3::ZERO, rotation)
     }
 
-    /// A translation, metres, and a rotation vector, radians.
+    /// A translation, meters, and a rotation vector, radians.
     #[inline]
     pub fn new(translation: Vec3, rotation_vector: Vec3) -> Self {
         Self::from_parts(translation, Quat::from_scaled_axis(rotation_vector))
@@ -124,7 +124,7 @@ impl Mul<Vec3> for Pose {
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// The corner with the smallest coordinates, metres.
+    /// The corner with the smallest coordinates, meters.
     pub mins: Vec3,
     /// The corner with the largest.
     pub maxs: Vec3,
@@ -174,7 +174,7 @@ impl Aabb {
     }
 }
 
-/// No place lies farther from its origin, metres: three times as far as the Moon. Beyond, squares and products of coordinates
+/// No place lies farther from its origin, meters: three times as far as the Moon. Beyond, squares and products of coordinates
 /// have no digits left for a body, and at last are infinite.
 pub(crate) const FARTHEST: f64 = 1e9;
 
@@ -196,7 +196,7 @@ pub fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
     [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Single-precision points as a structure of arrays, the layout the SIMD kernels read. Metres.
+/// Single-precision points as a structure of arrays, the layout the SIMD kernels read. Meters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {
     /// First coordinates.

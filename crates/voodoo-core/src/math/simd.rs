@@ -1,4 +1,4 @@
-//! Run-time choice of instruction set for loops that the compiler vectorises.
+//! Run-time choice of instruction set for loops that the compiler vectorizes.
 
 /// Values of single precision that one SIMD register holds, in AVX2.
 pub const LANES: usize = 8;

@@ -2,7 +2,7 @@
 
 use super::{Points, Vec3};
 
-/// Points in single precision, each with a weight. Metres.
+/// Points in single precision, each with a weight. Meters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct WeightedPoints {
     /// Where they are.

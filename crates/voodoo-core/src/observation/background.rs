@@ -1,23 +1,23 @@
-//! The still scene behind the body, learnt from the depth images of a camera.
+//! The still scene behind the body, learned from the depth images of a camera.
 
 use std::ops::Range;
 
 use crate::math::{Pose, widest};
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 
-/// A pixel belongs to the background when it lies no more than this before it: metres, and share of the depth, which the noise
+/// A pixel belongs to the background when it lies no more than this before it: meters, and share of the depth, which the noise
 /// of depth cameras grows with.
 const SCENE_MARGIN: (f32, f32) = (0.04, 0.012);
-/// A deeper return by more than this replaces what was learnt (something stood before it), metres.
+/// A deeper return by more than this replaces what was learned (something stood before it), meters.
 const DEEPER: f32 = 0.15;
-/// Two sides of a gap that differ by less, metres, belong to one surface: a wall seen aslant.
+/// Two sides of a gap that differ by less, meters, belong to one surface: a wall seen aslant.
 const ONE_WALL: f32 = 0.30;
-/// Share of a new return in what was learnt: about ten looks at a pixel average its noise.
+/// Share of a new return in what was learned: about ten looks at a pixel average its noise.
 const LEARNING: f32 = 0.1;
-/// One row of this many is learnt in a frame, for speed: the scene stands still.
+/// One row of this many is learned in a frame, for speed: the scene stands still.
 const ROW_STEP: usize = 8;
 
-/// A camera that moved by no more than this stands: metres, and radians; the odometry of a robot that stands wavers by less.
+/// A camera that moved by no more than this stands: meters, and radians; the odometry of a robot that stands wavers by less.
 const STANDS: (f64, f64) = (0.003, 0.0015);
 /// Stands for the depth at pixels that show another body: whatever returns there belongs to what is not this one.
 pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
@@ -41,42 +41,42 @@ pub(crate) struct Backgrounds {
     others: Vec<Vec<bool>>,
 }
 
-/// How far apart two poses are: metres, and radians.
-pub(super) fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+/// How far apart two poses are: meters, and radians.
+pub(super) fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
 }
 
 /// Whether a camera stands where it was.
-fn stands(a: &Pose, b: &Pose) -> bool {
-    let (metres, radians) = apart(a, b);
-    a == b || (metres <= STANDS.0 && radians <= STANDS.1)
+fn is_static(a: &Pose, b: &Pose) -> bool {
+    let (meters, radians) = pose_difference(a, b);
+    a == b || (meters <= STANDS.0 && radians <= STANDS.1)
 }
 
 impl Background {
-    /// Learnt depth, row by row; empty when nothing was learnt.
+    /// Learned depth, row by row; empty when nothing was learned.
     pub(crate) fn depth(&self) -> &[f32] {
         &self.depth
     }
 
-    /// Whether a return at `z` metres in pixel `index` belongs to the background.
+    /// Whether a return at `z` meters in pixel `index` belongs to the background.
     #[inline(always)]
-    pub(crate) fn holds(depth: f32, z: f32) -> bool {
+    pub(crate) fn contains(depth: f32, z: f32) -> bool {
         depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
     }
 
     /// Whether it is that of this image: of its camera, where it stands.
     pub(super) fn fits(&self, image: &DepthImage) -> bool {
         self.is_sized_like(image)
-            && self.world_from_sensor.is_some_and(|known| stands(&known, &image.world_from_sensor))
+            && self.world_from_sensor.is_some_and(|known| is_static(&known, &image.world_from_sensor))
     }
 
     pub(super) fn is_sized_like(&self, image: &DepthImage) -> bool {
         self.width == image.camera.width() && self.depth.len() == image.pixels.len()
     }
 
-    /// Learns from neighbouring pixels, without a branch.
+    /// Learns from neighboring pixels, without a branch.
     fn learn(&mut self, image: &DepthImage, pixels: Range<usize>) {
-        let scale = image.metres_per_unit as f32;
+        let scale = image.meters_per_unit as f32;
         let depth = &mut self.depth[pixels.clone()];
         widest(
             #[inline(always)]
@@ -85,10 +85,10 @@ impl Background {
                     depth
                         .iter_mut()
                         .zip(&all[pixels])
-                        .for_each(|(depth, z)| *depth = learnt(*depth, f32::from(*z) * scale));
+                        .for_each(|(depth, z)| *depth = learned(*depth, f32::from(*z) * scale));
                 }
                 DepthPixels::F32(all) => {
-                    depth.iter_mut().zip(&all[pixels]).for_each(|(depth, z)| *depth = learnt(*depth, *z * scale));
+                    depth.iter_mut().zip(&all[pixels]).for_each(|(depth, z)| *depth = learned(*depth, *z * scale));
                 }
             },
         );
@@ -97,7 +97,7 @@ impl Background {
 
 /// What is known of a pixel after a return at `z`.
 #[inline(always)]
-fn learnt(depth: f32, z: f32) -> f32 {
+fn learned(depth: f32, z: f32) -> f32 {
     let change = z - depth;
     let near = if change.abs() < DEEPER { depth + LEARNING * change } else { depth };
     let new = if (depth == 0.0) | (z > depth + DEEPER) { z } else { near };
@@ -106,11 +106,11 @@ fn learnt(depth: f32, z: f32) -> f32 {
 
 impl Backgrounds {
     /// The background of this image, if its camera has not moved.
-    pub(crate) fn of(&self, image: &DepthImage) -> Option<&Background> {
+    pub(crate) fn of_image(&self, image: &DepthImage) -> Option<&Background> {
         self.images.iter().find(|background| background.fits(image))
     }
 
-    /// What was learnt of this image.
+    /// What was learned of this image.
     pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
         let known = self.images.iter_mut().find(|background| background.fits(image));
         known.map(|background| background.depth.as_mut_slice())
@@ -122,7 +122,7 @@ impl Backgrounds {
     }
 
     /// Notes which points of clouds another person explains: those of whose owner `is_others` holds.
-    pub(super) fn share_clouds(&mut self, owners: &[Vec<u16>], is_others: impl Fn(u16) -> bool) {
+    pub(super) fn mark_others_points(&mut self, owners: &[Vec<u16>], is_others: impl Fn(u16) -> bool) {
         self.others.resize_with(owners.len(), Vec::new);
         for (others, owners) in self.others.iter_mut().zip(owners) {
             others.clear();
@@ -136,7 +136,7 @@ impl Backgrounds {
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
             (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.camera.width());
             own.depth.clear();
-            match scene.of(image) {
+            match scene.of_image(image) {
                 Some(known) => own.depth.extend_from_slice(&known.depth),
                 None => own.depth.resize(image.pixels.len(), 0.0),
             }
@@ -145,11 +145,11 @@ impl Backgrounds {
     }
 
     /// Makes sure that something is known, if only nothing, of every image of a frame; `moved` gets the numbers of those whose
-    /// cameras are not where they were, and whether what they had learnt was carried along.
-    pub(crate) fn meet(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
+    /// cameras are not where they were, and whether what they had learned was carried along.
+    pub(crate) fn register(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
         for (number, image) in frame.images.iter().enumerate() {
-            if self.of(image).is_none() {
-                let (_, carried) = self.carry(image, frame);
+            if self.of_image(image).is_none() {
+                let (_, carried) = self.carry_over(image, frame);
                 moved(number, carried);
             }
         }
@@ -170,7 +170,7 @@ impl Backgrounds {
     pub(crate) fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
         self.images.clear();
         for image in frame.images {
-            let depths = (0..image.pixels.len()).map(|index| image.pixels.get(index) * image.metres_per_unit as f32);
+            let depths = (0..image.pixels.len()).map(|index| image.pixels.get(index) * image.meters_per_unit as f32);
             let mut depth: Vec<f32> = depths.map(|z| if z > 0.0 && z.is_finite() { z } else { 0.0 }).collect();
             forget_body(image, &mut depth);
             self.images.push(Background {
@@ -194,11 +194,11 @@ impl Backgrounds {
     }
 
     /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. What a
-    /// camera learnt that moved since is carried along; one that is silent in this frame is remembered.
+    /// camera learned that moved since is carried along; one that is silent in this frame is remembered.
     pub(crate) fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> [Range<usize>; 2]) {
         for image in frame.images {
             let known = self.images.iter().position(|background| background.fits(image));
-            let index = known.unwrap_or_else(|| self.carry(image, frame).0);
+            let index = known.unwrap_or_else(|| self.carry_over(image, frame).0);
             let background = &mut self.images[index];
             let [columns, rows] = window(image);
             background.row = (background.row + 1) % ROW_STEP;
@@ -245,7 +245,7 @@ mod tests {
         let mut row = [0.0, 3.0, 0.0, 0.0, 3.3, 0.0, 1.0, 0.0, 2.5, 0.0];
         fill_row(&mut row);
         let expected = [3.0, 3.0, 3.1, 3.2, 3.3, 3.3, 1.0, 2.5, 2.5, 2.5];
-        assert!(row.iter().zip(expected).all(|(found, wanted)| (found - wanted).abs() < 1e-6), "{row:?}");
+        assert!(row.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-6), "{row:?}");
         let mut nothing = [0.0; 3];
         fill_row(&mut nothing);
         assert_eq!(nothing, [0.0; 3]);
@@ -257,7 +257,7 @@ mod tests {
         let image = |x: f64| DepthImage {
             pixels: DepthPixels::F32(&pixels),
             camera: pinhole(4, ROW_STEP, [4.0, 4.0, 2.0, 4.0]),
-            metres_per_unit: 1.0,
+            meters_per_unit: 1.0,
             world_from_sensor: Pose::from_translation(Vec3::new(x, 0.0, 0.0)),
             weight: 1.0,
             source: 0,
@@ -267,8 +267,8 @@ mod tests {
             let frame = Frame { images, ..Frame::empty(0.0) };
             backgrounds.update(&frame, |_| [0..0, 0..0]);
             [0.0, 1.0, 2.0].map(|x| {
-                let learnt = backgrounds.of(&image(x)).map(Background::depth);
-                learnt.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count() / 4)
+                let learned = backgrounds.of_image(&image(x)).map(Background::depth);
+                learned.map(|depth| depth.iter().filter(|depth| **depth > 0.0).count() / 4)
             })
         };
         assert_eq!(learn(&[image(0.0), image(1.0)]), [Some(1), Some(1), None]);

@@ -1,25 +1,25 @@
-//! A scene that was learnt by a camera which has moved since: its surfaces stay where they are in the world.
+//! A scene that was learned by a camera which has moved since: its surfaces stay where they are in the world.
 
-use super::background::{Background, Backgrounds, apart};
+use super::background::{Background, Backgrounds, pose_difference};
 use super::frame::{DepthImage, Frame};
 use crate::math::{Pose, Vec3};
 
-/// A camera that moved by more than this from one image to the next is another one: metres, and radians.
+/// A camera that moved by more than this from one image to the next is another one: meters, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
-/// Surfaces nearer to the camera plane are not carried along, metres: no sensor measures there.
+/// Surfaces nearer to the camera plane are not carried along, meters: no sensor measures there.
 const NEAREST_CARRIED: f32 = 0.1;
-/// Two sides of a crack that differ by less, metres, belong to one surface.
+/// Two sides of a crack that differ by less, meters, belong to one surface.
 const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
-    /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learnt elsewhere is carried to where it is
+    /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learned elsewhere is carried to where it is
     /// now, else nothing is known; in the place of a background that no image of the frame has.
-    pub(super) fn carry(&mut self, image: &DepthImage, frame: &Frame) -> (usize, bool) {
+    pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) -> (usize, bool) {
         let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
         let from = |background: &Background| background.world_from_sensor.filter(|_| background.is_sized_like(image));
         let leap = |background: &Background| {
-            let (metres, radians) = apart(&from(background)?, &image.world_from_sensor);
-            (metres <= LEAPS.0 && radians <= LEAPS.1).then_some(metres / LEAPS.0 + radians / LEAPS.1)
+            let (meters, radians) = pose_difference(&from(background)?, &image.world_from_sensor);
+            (meters <= LEAPS.0 && radians <= LEAPS.1).then_some(meters / LEAPS.0 + radians / LEAPS.1)
         };
         let left = (0..self.images.len()).filter(|index| gone(&self.images[*index]));
         let nearest = left
@@ -51,7 +51,7 @@ impl Background {
         self.rays.clear();
     }
 
-    /// Looks at the learnt surfaces from where the camera is now; the nearest that falls into a pixel is what is known there.
+    /// Looks at the learned surfaces from where the camera is now; the nearest that falls into a pixel is what is known there.
     ///
     /// A surface is kept on the ray it was seen on, not in the middle of its pixel: errors of rounding do not add up.
     fn move_to(&mut self, image: &DepthImage, before: &Pose) {
@@ -64,7 +64,7 @@ impl Background {
             true => camera.rays()[index],
             false => [((index % width) as f32 - cx) / fx, ((index / width) as f32 - cy) / fy],
         };
-        let seen_at = |ray: [f32; 2]| {
+        let view_at = |ray: [f32; 2]| {
             if camera.distorts() {
                 return camera.index_of(Vec3::new(f64::from(ray[0]), f64::from(ray[1]), 1.0));
             }
@@ -83,7 +83,7 @@ impl Background {
                 continue;
             }
             let ray = [place[0] / place[2], place[1] / place[2]];
-            let Some(target) = seen_at(ray) else { continue };
+            let Some(target) = view_at(ray) else { continue };
             if self.depth[target] == 0.0 || place[2] < self.depth[target] {
                 (self.depth[target], self.rays[target]) = (place[2], ray);
             }
@@ -93,7 +93,7 @@ impl Background {
         }
     }
 
-    /// Closes cracks one pixel wide between neighbours `step` apart, which open where a surface comes nearer.
+    /// Closes cracks one pixel wide between neighbors `step` apart, which open where a surface comes nearer.
     fn close_cracks(&mut self, step: usize) {
         for index in step..self.depth.len().saturating_sub(step) {
             let (a, b) = (self.depth[index - step], self.depth[index + step]);
@@ -130,7 +130,7 @@ mod tests {
         DepthImage {
             pixels: DepthPixels::F32(pixels),
             camera,
-            metres_per_unit: 1.0,
+            meters_per_unit: 1.0,
             world_from_sensor,
             weight: 1.0,
             source: 0,
@@ -138,7 +138,7 @@ mod tests {
     }
 
     /// A wall at z = 3 with a step to 4 on the right of x = 0.2.
-    fn seen(camera: &Camera, world_from_sensor: &Pose) -> Vec<f32> {
+    fn view_from(camera: &Camera, world_from_sensor: &Pose) -> Vec<f32> {
         (0..SIZE.0 * SIZE.1)
             .map(|index| {
                 let [x, y] = camera.pixel_ray(index % SIZE.0, index / SIZE.0);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_learnt_stays_where_it_is_while_the_camera_moves_on() {
+    fn what_was_learned_stays_where_it_is_while_the_camera_moves_on() {
         for lens in [Lens::Pinhole, Lens::PlumbBob([-0.3, 0.1, 0.002, -0.001, 0.0]), Lens::Fisheye([0.0; 4])] {
             moves_on(&camera(lens));
         }
@@ -164,24 +164,24 @@ mod tests {
 
     fn moves_on(camera: &Camera) {
         let mut backgrounds = Backgrounds::default();
-        let first = seen(camera, &pose(0.0, 0.0));
+        let first = view_from(camera, &pose(0.0, 0.0));
         let images = [image(&first, camera, pose(0.0, 0.0))];
         backgrounds.start(&Frame { images: &images, ..Frame::empty(0.0) }, |_, _| {});
         let mut known = 0;
         for step in 1..=80 {
             // A sixth of a pixel at a time: rounding alone would leave everything where it was in the image.
             let now = pose(0.002 * f64::from(step), 0.0025 * f64::from(step));
-            let pixels = seen(camera, &now);
+            let pixels = view_from(camera, &now);
             let frame = [image(&pixels, camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(f64::from(step)) };
-            backgrounds.meet(&frame, |_, _| {});
-            let depth = backgrounds.of(&frame.images[0]).map(Background::depth).unwrap_or_default();
+            backgrounds.register(&frame, |_, _| {});
+            let depth = backgrounds.of_image(&frame.images[0]).map(Background::depth).unwrap_or_default();
             known = depth.iter().filter(|z| **z > 0.0).count();
             // Within a pixel: the step falls between two of them.
             let beside = |index: usize| pixels[index.saturating_sub(1)..(index + 2).min(pixels.len())].iter();
-            let seen = || depth.iter().enumerate().filter(|(_, z)| **z > 0.0);
-            let near = seen().filter(|(index, z)| beside(*index).all(|seen| **z < seen - 0.1)).count();
-            let deep = seen().filter(|(index, z)| beside(*index).all(|seen| **z > seen + 0.1)).count();
+            let view_from = || depth.iter().enumerate().filter(|(_, z)| **z > 0.0);
+            let near = view_from().filter(|(index, z)| beside(*index).all(|view_from| **z < view_from - 0.1)).count();
+            let deep = view_from().filter(|(index, z)| beside(*index).all(|view_from| **z > view_from + 0.1)).count();
             // Too near would hide a body; too deep, where the far wall is seen through cracks of the near one, does not.
             assert!(near == 0 && deep * 20 <= known, "step {step}: {near} too near, {deep} too deep of {known}");
         }
@@ -192,17 +192,17 @@ mod tests {
     #[test]
     fn a_camera_that_wavers_stands_and_one_that_leaps_is_another() {
         let camera = camera(Lens::Pinhole);
-        let pixels = seen(&camera, &pose(0.0, 0.0));
+        let pixels = view_from(&camera, &pose(0.0, 0.0));
         let mut backgrounds = Backgrounds::default();
         let mut known = |now: Pose| {
             let frame = [image(&pixels, &camera, now)];
             let frame = Frame { images: &frame, ..Frame::empty(0.0) };
-            backgrounds.meet(&frame, |_, _| {});
+            backgrounds.register(&frame, |_, _| {});
             if now == pose(0.0, 0.0) {
                 backgrounds.start(&frame, |_, _| {});
             }
             backgrounds
-                .of(&frame.images[0])
+                .of_image(&frame.images[0])
                 .map_or(0, |background| background.depth().iter().filter(|z| **z > 0.0).count())
         };
         assert_eq!(known(pose(0.0, 0.0)), pixels.len());

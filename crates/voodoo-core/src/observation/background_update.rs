@@ -1,4 +1,4 @@
-//! What is not the body: the still scene, learnt around it.
+//! What is not the body: the still scene, learned around it.
 
 use super::background::{Background, Backgrounds};
 use super::candidates::image_window;
@@ -7,7 +7,7 @@ use super::observer::{Expectation, Own};
 use crate::math::{Aabb, Points, shifted};
 use crate::shape::SurfaceBatch;
 
-/// In the first frame, what lies within this of the body may be the body, metres: poses that are set are that far off.
+/// In the first frame, what lies within this of the body may be the body, meters: poses that are set are that far off.
 const BODY_REACH: f32 = 0.15;
 
 impl Backgrounds {
@@ -28,30 +28,30 @@ impl Backgrounds {
         });
     }
 
-    /// Forgets, and returns, what was learnt at pixels that show the body.
+    /// Forgets, and returns, what was learned at pixels that show the body.
     pub(super) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
         let Some(image) = frame.images.get(own.image) else { return Vec::new() };
         let Some(depth) = self.depth_mut(image) else { return Vec::new() };
-        let scale = image.metres_per_unit as f32;
+        let scale = image.meters_per_unit as f32;
         let forget = |pixel: &usize| {
             let Some(depth) = depth.get_mut(*pixel) else { return 0.0 };
-            let learnt = *depth;
-            // What was learnt behind the body stays.
+            let learned = *depth;
+            // What was learned behind the body stays.
             let z = image.pixels.get(*pixel) * scale;
-            if !(z > 0.0) || Background::holds(learnt, z) {
+            if !(z > 0.0) || Background::contains(learned, z) {
                 *depth = 0.0;
             }
-            learnt
+            learned
         };
         own.pixels.iter().map(forget).collect()
     }
 
     /// Learns again what was forgotten.
-    pub(super) fn restore(&mut self, frame: &Frame, own: Own, learnt: &[f32]) {
+    pub(super) fn restore(&mut self, frame: &Frame, own: Own, learned: &[f32]) {
         let Some(depth) = frame.images.get(own.image).and_then(|image| self.depth_mut(image)) else { return };
-        for (pixel, learnt) in own.pixels.iter().zip(learnt) {
+        for (pixel, learned) in own.pixels.iter().zip(learned) {
             if let Some(depth) = depth.get_mut(*pixel) {
-                *depth = *learnt;
+                *depth = *learned;
             }
         }
     }

@@ -25,7 +25,7 @@ pub(crate) struct Candidates {
     /// The pixels of depth images come first, image after image: the number of points up to the end of each, and where its
     /// camera stands.
     pub cameras: Vec<(u32, Vec3)>,
-    /// The points once more, neighbours together.
+    /// The points once more, neighbors together.
     pub(crate) clusters: Clusters,
     /// What [`Self::rough`] returns, if there are any.
     fewer: Option<Box<Candidates>>,
@@ -58,7 +58,7 @@ impl Candidates {
     }
 
     /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
-    /// whole-body box in the working frame; pixels of the learnt backgrounds are left out.
+    /// whole-body box in the working frame; pixels of the learned backgrounds are left out.
     pub(crate) fn gather(
         &mut self,
         frame: &Frame,
@@ -69,14 +69,14 @@ impl Candidates {
     ) {
         self.clear();
         let (up, floor) = match frame.ground {
-            Some(ground) => (ground.normal, ground.about(origin).offset + config.ground_clearance),
+            Some(ground) => (ground.normal, ground.relative_to(origin).offset + config.ground_clearance),
             None => (Vec3::ZERO, -1.0),
         };
         let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
         let gate =
             PointGate { low: to_f32(bounds.mins), high: to_f32(bounds.maxs), up: to_f32(up), floor: floor as f32 };
         for image in frame.images {
-            let background = backgrounds.of(image).map_or(&[][..], Background::depth);
+            let background = backgrounds.of_image(image).map_or(&[][..], Background::depth);
             self.gather_image(image, background, origin, bounds, &gate, config.max_points);
             self.cameras.push((self.points.len() as u32, image.world_from_sensor.translation - origin));
         }
@@ -89,7 +89,7 @@ impl Candidates {
     }
 
     /// Where depth images show many, about [`ROUGH_POINTS`] of them that weigh as much together; else all.
-    pub(crate) fn rough(&self) -> &Self {
+    pub(crate) fn subsampled(&self) -> &Self {
         self.fewer.as_deref().filter(|fewer| !fewer.is_empty()).unwrap_or(self)
     }
 
@@ -219,7 +219,7 @@ impl Candidates {
     }
 }
 
-/// A body is taken to be no nearer to its camera than this, metres, when a pixel's share of its surface is computed.
+/// A body is taken to be no nearer to its camera than this, meters, when a pixel's share of its surface is computed.
 const NEAREST_BODY: f64 = 0.3;
 /// Area of a person that a camera sees, about, m^2; what stands beside counts as well.
 const VISIBLE_AREA: f64 = 0.6;
@@ -272,7 +272,7 @@ mod tests {
         // One pixel after the other, in double precision.
         let expected: Vec<Vec3> = (0..pixels.len())
             .filter(|index| pixels[*index] > 0.0)
-            .filter(|index| !Background::holds(2.6 + 1e-6 * pixels[*index], pixels[*index]))
+            .filter(|index| !Background::contains(2.6 + 1e-6 * pixels[*index], pixels[*index]))
             .map(|index| world_from_sensor * images[0].back_project(index, pixels[index]))
             .filter(|point| point.z >= 0.5 + config.ground_clearance)
             .map(|point| point - origin)
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rough_look_sees_fewer_pixels_that_weigh_as_much_and_all_other_points() {
+    fn a_coarse_subset_has_fewer_pixels_that_weigh_as_much_and_all_other_points() {
         let mut all = Candidates::default();
         let pixels = 4 * ROUGH_POINTS;
         for index in 0..pixels {
@@ -297,7 +297,7 @@ mod tests {
         all.cameras = vec![(1000, Vec3::X), (pixels as u32, Vec3::Y)];
         (0..3).for_each(|index| all.push([index as f32, 1.0, 0.0], 2.0, 7, 2));
         all.thin();
-        let rough = all.rough();
+        let rough = all.subsampled();
         assert_eq!(rough.len(), ROUGH_POINTS + 3);
         assert_eq!(rough.weight.iter().sum::<f32>(), all.weight.iter().sum::<f32>());
         assert_eq!(rough.cameras, [(250, Vec3::X), (ROUGH_POINTS as u32, Vec3::Y)]);
@@ -306,7 +306,7 @@ mod tests {
         // Those of a coarse image are all needed.
         all.cameras = vec![(2 * ROUGH_POINTS as u32 - 1, Vec3::X)];
         all.thin();
-        assert_eq!(all.rough().len(), all.len());
+        assert_eq!(all.subsampled().len(), all.len());
     }
 
     #[test]

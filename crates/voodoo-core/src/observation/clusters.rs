@@ -1,4 +1,4 @@
-//! Neighbouring candidates together: what is true of all of them is then asked once.
+//! Neighboring candidates together: what is true of all of them is then asked once.
 
 use crate::math::{LANES, Points, widest};
 
@@ -10,10 +10,10 @@ const CELLS: usize = 16;
 const LAST: u32 = CELLS as u32 - 1;
 /// Single precision has no fractions from here on, and the bits after the leading one are zero.
 const WHOLE: f32 = (1 << 23) as f32;
-/// A cell is no smaller than this, metres: about as large as a cluster of a depth image's points.
+/// A cell is no smaller than this, meters: about as large as a cluster of a depth image's points.
 const SMALLEST_CELL: f32 = 0.08;
 
-/// Points in an order in which neighbours stand together, cut into clusters.
+/// Points in an order in which neighbors stand together, cut into clusters.
 #[derive(Debug, Default)]
 pub(crate) struct Clusters {
     /// Which point stands where, and the points in this order, the last one repeated to whole clusters.
@@ -29,7 +29,7 @@ pub(crate) struct Clusters {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
     /// Its middle.
-    pub centre: [f32; 3],
+    pub center: [f32; 3],
     /// Half its size.
     pub half: [f32; 3],
 }
@@ -94,7 +94,7 @@ impl Clusters {
     /// The cell of every point: layer by layer, and in each to and fro, so that one cell lies beside the next.
     #[inline(always)]
     fn find_cells(&mut self, points: &Points) {
-        let (x, y, z) = (Axis::of(&points.x), Axis::of(&points.y), Axis::of(&points.z));
+        let (x, y, z) = (CellAxis::new(&points.x), CellAxis::new(&points.y), CellAxis::new(&points.z));
         self.cells.clear();
         self.cells.resize(points.len(), 0);
         let back = |turn: u32| (turn & 1) * LAST;
@@ -112,13 +112,13 @@ impl Clusters {
     fn find_bounds(&mut self) {
         let Points { x, y, z } = &self.points;
         for start in (0..x.len()).step_by(CLUSTER) {
-            let (mut centre, mut half) = ([0.0; 3], [0.0; 3]);
+            let (mut center, mut half) = ([0.0; 3], [0.0; 3]);
             for (axis, values) in [x, y, z].into_iter().enumerate() {
                 let [low, high] = range(&values[start..start + CLUSTER]);
-                centre[axis] = 0.5 * (low + high);
+                center[axis] = 0.5 * (low + high);
                 half[axis] = 0.5 * (high - low);
             }
-            self.bounds.push(Bounds { centre, half });
+            self.bounds.push(Bounds { center, half });
         }
     }
 
@@ -138,14 +138,14 @@ impl Clusters {
 }
 
 /// The cells along an axis.
-struct Axis {
+struct CellAxis {
     low: f32,
     scale: f32,
 }
 
-impl Axis {
+impl CellAxis {
     #[inline(always)]
-    fn of(values: &[f32]) -> Self {
+    fn new(values: &[f32]) -> Self {
         let [low, high] = range(values);
         Self { low, scale: 1.0 / ((high - low) / CELLS as f32).max(SMALLEST_CELL) }
     }
@@ -194,22 +194,22 @@ mod tests {
                 points.push([part(3), 0.5 * part(71), 2.0 * part(401)]);
             }
             clusters.arrange(&points);
-            let mut seen = vec![0; count];
+            let mut counts = vec![0; count];
             let mut size = 0.0;
             for cluster in clusters.iter() {
-                let Bounds { centre, half } = *cluster.bounds;
+                let Bounds { center, half } = *cluster.bounds;
                 size += half.iter().sum::<f32>() / half.len() as f32;
                 for (offset, which) in cluster.which.iter().enumerate() {
                     let index = *which as usize;
-                    seen[index] += 1;
+                    counts[index] += 1;
                     let place = [cluster.x[offset], cluster.y[offset], cluster.z[offset]];
                     assert_eq!(place, [points.x[index], points.y[index], points.z[index]]);
                     for axis in 0..3 {
-                        assert!((place[axis] - centre[axis]).abs() <= half[axis] + 1e-6);
+                        assert!((place[axis] - center[axis]).abs() <= half[axis] + 1e-6);
                     }
                 }
             }
-            assert!(seen.iter().all(|times| *times == 1), "{count}: {seen:?}");
+            assert!(counts.iter().all(|times| *times == 1), "{count}: {counts:?}");
             assert_eq!(clusters.iter().len(), count.div_ceil(CLUSTER));
             // All points lie in a box of 1 m x 0.5 m x 2 m.
             assert!(count < 1000 || size / (clusters.iter().len() as f32) < 0.25, "{size}");

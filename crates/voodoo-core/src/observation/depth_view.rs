@@ -1,6 +1,6 @@
 //! What the pixels of a depth image say about a place in space.
 
-use crate::camera::NEAREST_SEEN;
+use crate::camera::NEAREST_RETURN;
 use crate::math::{Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
@@ -32,7 +32,7 @@ pub(crate) enum Pixel {
 }
 
 /// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
-const SEGMENTED_SHARE: f64 = 0.5;
+const SEGMENTED_FRACTION: f64 = 0.5;
 /// Every so manyth pixel is asked for that; a prime, so that all columns take part.
 const SEGMENTED_STEP: usize = 97;
 
@@ -55,7 +55,7 @@ impl<'a> DepthViews<'a> {
         let images = self.frame.images.iter().zip(self.segmented);
         images.map(move |(image, segmented)| DepthView {
             image,
-            background: self.backgrounds.of(image),
+            background: self.backgrounds.of_image(image),
             working_from_camera: shifted(&image.world_from_sensor, self.origin),
             segmented: *segmented,
         })
@@ -67,17 +67,17 @@ impl DepthView<'_> {
     #[inline(always)]
     pub(crate) fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
-        if point.z < NEAREST_SEEN {
+        if point.z < NEAREST_RETURN {
             return Pixel::Unknown;
         }
         let Some(index) = image.camera.index_of(point) else { return Pixel::Unknown };
-        let z = f64::from(image.pixels.get(index)) * image.metres_per_unit;
+        let z = f64::from(image.pixels.get(index)) * image.meters_per_unit;
         if z.is_nan() || z <= 0.0 {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
         }
         let scene = self.background.and_then(|background| background.depth().get(index));
         match scene {
-            Some(depth) if Background::holds(*depth, z as f32) => {
+            Some(depth) if Background::contains(*depth, z as f32) => {
                 if *depth == OTHERS {
                     Pixel::Other(z)
                 } else {
@@ -98,7 +98,7 @@ pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
             all += 1;
             none += u32::from(image.pixels.get(index) <= 0.0);
         }
-        f64::from(none) > SEGMENTED_SHARE * f64::from(all)
+        f64::from(none) > SEGMENTED_FRACTION * f64::from(all)
     }));
 }
 
@@ -108,13 +108,13 @@ mod tests {
     use crate::camera::{Camera, Lens};
     use crate::testing::image;
 
-    /// Every pixel of this image has a depth of its own, metres.
+    /// Every pixel of this image has a depth of its own, meters.
     fn distinct(count: usize) -> Vec<f32> {
         (0..count).map(|index| 1.0 + 0.01 * index as f32).collect()
     }
 
     #[test]
-    fn a_place_is_seen_in_the_pixel_of_its_ray_through_every_lens() {
+    fn a_place_is_visible_in_the_pixel_of_its_ray_through_every_lens() {
         let pixels = distinct(24 * 16);
         for lens in [
             Lens::PlumbBob([-0.3, 0.1, 0.002, -0.001, 0.0]),
@@ -138,12 +138,12 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_seen_in_the_pixel_whose_ray_passes_nearest() {
+    fn a_place_is_visible_in_the_pixel_whose_ray_passes_nearest() {
         let pixels = distinct(24 * 16);
         let image = image(&pixels, 24, 20.0);
         let view = DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
         for (index, depth) in pixels.iter().enumerate() {
-            // Anywhere on the pixel, and at any depth: its edges are half a pixel from its centre.
+            // Anywhere on the pixel, and at any depth: its edges are half a pixel from its center.
             for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
                 let aside = Vec3::new(u, v, 0.0) * (f64::from(z) / 20.0);
                 let found = view.at(image.back_project(index, z) + aside);
@@ -175,11 +175,11 @@ mod tests {
     }
 
     #[test]
-    fn what_was_learnt_as_scene_is_background() {
+    fn what_was_learned_as_scene_is_background() {
         let scene = vec![3.0_f32; 12 * 10];
         let mut backgrounds = Backgrounds::default();
-        let learnt = image(&scene, 12, 10.0);
-        backgrounds.start(&Frame { images: &[learnt], ..Frame::empty(0.0) }, |_, _| {});
+        let learned = image(&scene, 12, 10.0);
+        backgrounds.start(&Frame { images: &[learned], ..Frame::empty(0.0) }, |_, _| {});
         let mut pixels = scene.clone();
         pixels[55] = 2.0;
         let images = [image(&pixels, 12, 10.0)];

@@ -6,7 +6,7 @@ use crate::error::TrackError;
 use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
-/// Three-dimensional points as they lie in memory, in metres.
+/// Three-dimensional points as they lie in memory, in meters.
 #[derive(Clone, Copy, Debug)]
 pub enum PointSlice<'a> {
     /// Single precision.
@@ -67,9 +67,9 @@ pub struct Cloud<'a> {
 /// The pixels of a depth image: distance along the optical axis, 0 (or NaN) = no return, row by row.
 #[derive(Clone, Copy, Debug)]
 pub enum DepthPixels<'a> {
-    /// In units of `metres_per_unit`.
+    /// In units of `meters_per_unit`.
     U16(&'a [u16]),
-    /// In units of `metres_per_unit`.
+    /// In units of `meters_per_unit`.
     F32(&'a [f32]),
 }
 
@@ -97,15 +97,15 @@ impl DepthPixels<'_> {
     }
 }
 
-/// An organised depth image; its pixels are free points.
+/// An organized depth image; its pixels are free points.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthImage<'a> {
     /// All pixels of the camera.
     pub pixels: DepthPixels<'a>,
     /// Its calibration; its lens may distort.
     pub camera: &'a Camera,
-    /// Length of one unit of the pixels, metres.
-    pub metres_per_unit: f64,
+    /// Length of one unit of the pixels, meters.
+    pub meters_per_unit: f64,
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
     /// Weight of each point.
@@ -115,18 +115,18 @@ pub struct DepthImage<'a> {
 }
 
 impl DepthImage<'_> {
-    /// The point of a pixel in the camera's frame for a depth of `z` metres.
+    /// The point of a pixel in the camera's frame for a depth of `z` meters.
     pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
         let [x, y] = self.camera.pixel_ray(index % self.camera.width(), index / self.camera.width());
         f64::from(z) * Vec3::new(x, y, 1.0)
     }
 
-    /// The depth that was measured where a place of the world is seen, 0 for none, and that of the place, metres; none outside the
+    /// The depth that was measured where a place of the world is seen, 0 for none, and that of the place, meters; none outside the
     /// image.
     pub fn measured(&self, place: Vec3) -> Option<[f64; 2]> {
         let point = self.world_from_sensor.inverse_transform_point(place);
         let index = self.camera.index_of(point)?;
-        Some([f64::from(self.pixels.get(index)) * self.metres_per_unit, point.z])
+        Some([f64::from(self.pixels.get(index)) * self.meters_per_unit, point.z])
     }
 }
 
@@ -139,7 +139,7 @@ pub struct PositionRelation {
     pub position: Vec3,
     /// Its weight.
     pub weight: f64,
-    /// It may always be this far off, metres: within, it says nothing; beyond, it pulls with the rest of the distance.
+    /// It may always be this far off, meters: within, it says nothing; beyond, it pulls with the rest of the distance.
     pub bias: f64,
     /// Number of the source, for the report.
     pub source: u16,
@@ -156,7 +156,7 @@ pub struct RayRelation {
     pub direction: Vec3,
     /// Its weight.
     pub weight: f64,
-    /// It may always be this far off, metres: within, it says nothing; beyond, it pulls with the rest of the distance.
+    /// It may always be this far off, meters: within, it says nothing; beyond, it pulls with the rest of the distance.
     pub bias: f64,
     /// Number of the source, for the report.
     pub source: u16,
@@ -167,17 +167,17 @@ pub struct RayRelation {
 pub struct Ground {
     /// Unit vector upwards, world frame.
     pub normal: Vec3,
-    /// Height of the floor along it, metres.
+    /// Height of the floor along it, meters.
     pub offset: f64,
 }
 
 impl Ground {
     /// The same floor where `origin`, a place in the world, is the origin.
-    pub fn about(self, origin: Vec3) -> Self {
+    pub fn relative_to(self, origin: Vec3) -> Self {
         Self { offset: self.offset - self.normal.dot(origin), ..self }
     }
 
-    /// Height of a point above the floor, metres.
+    /// Height of a point above the floor, meters.
     pub fn height(&self, point: Vec3) -> f64 {
         self.normal.dot(point) - self.offset
     }
@@ -195,7 +195,7 @@ pub struct Frame<'a> {
     pub clouds: &'a [Cloud<'a>],
     /// Depth images.
     pub images: &'a [DepthImage<'a>],
-    /// Colour pictures.
+    /// Color pictures.
     pub colors: &'a [ColorImage<'a>],
     /// Sites with positions.
     pub positions: &'a [PositionRelation],
@@ -283,7 +283,7 @@ impl<'a> Frame<'a> {
             };
             if let Some(row) = bad {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
-                return Err(TrackError::measurement(what("points"), "finite metres, 1e9 at most", found));
+                return Err(TrackError::measurement(what("points"), "finite meters, 1e9 at most", found));
             }
         }
         for (index, image) in self.images.iter().enumerate() {
@@ -344,8 +344,8 @@ fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
         let found = format!("{} for {}x{}", image.pixels.len(), image.camera.width(), image.camera.height());
         return wrong("image", "all pixels of the camera", found);
     }
-    if !(image.metres_per_unit > 0.0 && image.metres_per_unit.is_finite()) {
-        return wrong("metres_per_unit", "a finite length above zero", image.metres_per_unit.to_string());
+    if !(image.meters_per_unit > 0.0 && image.meters_per_unit.is_finite()) {
+        return wrong("meters_per_unit", "a finite length above zero", image.meters_per_unit.to_string());
     }
     check_weight(|| format!("depth[{index}].weight"), image.weight)?;
     check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
@@ -379,7 +379,7 @@ fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), Track
     if is_place(vector) {
         Ok(())
     } else {
-        Err(TrackError::measurement(what(), "finite metres, 1e9 at most", format!("{:?}", vector.to_array())))
+        Err(TrackError::measurement(what(), "finite meters, 1e9 at most", format!("{:?}", vector.to_array())))
     }
 }
 

@@ -4,7 +4,7 @@ use super::background::{Backgrounds, OTHERS};
 use super::candidates::{Candidates, body_box};
 use super::depth_view::{DepthViews, find_segmented};
 use super::frame::{Frame, Ground};
-use super::share::Share;
+use super::ownership::OwnershipMask;
 use crate::body::Body;
 use crate::config::Config;
 use crate::math::{Aabb, Pose, Vec3};
@@ -31,7 +31,7 @@ impl<'a> Observation<'a> {
 
     /// The floor in the working frame, where it is known.
     pub(crate) fn floor(&self) -> Option<Ground> {
-        self.frame().ground.map(|ground| ground.about(self.origin()))
+        self.frame().ground.map(|ground| ground.relative_to(self.origin()))
     }
 
     /// The same frame with other candidates.
@@ -66,7 +66,7 @@ pub(crate) struct Own<'a> {
     pub pixels: &'a [usize],
 }
 
-/// Keeps what is learnt of the scene, and the candidates of the current frame.
+/// Keeps what is learned of the scene, and the candidates of the current frame.
 #[derive(Debug, Default)]
 pub(crate) struct Observer {
     backgrounds: Backgrounds,
@@ -81,8 +81,8 @@ impl Observer {
         self.backgrounds.clear();
     }
 
-    /// Notes which images of a frame are segmented; nothing is learnt.
-    pub(crate) fn face(&mut self, frame: &Frame) {
+    /// Notes which images of a frame are segmented; nothing is learned.
+    pub(crate) fn find_segmented(&mut self, frame: &Frame) {
         find_segmented(frame, &mut self.segmented);
     }
 
@@ -97,26 +97,32 @@ impl Observer {
     }
 
     /// The same for one of several persons: the scene is known, and what others explain is theirs.
-    pub(crate) fn observe_share(&mut self, frame: &Frame, expected: Expectation, share: Share, config: &Config) {
+    pub(crate) fn observe_owned(
+        &mut self,
+        frame: &Frame,
+        expected: Expectation,
+        ownership: OwnershipMask,
+        config: &Config,
+    ) {
         find_segmented(frame, &mut self.segmented);
         let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
-        self.backgrounds.adopt(frame, share.scene, |image, depth| {
-            for (depth, owner) in depth.iter_mut().zip(share.owners(image)) {
-                *depth = if share.is_others(*owner) { OTHERS } else { *depth };
+        self.backgrounds.adopt(frame, ownership.scene, |image, depth| {
+            for (depth, owner) in depth.iter_mut().zip(ownership.owners(image)) {
+                *depth = if ownership.is_others(*owner) { OTHERS } else { *depth };
             }
         });
-        self.backgrounds.share_clouds(share.cloud_owners, |owner| share.is_others(owner));
+        self.backgrounds.mark_others_points(ownership.cloud_owners, |owner| ownership.is_others(owner));
         self.gather(frame, expected.origin, &bounds, config);
     }
 
-    /// Pixels that were taken for the scene may show the body; what was learnt there, for `restore`.
+    /// Pixels that were taken for the scene may show the body; what was learned there, for `restore`.
     pub(crate) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
         self.backgrounds.release(frame, own)
     }
 
     /// They do not.
-    pub(crate) fn restore(&mut self, frame: &Frame, own: Own, learnt: &[f32]) {
-        self.backgrounds.restore(frame, own, learnt);
+    pub(crate) fn restore(&mut self, frame: &Frame, own: Own, learned: &[f32]) {
+        self.backgrounds.restore(frame, own, learned);
     }
 
     /// The candidates in another box.
@@ -125,7 +131,7 @@ impl Observer {
     }
 
     /// What was observed of `frame`.
-    pub(crate) fn seen<'a>(&'a self, frame: &'a Frame<'a>, origin: Vec3) -> Observation<'a> {
+    pub(crate) fn observation<'a>(&'a self, frame: &'a Frame<'a>, origin: Vec3) -> Observation<'a> {
         let views = DepthViews { frame, backgrounds: &self.backgrounds, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
@@ -158,7 +164,7 @@ mod tests {
     }
 
     /// Shows a frame; how many candidates lie on the lamp, and how many do not.
-    fn show(
+    fn feed(
         observer: &mut Observer,
         pixels: &[u16],
         model: &Model,
@@ -188,22 +194,22 @@ mod tests {
         let (lamp, alone) = (with_lamp(&model, &poses), before_wall(&model.body, &poses));
         let mut observer = Observer::default();
         for known in [FIRST, LATER, LATER] {
-            let [on_lamp, others] = show(&mut observer, &lamp, &model, &poses, known);
+            let [on_lamp, others] = feed(&mut observer, &lamp, &model, &poses, known);
             assert_eq!(on_lamp, 0);
             assert!(others > 1000, "{others} points of the body");
         }
         // A lamp that comes later may be a hand.
         let mut observer = Observer::default();
-        show(&mut observer, &alone, &model, &poses, FIRST);
-        assert!(show(&mut observer, &lamp, &model, &poses, LATER)[0] > 20);
+        feed(&mut observer, &alone, &model, &poses, FIRST);
+        assert!(feed(&mut observer, &lamp, &model, &poses, LATER)[0] > 20);
     }
 
     #[test]
     fn a_pose_set_a_little_off_makes_no_background_of_the_body() {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
-        let all = show(&mut Observer::default(), &pixels, &model, &poses, FIRST)[1];
-        let left = |off: f64| show(&mut Observer::default(), &pixels, &model, &moved(&poses, off * Vec3::X), FIRST)[1];
+        let all = feed(&mut Observer::default(), &pixels, &model, &poses, FIRST)[1];
+        let left = |off: f64| feed(&mut Observer::default(), &pixels, &model, &moved(&poses, off * Vec3::X), FIRST)[1];
         assert_eq!(left(0.10), all);
         assert!(2 * left(0.40) < all, "who is set elsewhere is taken for the scene");
     }
@@ -213,11 +219,11 @@ mod tests {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
         let (mut tracked, mut searched) = (Observer::default(), Observer::default());
-        let all = show(&mut tracked, &pixels, &model, &poses, FIRST);
-        show(&mut searched, &pixels, &model, &poses, FIRST);
+        let all = feed(&mut tracked, &pixels, &model, &poses, FIRST);
+        feed(&mut searched, &pixels, &model, &poses, FIRST);
         for frame in 0..20 {
-            assert_eq!(show(&mut tracked, &pixels, &model, &poses, LATER), all, "tracked, frame {frame}");
-            assert_eq!(show(&mut searched, &pixels, &model, &poses, (false, Some(frame))), all, "searched {frame}");
+            assert_eq!(feed(&mut tracked, &pixels, &model, &poses, LATER), all, "tracked, frame {frame}");
+            assert_eq!(feed(&mut searched, &pixels, &model, &poses, (false, Some(frame))), all, "searched {frame}");
         }
     }
 
@@ -228,10 +234,10 @@ mod tests {
         let mut observer = Observer::default();
         let nothing = Frame::empty(1.0);
         assert!(!observer.silent(&nothing), "nobody knows of a camera");
-        show(&mut observer, &pixels, &model, &poses, FIRST);
+        feed(&mut observer, &pixels, &model, &poses, FIRST);
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
         assert!(!observer.silent(&nothing) && observer.candidates().is_empty());
-        assert!(show(&mut observer, &pixels, &model, &poses, LATER)[0] > 20, "the lamp was forgotten");
+        assert!(feed(&mut observer, &pixels, &model, &poses, LATER)[0] > 20, "the lamp was forgotten");
     }
 }

@@ -1,4 +1,4 @@
-//! Colour and grey pictures.
+//! Color and gray pictures.
 
 use crate::camera::Camera;
 use crate::error::TrackError;
@@ -13,7 +13,7 @@ pub enum ColorPixels<'a> {
     /// Three channels in any order that is always the same.
     Color(&'a [[u8; 3]]),
     /// Brightness alone.
-    Grey(&'a [u8]),
+    Gray(&'a [u8]),
 }
 
 impl ColorPixels<'_> {
@@ -21,7 +21,7 @@ impl ColorPixels<'_> {
     pub fn len(&self) -> usize {
         match self {
             Self::Color(pixels) => pixels.len(),
-            Self::Grey(pixels) => pixels.len(),
+            Self::Gray(pixels) => pixels.len(),
         }
     }
 
@@ -30,17 +30,17 @@ impl ColorPixels<'_> {
         self.len() == 0
     }
 
-    /// The colour of a pixel.
+    /// The color of a pixel.
     #[inline(always)]
     pub fn get(&self, index: usize) -> [u8; 3] {
         match self {
             Self::Color(pixels) => pixels[index],
-            Self::Grey(pixels) => [pixels[index]; 3],
+            Self::Gray(pixels) => [pixels[index]; 3],
         }
     }
 }
 
-/// A colour or grey picture: its regions tell where limbs end (R07 section 3), and clothes tell persons apart.
+/// A color or gray picture: its regions tell where limbs end (R07 section 3), and clothes tell persons apart.
 ///
 /// The contours of limbs are straight lines and ellipses in the picture of a pinhole alone: whoever fits regions takes the lens's
 /// distortion out of the picture before, and gives the pinhole camera that is left. Clothes may be seen through any lens.

@@ -31,11 +31,11 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// About one pixel in `share`, as evenly as whole numbers allow.
-    pub(super) fn new(share: f64) -> Self {
+    /// About one pixel in `fraction`, as evenly as whole numbers allow.
+    pub(super) fn new(fraction: f64) -> Self {
         let within = |apart: f64| if apart >= 1.0 { apart.min(MOST_APART) } else { 1.0 };
-        let rows = within(share.sqrt().floor());
-        let columns = within((share / rows).round());
+        let rows = within(fraction.sqrt().floor());
+        let columns = within((fraction / rows).round());
         Self { rows: rows as usize, columns: columns as usize }
     }
 
@@ -48,7 +48,7 @@ impl Grid {
 /// Pixels of a row that are looked at together: a whole number of SIMD lanes.
 pub(super) const STRETCH: usize = 32;
 
-/// Visits every `stride`th value with its place in `to`; neighbours fill whole registers.
+/// Visits every `stride`th value with its place in `to`; neighbors fill whole registers.
 #[inline(always)]
 fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
     if stride == 1 {
@@ -58,7 +58,7 @@ fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, 
     }
 }
 
-/// Depth, `x / z` and `y / z` of neighbouring pixels; the depth is 0 beyond the last of them.
+/// Depth, `x / z` and `y / z` of neighboring pixels; the depth is 0 beyond the last of them.
 pub(super) struct Stretch {
     x: [f32; STRETCH],
     y: [f32; STRETCH],
@@ -77,7 +77,7 @@ impl Stretch {
     ) -> Self {
         let count = STRETCH.min((end - start).div_ceil(stride));
         let first = row * image.camera.width() + start;
-        let scale = image.metres_per_unit as f32;
+        let scale = image.meters_per_unit as f32;
         let mut z = [0.0; STRETCH];
         match image.pixels {
             DepthPixels::U16(pixels) => {
@@ -89,7 +89,7 @@ impl Stretch {
         }
         if !background.is_empty() {
             every(&background[first..], stride, &mut z[..count], |z, depth| {
-                *z = if Background::holds(*depth, *z) { 0.0 } else { *z };
+                *z = if Background::contains(*depth, *z) { 0.0 } else { *z };
             });
         }
         let [x, y] = image.camera.row_rays(row, start, stride, count);
@@ -137,15 +137,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grid_keeps_the_share_asked_for_and_spreads_it() {
+    fn a_grid_keeps_the_fraction_asked_for_and_spreads_it() {
         for tenths in 1..400 {
-            let share = f64::from(tenths) / 10.0;
-            let grid = Grid::new(share);
-            let kept = (grid.rows * grid.columns) as f64 / share.max(1.0);
-            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {share}");
+            let fraction = f64::from(tenths) / 10.0;
+            let grid = Grid::new(fraction);
+            let kept = (grid.rows * grid.columns) as f64 / fraction.max(1.0);
+            assert!(kept > 0.66 && kept < 1.5, "{grid:?} for one in {fraction}");
             assert!((0..50).all(|row| grid.offset(row) < grid.columns));
         }
-        let columns = |share: f64| [0, 1, 2, 3].map(|row| Grid::new(share).offset(row));
+        let columns = |fraction: f64| [0, 1, 2, 3].map(|row| Grid::new(fraction).offset(row));
         assert_eq!((Grid::new(0.3), columns(0.3)), (Grid { rows: 1, columns: 1 }, [0; 4]));
         assert_eq!((Grid::new(2.0), columns(2.0)), (Grid { rows: 1, columns: 2 }, [0, 1, 0, 1]));
         assert_eq!((Grid::new(4.0), columns(4.0)), (Grid { rows: 2, columns: 2 }, [0; 4]));

@@ -8,18 +8,18 @@ use crate::observation::frame::{DepthPixels, Frame};
 
 /// Samples taken of one source, about: a search runs while the body is lost, and must keep up with the frames.
 const SAMPLES_PER_SOURCE: usize = 5000;
-/// Edge of a cell of space, metres: samples in cells that touch hang together.
+/// Edge of a cell of space, meters: samples in cells that touch hang together.
 const CELL: f64 = 0.12;
 /// A cell with fewer surface patches than this holds stray returns: a surface fills some hundred.
 const LEAST_PATCHES: f32 = 15.0;
 /// Half of the cells along an axis that a key holds.
 const HALF_KEY: f64 = (1_u64 << 20) as f64;
 
-/// What hangs together; working frame, metres.
+/// What hangs together; working frame, meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Segment {
     /// Mean of the samples.
-    pub centre: Vec3,
+    pub center: Vec3,
     /// Corners of its box.
     pub low: Vec3,
     /// The other corner.
@@ -78,7 +78,7 @@ impl Segments {
             self.samples.retain(|sample| !inside(sample));
         }
         if let Some(ground) = frame.ground {
-            let floor = ground.about(origin);
+            let floor = ground.relative_to(origin);
             let height = |point: [f32; 3]| floor.height(Vec3::from_array(point.map(f64::from)));
             self.samples.retain(|sample| height(sample.point) >= config.ground_clearance);
         }
@@ -104,7 +104,7 @@ impl Segments {
 
     fn sample_images(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds) {
         for image in frame.images {
-            let background = backgrounds.of(image).map_or(&[][..], Background::depth);
+            let background = backgrounds.of_image(image).map_or(&[][..], Background::depth);
             let step = ((image.pixels.len() as f64 / SAMPLES_PER_SOURCE as f64).sqrt().ceil() as usize).max(1);
             let [fx, fy] = image.camera.focal();
             let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
@@ -113,9 +113,9 @@ impl Segments {
                     let z = match image.pixels {
                         DepthPixels::U16(pixels) => f32::from(pixels[pixel]),
                         DepthPixels::F32(pixels) => pixels[pixel],
-                    } * image.metres_per_unit as f32;
-                    let seen = z > 0.0 && z.is_finite();
-                    if !seen || background.get(pixel).is_some_and(|depth| Background::holds(*depth, z)) {
+                    } * image.meters_per_unit as f32;
+                    let returned = z > 0.0 && z.is_finite();
+                    if !returned || background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
                         continue;
                     }
                     let point = image.world_from_sensor * image.back_project(pixel, z) - origin;
@@ -146,10 +146,10 @@ impl Segments {
     fn join_cells(&mut self) {
         for index in 0..self.cells.len() {
             let key = self.cells[index].key;
-            for neighbour in 14..27_i64 {
-                let offset = ((neighbour / 9 - 1) << 42) + ((neighbour / 3 % 3 - 1) << 21) + (neighbour % 3 - 1);
-                let wanted = key.wrapping_add_signed(offset);
-                if let Ok(other) = self.cells.binary_search_by_key(&wanted, |cell| cell.key) {
+            for neighbor in 14..27_i64 {
+                let offset = ((neighbor / 9 - 1) << 42) + ((neighbor / 3 % 3 - 1) << 21) + (neighbor % 3 - 1);
+                let key_beside = key.wrapping_add_signed(offset);
+                if let Ok(other) = self.cells.binary_search_by_key(&key_beside, |cell| cell.key) {
                     let (a, b) = (self.first(index as u32), self.first(other as u32));
                     self.cells[a.max(b) as usize].parent = a.min(b);
                 }
@@ -179,24 +179,24 @@ impl Segments {
             if first == index {
                 self.of_cell[index] = self.found.len() as u32;
                 let (low, high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-                self.found.push(Segment { centre: Vec3::ZERO, low, high, patches: 0.0 });
+                self.found.push(Segment { center: Vec3::ZERO, low, high, patches: 0.0 });
             }
             let segment = &mut self.found[self.of_cell[first] as usize];
             let (start, end) = self.cells[index].samples;
             for sample in &self.samples[start as usize..end as usize] {
                 let weight = f64::from(sample.weight);
                 let point = Vec3::from_array(sample.point.map(f64::from));
-                segment.centre += weight * point;
+                segment.center += weight * point;
                 segment.low = segment.low.min(point);
                 segment.high = segment.high.max(point);
                 segment.patches += weight;
             }
         }
         for segment in &mut self.found {
-            segment.centre /= segment.patches;
+            segment.center /= segment.patches;
         }
-        // No two segments share a centre: the order is the same on every run.
-        let place = |segment: &Segment| segment.centre.to_array();
+        // No two segments share a center: the order is the same on every run.
+        let place = |segment: &Segment| segment.center.to_array();
         self.found.sort_unstable_by(|a, b| b.patches.total_cmp(&a.patches).then_with(|| order(&place(a), &place(b))));
     }
 }
@@ -218,7 +218,7 @@ mod tests {
             (0..count).map(move |i| [at[0] + 0.01 * (i % 30) as f64, at[1] + 0.01 * (i / 30) as f64, at[2]])
         };
         let mut points: Vec<[f64; 3]> = patch([1.0, 0.0, 0.0], 600).chain(patch([3.0, 0.0, 0.0], 900)).collect();
-        // Single returns, half a metre apart, make no bridge between the two.
+        // Single returns, half a meter apart, make no bridge between the two.
         points.extend((0..40).map(|i| [0.5 * f64::from(i), 0.5, 1.0]));
         let mut found = Vec::new();
         for _ in 0..2 {
@@ -239,6 +239,6 @@ mod tests {
         assert_eq!(found[0], found[1]);
         assert_eq!(found[0].len(), 2, "{found:?}");
         assert!((found[0][0].patches - 900.0).abs() < 40.0 && (found[0][1].patches - 600.0).abs() < 40.0, "{found:?}");
-        assert!((found[0][0].centre - Vec3::new(3.145, 0.145, 0.0)).length() < 0.02, "{found:?}");
+        assert!((found[0][0].center - Vec3::new(3.145, 0.145, 0.0)).length() < 0.02, "{found:?}");
     }
 }

@@ -7,11 +7,11 @@ use crate::math::Vec3;
 /// Accepts measurements near predicted sites, and opens slowly while nothing is accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteGate {
-    /// Metres.
+    /// Meters.
     pub radius: f64,
-    /// Of the radius while nothing is accepted, metres a second.
+    /// Of the radius while nothing is accepted, meters a second.
     pub growth: f64,
-    /// It grows up to this, metres.
+    /// It grows up to this, meters.
     pub widest: f64,
     /// Of each source and site when something was accepted last, or first looked for, seconds.
     last: BTreeMap<String, BTreeMap<String, f64>>,
@@ -23,7 +23,7 @@ impl SiteGate {
         Self { radius, growth, widest, last: BTreeMap::new() }
     }
 
-    /// Radius of a site's gate at a time, metres.
+    /// Radius of a site's gate at a time, meters.
     pub fn limit(&mut self, site: &str, source: &str, stamp: f64) -> f64 {
         let known = self.last.get(source).and_then(|sites| sites.get(site)).copied();
         let waited = match known {
@@ -36,7 +36,7 @@ impl SiteGate {
         (self.radius + self.growth * waited).min(self.widest)
     }
 
-    /// Whether a measurement so far from the predicted site, metres, is near enough.
+    /// Whether a measurement so far from the predicted site, meters, is near enough.
     pub fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
         let near = distance <= self.limit(site, source, stamp);
         if near {
@@ -60,21 +60,21 @@ impl SiteGate {
 pub struct SiteRay {
     /// Its name.
     pub site: String,
-    /// Focal point in the world, metres.
+    /// Focal point in the world, meters.
     pub origin: Vec3,
     /// Unit vector in the world.
     pub direction: Vec3,
-    /// Standard deviation across the ray at the site, metres.
+    /// Standard deviation across the ray at the site, meters.
     pub sigma: f64,
     /// Name of what saw it.
     pub source: String,
     /// Factor of its weight, in [0, 1].
     pub trust: f64,
-    /// It may always be this far off, metres.
+    /// It may always be this far off, meters.
     pub bias: f64,
-    /// Where on the ray the site is, if a depth camera saw it, metres.
+    /// Where on the ray the site is, if a depth camera saw it, meters.
     pub place: Option<Vec3>,
-    /// Standard deviation of that along the ray, metres.
+    /// Standard deviation of that along the ray, meters.
     pub place_sigma: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The colour of somebody's clothes, above and below the waist.
+//! The color of somebody's clothes, above and below the waist.
 
 use crate::body::{Body, LimbRole};
 use crate::math::{Pose, Vec3};
@@ -6,41 +6,41 @@ use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
 
-/// Where across a limb colours are taken, in shares of its radius from the middle: the rim may show what is behind.
+/// Where across a limb colors are taken, in shares of its radius from the middle: the rim may show what is behind.
 const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
-/// A depth pixel shows the limb when it lies within this of where the limb's surface is, metres: clothes are thick.
-const SHOWS: f64 = 0.08;
-/// Bins of brightness and of the two colour differences.
+/// A depth pixel shows the limb when it lies within this of where the limb's surface is, meters: clothes are thick.
+const SURFACE_TOLERANCE: f64 = 0.08;
+/// Bins of brightness and of the two color differences.
 const BINS: [usize; 3] = [5, 9, 9];
-/// Range of the colour differences that the bins cover: clothes are seldom more colourful.
+/// Range of the color differences that the bins cover: clothes are seldom more colorful.
 const COLORFUL: f32 = 80.0;
 /// A look at fewer places than this tells nothing.
 const FEWEST_PLACES: usize = 15;
 /// Share of a new look in what is remembered, at least.
-const NEW_LOOK: f32 = 0.1;
+const NEW_WEIGHT: f32 = 0.1;
 
-/// How often each colour was seen; sums to one.
+/// How often each color was seen; sums to one.
 #[derive(Clone, Debug, Default)]
-struct Histogram {
-    shares: Vec<f32>,
-    looks: f32,
+struct ClothesHistogram {
+    frequencies: Vec<f32>,
+    updates: f32,
 }
 
 /// What somebody wears, as far as it was seen.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clothes {
-    worn: [Histogram; 2],
+    worn: [ClothesHistogram; 2],
     counts: Vec<f32>,
 }
 
 impl Clothes {
     /// Looks at a posed body, world frame; `own` says of a depth image's number and pixel whether it may be the body's.
-    pub(super) fn look(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
+    pub(super) fn observe(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
         let Self { worn, counts } = self;
         for (half, histogram) in worn.iter_mut().enumerate() {
             counts.clear();
             counts.resize(BINS.iter().product(), 0.0);
-            let mut seen = 0;
+            let mut places = 0;
             for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
                 if body.roles().limb(index).and_then(half_of) != Some(half) {
                     continue;
@@ -53,24 +53,24 @@ impl Clothes {
                             let world = image.world_from_sensor * point;
                             if let Some(color) = frame.colors.iter().find_map(|picture| color_at(picture, world)) {
                                 add(counts, color);
-                                seen += 1;
+                                places += 1;
                             }
                         }
                     }
                 }
             }
-            if seen >= FEWEST_PLACES {
-                histogram.take(counts, seen as f32);
+            if places >= FEWEST_PLACES {
+                histogram.update(counts, places as f32);
             }
         }
     }
 
     /// How unlike two persons' clothes are, from 0 to 1, the mean of what was seen of both; none when nothing was.
-    pub(super) fn unlike(&self, other: &Self) -> Option<f64> {
-        let pairs = self.worn.iter().zip(&other.worn).filter(|(a, b)| a.looks > 0.0 && b.looks > 0.0);
+    pub(super) fn distance(&self, other: &Self) -> Option<f64> {
+        let pairs = self.worn.iter().zip(&other.worn).filter(|(a, b)| a.updates > 0.0 && b.updates > 0.0);
         let (mut sum, mut count) = (0.0, 0.0);
         for (a, b) in pairs {
-            let alike: f32 = a.shares.iter().zip(&b.shares).map(|(a, b)| (a * b).sqrt()).sum();
+            let alike: f32 = a.frequencies.iter().zip(&b.frequencies).map(|(a, b)| (a * b).sqrt()).sum();
             sum += 1.0 - f64::from(alike);
             count += 1.0;
         }
@@ -87,13 +87,13 @@ fn half_of(limb: LimbRole) -> Option<usize> {
     }
 }
 
-impl Histogram {
-    fn take(&mut self, counts: &[f32], total: f32) {
-        self.shares.resize(counts.len(), 0.0);
-        self.looks += 1.0;
-        let new = NEW_LOOK.max(1.0 / self.looks);
-        for (share, count) in self.shares.iter_mut().zip(counts) {
-            *share += new * (count / total - *share);
+impl ClothesHistogram {
+    fn update(&mut self, counts: &[f32], total: f32) {
+        self.frequencies.resize(counts.len(), 0.0);
+        self.updates += 1.0;
+        let new = NEW_WEIGHT.max(1.0 / self.updates);
+        for (weight, count) in self.frequencies.iter_mut().zip(counts) {
+            *weight += new * (count / total - *weight);
         }
     }
 }
@@ -101,33 +101,33 @@ impl Histogram {
 /// The point that a depth image shows where a limb's surface is expected, camera frame.
 fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
     let pixel = image.camera.index_of(place)?;
-    let z = f64::from(image.pixels.get(pixel)) * image.metres_per_unit;
-    ((z - place.z).abs() < SHOWS && own(pixel)).then(|| place * (z / place.z))
+    let z = f64::from(image.pixels.get(pixel)) * image.meters_per_unit;
+    ((z - place.z).abs() < SURFACE_TOLERANCE && own(pixel)).then(|| place * (z / place.z))
 }
 
-/// The colour of a place of the world in a picture.
+/// The color of a place of the world in a picture.
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
     Some(picture.pixels.get(picture.camera.index_of(place)?))
 }
 
-/// Counts a colour in the bins about it, by how near it is to their middles.
+/// Counts a color in the bins about it, by how near it is to their middles.
 fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
     let [x, y, z] = [first, green, last].map(f32::from);
-    // Brightness and colour differences; which end is red does not matter as long as it is always the same.
+    // Brightness and color differences; which end is red does not matter as long as it is always the same.
     let brightness = 0.2 * x + 0.6 * y + 0.2 * z;
     let place = |value: f32, bins: usize| (value * (bins - 1) as f32).clamp(0.0, (bins - 1) as f32);
     let difference = |value: f32| (value - brightness) / (2.0 * COLORFUL) + 0.5;
     let at = [place(brightness / 255.0, BINS[0]), place(difference(x), BINS[1]), place(difference(z), BINS[2])];
     for corner in 0..8_usize {
-        let (mut index, mut share) = (0, 1.0);
+        let (mut index, mut weight) = (0, 1.0);
         for axis in 0..3 {
             let low = at[axis].floor().min((BINS[axis] - 2) as f32);
-            let part = at[axis] - low;
+            let prune_tracks = at[axis] - low;
             let high = (corner >> axis) & 1;
-            share *= if high == 1 { part } else { 1.0 - part };
+            weight *= if high == 1 { prune_tracks } else { 1.0 - prune_tracks };
             index = index * BINS[axis] + low as usize + high;
         }
-        counts[index] += share;
+        counts[index] += weight;
     }
 }

@@ -4,35 +4,35 @@
 //! number back, where size, place and time agree.
 
 mod assign;
-mod claims;
 mod clothes;
+mod options;
 mod person;
-mod scene;
-mod strangers;
-mod wanted;
+mod pixel_assignment;
+mod scene_model;
+mod tentative_tracks;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::{BoundDetector, Detect, DetectError, Detected, DetectionQuery, Surroundings, sized};
+use crate::detect::{BoundDetector, Detect, DetectError, Detected, DetectionQuery, Surroundings, fit_body};
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
-use crate::observation::share::NOBODY;
+use crate::observation::ownership::NO_OWNER;
 use crate::relocalize::SAME_PERSON;
 use crate::tracker::Tracker;
-use claims::{Claimant, Claims};
 use clothes::Clothes;
+pub use options::PeopleOptions;
 use person::Person;
+use pixel_assignment::{PixelAssignment, PredictedBody};
 use rayon::ThreadPool;
 use rayon::prelude::*;
-use scene::Scene;
-use strangers::{Stranger, Strangers};
-pub use wanted::Options;
+use scene_model::SceneModel;
+use tentative_tracks::{TentativeTrack, TentativeTracks};
 
 /// The detector looks at what nobody explains this often at most, seconds.
-const LOOK_EVERY: f64 = 0.06;
-/// Two bodies whose roots are nearer than this are one, metres.
+const DETECT_EVERY: f64 = 0.06;
+/// Two bodies whose roots are nearer than this are one, meters.
 const ONE_BODY: f64 = 0.3;
 /// Who was there for less than this is not remembered, seconds.
 const KNOWN_AFTER: f64 = 1.0;
@@ -42,21 +42,21 @@ const KNOWN_AFTER: f64 = 1.0;
 pub struct People {
     prototype: Body,
     config: Config,
-    options: Options,
+    options: PeopleOptions,
     persons: Vec<Person>,
     next_id: usize,
-    claims: Claims,
-    scene: Scene,
-    strangers: Strangers,
+    assignment: PixelAssignment,
+    scene: SceneModel,
+    tentative: TentativeTracks,
     detector: BoundDetector,
-    looked: Option<f64>,
+    last_detection: Option<f64>,
     stamp: Option<f64>,
     threads: Option<ThreadPool>,
 }
 
 impl People {
     /// Everybody who comes gets a copy of `prototype`.
-    pub fn new(prototype: Body, config: Config, options: Options) -> Result<Self, TrackError> {
+    pub fn new(prototype: Body, config: Config, options: PeopleOptions) -> Result<Self, TrackError> {
         let threads = match config.threads {
             1 => None,
             count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
@@ -69,11 +69,11 @@ impl People {
             options,
             persons: Vec::new(),
             next_id: 1,
-            claims: Claims::default(),
-            scene: Scene::default(),
-            strangers: Strangers::default(),
+            assignment: PixelAssignment::default(),
+            scene: SceneModel::default(),
+            tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
-            looked: None,
+            last_detection: None,
             stamp: None,
             threads,
         })
@@ -97,21 +97,21 @@ impl People {
     }
 
     /// Those who are there: their number and their tracker, in the order in which they came.
-    pub fn there(&self) -> impl Iterator<Item = (usize, &Tracker)> {
-        self.persons.iter().filter(|person| person.there).map(|person| (person.id, &person.tracker))
+    pub fn present(&self) -> impl Iterator<Item = (usize, &Tracker)> {
+        self.persons.iter().filter(|person| person.present).map(|person| (person.id, &person.tracker))
     }
 
-    /// Whether colour pictures would tell something in the next frame: of somebody whose clothes were not looked at for a while,
+    /// Whether color pictures would tell something in the next frame: of somebody whose clothes were not looked at for a while,
     /// or of somebody who may come back.
-    pub fn wants_colors(&self) -> bool {
+    pub fn needs_colors(&self) -> bool {
         let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
-        self.persons.iter().any(|person| !person.tracked() || person.due(stamp))
+        self.persons.iter().any(|person| !person.is_tracked() || person.are_clothes_due(stamp))
     }
 
     /// Follows these numbers and nobody else from now on; with `None` everybody.
-    pub fn only(&mut self, ids: Option<Vec<usize>>) {
+    pub fn restrict_to(&mut self, ids: Option<Vec<usize>>) {
         self.options.only = ids;
-        self.part();
+        self.prune_tracks();
     }
 
     /// Somebody is where these positions of named sites say (index of the site, world position): who was lost or away and can have
@@ -120,13 +120,13 @@ impl People {
         let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
         let mut person = self.nobody_yet(stamp)?;
         person.tracker.reset(positions, fit_sizes)?;
-        person.there = true;
+        person.present = true;
         person.place = person.tracker.estimate().world_from_limb.first().map_or(Vec3::ZERO, |root| root.translation);
-        let far = |known: &Person| came_from(known, person.place, stamp);
-        let known = self.persons.iter_mut().filter(|known| !known.tracked() && far(known) < NEW);
+        let far = |known: &Person| distance_cost(known, person.place, stamp);
+        let known = self.persons.iter_mut().filter(|known| !known.is_tracked() && far(known) < NEW);
         if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
             known.tracker.reset(positions, false)?;
-            (known.there, known.place, known.seen) = (true, person.place, stamp);
+            (known.present, known.place, known.last_tracked) = (true, person.place, stamp);
             return Ok(known.id);
         }
         self.persons.push(person);
@@ -146,38 +146,38 @@ impl People {
         own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
         self.stamp = Some(frame.stamp);
         self.detector.clear_error();
-        self.scene.meet(frame);
-        self.share_out(frame);
+        self.scene.register(frame);
+        self.assign_pixels(frame);
         self.follow(frame, own);
-        self.scene.learn(frame, self.claims.owners());
-        self.part();
-        self.look(frame);
-        self.forget(frame.stamp);
+        self.scene.learn(frame, self.assignment.owners());
+        self.prune_tracks();
+        self.detect_new(frame);
+        self.delete_expired(frame.stamp);
         Ok(())
     }
 
     /// Gives every pixel and free point to whose surface explains it.
-    fn share_out(&mut self, frame: &Frame) {
-        for person in self.persons.iter_mut().filter(|person| person.there) {
-            person.tracker.expect(frame.stamp, &mut person.expected);
+    fn assign_pixels(&mut self, frame: &Frame) {
+        for person in self.persons.iter_mut().filter(|person| person.present) {
+            person.tracker.predict(frame.stamp, &mut person.expected);
         }
         // Who is lost explains nothing.
-        let claimants = (0..)
+        let predicted = (0..)
             .zip(&self.persons)
-            .filter(|(_, person)| person.tracked())
-            .map(|(number, person)| Claimant { number, body: person.tracker.body(), poses: &person.expected });
-        self.claims.settle(frame, self.scene.known(), claimants);
+            .filter(|(_, person)| person.is_tracked())
+            .map(|(number, person)| PredictedBody { number, body: person.tracker.body(), poses: &person.expected });
+        self.assignment.assign(frame, self.scene.known(), predicted);
     }
 
     /// Every tracker by its share.
     fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
-        let (claims, scene) = (&self.claims, self.scene.known());
+        let (assignment, scene) = (&self.assignment, self.scene.known());
         let work = |(number, person): (usize, &mut Person)| {
-            if person.there {
-                let share = claims.share(number, scene);
+            if person.present {
+                let ownership = assignment.ownership(number, scene);
                 let of = own.iter().find(|(id, _)| *id == person.id).map_or(frame, |(_, frame)| frame);
-                person.tracker.step_among(of, share);
-                person.note(frame, share);
+                person.tracker.step_owned(of, ownership);
+                person.update(frame, ownership);
             }
         };
         match &self.threads {
@@ -188,140 +188,143 @@ impl People {
     }
 
     /// Of two on one body the one that explains less of it goes, or the younger; who leaves the region goes, and who is not wanted.
-    fn part(&mut self) {
+    fn prune_tracks(&mut self) {
         for younger in 0..self.persons.len() {
             let place = self.persons[younger].place;
             for older in 0..younger {
                 let [a, b] = [older, younger].map(|number| &self.persons[number]);
-                if a.tracked() && b.tracked() && a.place.distance(place) < ONE_BODY {
-                    let more = self.claims.explained(younger) > self.claims.explained(older);
-                    self.persons[if more { older } else { younger }].there = false;
+                if a.is_tracked() && b.is_tracked() && a.place.distance(place) < ONE_BODY {
+                    let more = self.assignment.count(younger) > self.assignment.count(older);
+                    self.persons[if more { older } else { younger }].present = false;
                 }
             }
-            let wanted = self.options.allows(place) && self.options.wants(self.persons[younger].id);
-            self.persons[younger].there &= wanted;
+            let is_followed = self.options.allows(place) && self.options.includes(self.persons[younger].id);
+            self.persons[younger].present &= is_followed;
         }
     }
 
     /// Looks for somebody at what nobody explains.
-    fn look(&mut self, frame: &Frame) {
+    fn detect_new(&mut self, frame: &Frame) {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
-            only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.tracked()))
+            only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
         });
-        if everybody_there || !self.detector.knows() || self.looked.is_some_and(|last| frame.stamp - last < LOOK_EVERY)
+        if everybody_there
+            || !self.detector.knows()
+            || self.last_detection.is_some_and(|last| frame.stamp - last < DETECT_EVERY)
         {
             return;
         }
-        self.looked = Some(frame.stamp);
-        self.strangers.fade(frame.stamp);
+        self.last_detection = Some(frame.stamp);
+        self.tentative.prune(frame.stamp);
         self.detect(frame, DetectionQuery::New);
-        let believed = self.strangers.believed(frame.stamp);
-        if !believed.is_empty() {
-            self.welcome(frame, &believed);
+        let confirmed = self.tentative.take_confirmed(frame.stamp);
+        if !confirmed.is_empty() {
+            self.associate(frame, &confirmed);
         }
     }
 
     fn detect(&mut self, frame: &Frame, query: DetectionQuery) {
         for (number, image) in frame.images.iter().enumerate() {
-            let scene = self.scene.known().of(image).map_or(&[][..], Background::depth);
+            let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
             let around = Surroundings {
                 ground: frame.ground,
                 excluded: frame.excluded,
-                owners: self.claims.owners().get(number).map_or(&[], Vec::as_slice),
+                owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
                 // Somebody may have stood there from the start.
                 background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
                 ..Surroundings::default()
             };
-            for found in self.detector.look(&self.prototype, image, &around, query) {
-                if !self.asked_for(frame, found.root) {
+            for found in self.detector.detect(&self.prototype, image, &around, query) {
+                if !self.is_requested(frame, found.root) {
                     self.detector.reject(found.index);
                     continue;
                 }
-                let still = self.scene.shows(frame, number, &found.detection.pixels);
-                self.strangers.note(frame.stamp, found, number, still);
+                let still = self.scene.is_still(frame, number, &found.detection.pixels);
+                self.tentative.update(frame.stamp, found, number, still);
             }
         }
     }
 
     /// Whether somebody where a person is seen is to be followed.
-    fn asked_for(&self, frame: &Frame, place: Vec3) -> bool {
-        let others = self.others_than(None);
+    fn is_requested(&self, frame: &Frame, place: Vec3) -> bool {
+        let others = self.tracked_except(None);
         self.options.allows(place) && self.options.room(frame, place, &others).is_some()
     }
 
     /// Numbers and places of those who are seen.
-    fn others_than(&self, one: Option<usize>) -> Vec<(usize, Vec3)> {
-        let others = (0..self.persons.len()).filter(|number| self.persons[*number].tracked() && Some(*number) != one);
+    fn tracked_except(&self, one: Option<usize>) -> Vec<(usize, Vec3)> {
+        let others =
+            (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked() && Some(*number) != one);
         others.map(|number| (number, self.persons[number].place)).collect()
     }
 
     /// Those who are believed to be persons get a tracker: their own when they are somebody who was there. Who they are is asked
     /// together with all others who are seen.
-    fn welcome(&mut self, frame: &Frame, believed: &[Stranger]) {
-        let absent: Vec<usize> = (0..self.persons.len()).filter(|number| self.may_be(*number, believed)).collect();
+    fn associate(&mut self, frame: &Frame, confirmed: &[TentativeTrack]) {
+        let absent: Vec<usize> = (0..self.persons.len()).filter(|number| self.may_match(*number, confirmed)).collect();
         if !absent.is_empty() {
             self.detect(frame, DetectionQuery::All);
-            self.strangers.leave_out(believed);
+            self.tentative.discard(confirmed);
         }
-        let cost = |stranger: &Stranger| {
-            let clothes = self.clothes_of(frame, stranger);
-            let size = |number: usize| self.persons[number].unlike(self.detected(stranger));
+        let cost = |track: &TentativeTrack| {
+            let clothes = self.clothes_of_track(frame, track);
+            let size = |number: usize| self.persons[number].stature_cost(self.detected(track));
             let cost =
-                |number: &usize| person_cost(&self.persons[*number], size(*number), stranger, &clothes, frame.stamp);
+                |number: &usize| person_cost(&self.persons[*number], size(*number), track, &clothes, frame.stamp);
             absent.iter().map(cost).collect()
         };
-        let costs: Vec<Vec<f64>> = believed.iter().chain(self.strangers.seen_at(frame.stamp)).map(cost).collect();
-        for (stranger, given) in believed.iter().zip(assign::assign(&costs, NEW)) {
+        let costs: Vec<Vec<f64>> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).map(cost).collect();
+        for (track, given) in confirmed.iter().zip(assign::assign(&costs, NEW)) {
             let known = given.map(|column| absent[column]);
-            let others = self.others_than(known);
-            let Some(leaves) = self.options.room(frame, stranger.place, &others) else { continue };
+            let others = self.tracked_except(known);
+            let Some(leaves) = self.options.room(frame, track.place, &others) else { continue };
             let came = match known {
-                Some(number) => self.take_up(frame, stranger, number),
-                None => self.bear(frame, stranger),
+                Some(number) => self.reactivate(frame, track, number),
+                None => self.spawn(frame, track),
             };
             if let Some(leaves) = leaves.filter(|_| came) {
-                self.persons[leaves].there = false;
+                self.persons[leaves].present = false;
             }
-            if came && self.options.limit.is_some_and(|limit| self.there().count() > limit) {
+            if came && self.options.limit.is_some_and(|limit| self.present().count() > limit) {
                 // Somebody else takes the place of who is hidden.
-                self.persons.iter_mut().for_each(|person| person.there &= person.tracked());
+                self.persons.iter_mut().for_each(|person| person.present &= person.is_tracked());
             }
         }
     }
 
     /// Whether one of the strangers may be this person: who is away, and who follows less than what such a stranger shows beside
     /// them.
-    fn may_be(&self, number: usize, strangers: &[Stranger]) -> bool {
+    fn may_match(&self, number: usize, candidates: &[TentativeTrack]) -> bool {
         let person = &self.persons[number];
-        let beside = |stranger: &&Stranger| stranger.place.distance(person.place) < SAME_PERSON;
-        let shown = strangers.iter().filter(beside).map(|stranger| stranger.detection.pixels.len()).max();
-        !person.tracked() || shown.is_some_and(|shown| self.claims.explained(number) < shown)
+        let beside = |track: &&TentativeTrack| track.place.distance(person.place) < SAME_PERSON;
+        let visible = candidates.iter().filter(beside).map(|track| track.detection.pixels.len()).max();
+        !person.is_tracked() || visible.is_some_and(|visible| self.assignment.count(number) < visible)
     }
 
     /// What the detector reported of a stranger.
-    fn detected<'a>(&'a self, stranger: &'a Stranger) -> Detected<'a> {
-        Detected { detection: &stranger.detection, map: self.detector.map() }
+    fn detected<'a>(&'a self, track: &'a TentativeTrack) -> Detected<'a> {
+        Detected { detection: &track.detection, map: self.detector.map() }
     }
 
     /// What a stranger wears.
-    fn clothes_of(&self, frame: &Frame, stranger: &Stranger) -> Clothes {
+    fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
-        if let Some((body, poses)) = sized(&Model::new(self.prototype.clone()), self.detected(stranger)) {
-            let free = |image: usize, pixel: usize| self.claims.owners()[image].get(pixel) == Some(&NOBODY);
-            clothes.look(frame, &body, &poses, free);
+        if let Some((body, poses)) = fit_body(&Model::new(self.prototype.clone()), self.detected(track)) {
+            let free = |image: usize, pixel: usize| self.assignment.owners()[image].get(pixel) == Some(&NO_OWNER);
+            clothes.observe(frame, &body, &poses, free);
         }
         clothes
     }
 
     /// Somebody new, if they are there.
-    fn bear(&mut self, frame: &Frame, stranger: &Stranger) -> bool {
-        let full = self.persons.len() >= usize::from(NOBODY);
-        if full || !self.options.wants(self.next_id) {
+    fn spawn(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
+        let full = self.persons.len() >= usize::from(NO_OWNER);
+        if full || !self.options.includes(self.next_id) {
             return false;
         }
         let Ok(person) = self.nobody_yet(frame.stamp) else { return false };
         self.persons.push(person);
-        let came = self.take_up(frame, stranger, self.persons.len() - 1);
+        let came = self.reactivate(frame, track, self.persons.len() - 1);
         if came {
             self.next_id += 1;
         } else {
@@ -331,41 +334,42 @@ impl People {
     }
 
     /// Starts a person's tracker where a stranger is seen; whether they are there.
-    fn take_up(&mut self, frame: &Frame, stranger: &Stranger, number: usize) -> bool {
-        self.scene.release(frame, stranger.image, &stranger.detection.pixels);
+    fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize) -> bool {
+        self.scene.release(frame, track.image, &track.detection.pixels);
         let person = &mut self.persons[number];
-        if !self.options.wants(person.id) {
+        if !self.options.includes(person.id) {
             return false;
         }
-        let known = person.born < frame.stamp;
-        let share = self.claims.share(number, self.scene.known());
-        let detected = Detected { detection: &stranger.detection, map: self.detector.map() };
-        let came = person.tracker.begin(frame, share, detected, known);
+        let known = person.created < frame.stamp;
+        let ownership = self.assignment.ownership(number, self.scene.known());
+        let detected = Detected { detection: &track.detection, map: self.detector.map() };
+        let came = person.tracker.start_at_detection(frame, ownership, detected, known);
         if came {
-            person.there = true;
-            person.measure(detected);
+            person.present = true;
+            person.update_stature(detected);
         }
-        person.note(frame, share);
+        person.update(frame, ownership);
         // Who was lost may have been found by their own tracker in this very frame.
         let place = person.place;
-        let twice = self.others_than(Some(number)).iter().any(|(_, other)| other.distance(place) < ONE_BODY);
-        self.persons[number].there &= !twice;
+        let twice = self.tracked_except(Some(number)).iter().any(|(_, other)| other.distance(place) < ONE_BODY);
+        self.persons[number].present &= !twice;
         came && !twice
     }
 
     /// Forgets who has been away for too long, and who was there for a moment only.
-    fn forget(&mut self, stamp: f64) {
+    fn delete_expired(&mut self, stamp: f64) {
         let forget_after = self.options.forget_after;
         self.persons.retain(|person| {
-            let remembered = person.seen - person.born >= KNOWN_AFTER && stamp - person.seen < forget_after;
-            person.there || remembered
+            let remembered =
+                person.last_tracked - person.created >= KNOWN_AFTER && stamp - person.last_tracked < forget_after;
+            person.present || remembered
         });
     }
 }
 
 /// Cost of somebody new.
 const NEW: f64 = 4.0;
-/// How far a person comes at once and in a second, metres.
+/// How far a person comes at once and in a second, meters.
 const COMES: [f64; 2] = [0.4, 1.2];
 /// How unlike the clothes of one person are who is seen twice, and the spread of that.
 const CLOTHES: [f64; 2] = [0.10, 0.07];
@@ -373,16 +377,17 @@ const CLOTHES: [f64; 2] = [0.10, 0.07];
 const LIKE_CLOTHES: f64 = 3.0;
 
 /// What speaks against a person's having come to a place.
-fn came_from(person: &Person, place: Vec3, stamp: f64) -> f64 {
-    let reach = COMES[0] + COMES[1] * (stamp - person.seen);
+fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
+    let reach = COMES[0] + COMES[1] * (stamp - person.last_tracked);
     let far = person.place.distance(place) / reach;
     if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
 }
 
 /// What speaks against a stranger's being this person; `size`: of which their sizes do.
-fn person_cost(person: &Person, size: f64, stranger: &Stranger, clothes: &Clothes, stamp: f64) -> f64 {
-    let far = came_from(person, stranger.place, stamp);
-    let unlike = person.clothes.unlike(clothes);
-    let color = unlike.map_or(0.0, |unlike| 0.5 * ((unlike - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
+fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
+    let far = distance_cost(person, track.place, stamp);
+    let distance = person.clothes.distance(clothes);
+    let color =
+        distance.map_or(0.0, |distance| 0.5 * ((distance - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
     far + size + color
 }

@@ -3,18 +3,18 @@
 use crate::association::correspondence::RegionSupport;
 
 /// A mean log ratio beside the contour that is told from none.
-const TOLD: f32 = 0.15;
+const DECISIVE: f32 = 0.15;
 /// The outer part of a limb begins at this share of its length.
 const OUTER_FROM: f64 = 0.6;
 
 /// A limb is in doubt when a smaller share of what can tell speaks for it.
-const DOUBTED: f64 = 0.15;
+const WEAK: f64 = 0.15;
 
 /// Sums over the lines of a limb.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Evidence {
     lines: f64,
-    told: f64,
+    decided: f64,
     /// Weights of the lines that can tell, of those that speak for the limb and of those against it: of the whole, of the outer
     /// part.
     sums: [[f64; 2]; 3],
@@ -25,10 +25,10 @@ impl Evidence {
     pub(super) fn take(&mut self, t: f64, beside: Option<[f32; 2]>) {
         self.lines += 1.0;
         let Some([inside, outside]) = beside else { return };
-        self.told += 1.0;
+        self.decided += 1.0;
         let weights = [t.max(0.1), if t > OUTER_FROM { 1.0 } else { 0.0 }];
-        let own = inside > TOLD && outside < -TOLD;
-        let against = inside < -TOLD;
+        let own = inside > DECISIVE && outside < -DECISIVE;
+        let against = inside < -DECISIVE;
         for (sum, counts) in self.sums.iter_mut().zip([true, own, against]) {
             for (sum, weight) in sum.iter_mut().zip(weights) {
                 *sum += if counts { weight } else { 0.0 };
@@ -37,17 +37,18 @@ impl Evidence {
     }
 
     /// The limb may not be where it is thought to be: too little speaks for it.
-    pub(super) fn doubts(&self) -> bool {
-        self.told > 0.0 && self.support().own[0] < DOUBTED
+    pub(super) fn is_weak(&self) -> bool {
+        self.decided > 0.0 && self.support().own[0] < WEAK
     }
 
     pub(super) fn support(&self) -> RegionSupport {
         let [all, own, against] = self.sums;
-        let share = |part: [f64; 2]| [0, 1].map(|index| if all[index] > 0.0 { part[index] / all[index] } else { 0.0 });
+        let fraction =
+            |part: [f64; 2]| [0, 1].map(|index| if all[index] > 0.0 { part[index] / all[index] } else { 0.0 });
         RegionSupport {
-            own: share(own),
-            against: share(against),
-            shown: self.told / self.lines.max(1.0),
+            own: fraction(own),
+            against: fraction(against),
+            visible: self.decided / self.lines.max(1.0),
             lines: self.lines,
             ..RegionSupport::default()
         }

@@ -1,4 +1,4 @@
-//! How often colours are seen: 16 x 16 x 16 bins of colours, or 256 of grey, smoothed.
+//! How often colors are seen: 16 x 16 x 16 bins of colors, or 256 of gray, smoothed.
 
 use crate::math::widest;
 use crate::observation::picture::ColorPixels;
@@ -7,14 +7,14 @@ use crate::observation::picture::ColorPixels;
 const BITS: u32 = 4;
 /// Bins of each channel.
 const SIDE: usize = 1 << BITS;
-/// Share of a count that its neighbour gets on either side: a Gaussian of 0.7 bins.
+/// Share of a count that its neighbor gets on either side: a Gaussian of 0.7 bins.
 const SPREAD: f32 = 0.21;
-/// Grey has finer bins: it is smoothed so many times.
-const GREY_PASSES: usize = 40;
-/// Share of colours that may be any.
+/// Gray has finer bins: it is smoothed so many times.
+const GRAY_PASSES: usize = 40;
+/// Share of colors that may be any.
 const UNIFORM: f32 = 0.05;
 
-/// Log ratios are held to this: a colour never seen before proves little.
+/// Log ratios are held to this: a color never seen before proves little.
 pub(super) const MOST_RATIO: f32 = 2.0;
 
 /// What the pixels of a picture are: it tells the bins.
@@ -22,26 +22,26 @@ pub(super) const MOST_RATIO: f32 = 2.0;
 pub(super) enum Kind {
     #[default]
     Color,
-    Grey,
+    Gray,
 }
 
 impl Kind {
-    pub(super) fn of(pixels: &ColorPixels) -> Self {
+    pub(super) fn new(pixels: &ColorPixels) -> Self {
         match pixels {
             ColorPixels::Color(_) => Self::Color,
-            ColorPixels::Grey(_) => Self::Grey,
+            ColorPixels::Gray(_) => Self::Gray,
         }
     }
 
     pub(super) fn bins(self) -> usize {
         match self {
             Self::Color => SIDE * SIDE * SIDE,
-            Self::Grey => 256,
+            Self::Gray => 256,
         }
     }
 }
 
-/// The bin of a colour.
+/// The bin of a color.
 #[inline(always)]
 pub(super) fn color_bin(pixel: [u8; 3]) -> usize {
     let [x, y, z] = pixel.map(|value| usize::from(value >> (8 - BITS)));
@@ -53,31 +53,31 @@ pub(super) fn color_bin(pixel: [u8; 3]) -> usize {
 pub(super) fn bin_of(pixels: &ColorPixels, index: usize) -> usize {
     match pixels {
         ColorPixels::Color(pixels) => color_bin(pixels[index]),
-        ColorPixels::Grey(pixels) => usize::from(pixels[index]),
+        ColorPixels::Gray(pixels) => usize::from(pixels[index]),
     }
 }
 
 /// A log ratio as it counts.
 #[inline(always)]
-pub(super) fn held(ratio: f32) -> f32 {
+pub(super) fn clamped(ratio: f32) -> f32 {
     ratio.clamp(-MOST_RATIO, MOST_RATIO)
 }
 
-/// Shares of colours, and their logarithms.
+/// Shares of colors, and their logarithms.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Histogram {
-    share: Vec<f32>,
+pub(super) struct ColorHistogram {
+    frequency: Vec<f32>,
     pub log: Vec<f32>,
     counts: Vec<f32>,
     counted: f32,
-    /// Something was learnt.
+    /// Something was learned.
     pub known: bool,
 }
 
-impl Histogram {
+impl ColorHistogram {
     pub(super) fn clear(&mut self, kind: Kind) {
         let bins = kind.bins();
-        for values in [&mut self.share, &mut self.counts] {
+        for values in [&mut self.frequency, &mut self.counts] {
             values.clear();
             values.resize(bins, 0.0);
         }
@@ -86,7 +86,7 @@ impl Histogram {
         (self.counted, self.known) = (0.0, false);
     }
 
-    /// Counts a colour; it is learnt with the next [`Histogram::learn`].
+    /// Counts a color; it is learned with the next [`ColorHistogram::learn`].
     #[inline(always)]
     pub(super) fn count(&mut self, bin: usize) {
         self.counts[bin] += 1.0;
@@ -98,18 +98,18 @@ impl Histogram {
         if self.counted >= least {
             match kind {
                 Kind::Color => smooth_color(&mut self.counts, room),
-                Kind::Grey => (0..GREY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, 256)),
+                Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, 256)),
             }
             let rate = if self.known { rate } else { 1.0 };
             let (keep, new) = (1.0 - rate, rate / self.counted);
-            let uniform = UNIFORM / self.share.len() as f32;
-            let Self { share, log, counts, .. } = self;
+            let uniform = UNIFORM / self.frequency.len() as f32;
+            let Self { frequency, log, counts, .. } = self;
             widest(
                 #[inline(always)]
                 || {
-                    for ((share, log), count) in share.iter_mut().zip(log).zip(&*counts) {
-                        *share = keep * *share + new * count;
-                        *log = ln((1.0 - UNIFORM) * *share + uniform);
+                    for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
+                        *frequency = keep * *frequency + new * count;
+                        *log = ln((1.0 - UNIFORM) * *frequency + uniform);
                     }
                 },
             );
@@ -128,7 +128,7 @@ fn smooth_color(values: &mut [f32], room: &mut Vec<f32>) {
     }
 }
 
-/// Spreads values to their neighbours at a stride, in rows of so many; those at the ends keep what would leave.
+/// Spreads values to their neighbors at a stride, in rows of so many; those at the ends keep what would leave.
 fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
     room.clear();
     room.extend_from_slice(values);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn smoothing_keeps_the_sum_and_spreads_to_neighbours_alone() {
+    fn smoothing_keeps_the_sum_and_spreads_to_neighbors_alone() {
         let mut values = vec![0.0; SIDE * SIDE * SIDE];
         let place = (3 * SIDE + 15) * SIDE;
         values[place] = 1.0;
@@ -184,6 +184,6 @@ mod tests {
         let (middle, beside) = (1.0 - 2.0 * SPREAD, 1.0 - SPREAD);
         assert!((values[place] - middle * beside * beside).abs() < 1e-6);
         assert!((values[place + 1] - middle * beside * SPREAD).abs() < 1e-6);
-        assert_eq!((values[place - 1], values[place + SIDE]), (0.0, 0.0), "no neighbours");
+        assert_eq!((values[place - 1], values[place + SIDE]), (0.0, 0.0), "no neighbors");
     }
 }

@@ -14,7 +14,7 @@ const CORNERS: [[f64; 2]; 8] = {
     use std::f64::consts::FRAC_1_SQRT_2 as H;
     [[1.0, 0.0], [H, H], [0.0, 1.0], [-H, H], [-1.0, 0.0], [-H, -H], [0.0, -1.0], [H, -H]]
 };
-/// A limb with an end nearer than this to the camera's plane is not drawn, metres.
+/// A limb with an end nearer than this to the camera's plane is not drawn, meters.
 pub(super) const NEAREST_END: f64 = 0.1;
 
 /// No limb is seen there.
@@ -22,7 +22,7 @@ pub(super) const NOTHING: u16 = u16::MAX;
 
 /// A picture of limbs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Labels {
+pub(super) struct LimbLabels {
     /// A cell is two to this power pixels wide and high.
     bits: u32,
     columns: usize,
@@ -39,45 +39,45 @@ pub(super) struct Labels {
 }
 
 /// Depth along the picture of an axis.
-struct Axis {
+struct DepthAxis {
     start: [f32; 2],
     along: [f32; 2],
     depth: [f32; 2],
 }
 
-impl Labels {
-    /// Draws the limbs that are `shown` as a camera sees them, in cells of two to the power of `bits` pixels.
+impl LimbLabels {
+    /// Draws the limbs that are `visible` as a camera sees them, in cells of two to the power of `bits` pixels.
     pub(super) fn draw(
         &mut self,
         body: &Body,
         camera_from_limb: &[Pose],
         camera: &Camera,
         bits: u32,
-        shown: impl Fn(usize) -> bool,
+        visible: impl Fn(usize) -> bool,
     ) {
         self.clear(bits, [camera.width(), camera.height()].map(|size| size.div_ceil(1 << bits)));
         let scale = 1.0 / f64::from(1_u32 << bits);
         let cells = |place: [f64; 2]| place.map(|value| (scale * value) as f32);
         let limbs = body.limbs().iter().zip(camera_from_limb).enumerate();
-        for (index, (limb, pose)) in limbs.filter(|(index, _)| shown(*index)) {
+        for (index, (limb, pose)) in limbs.filter(|(index, _)| visible(*index)) {
             let shape = &limb.shape;
             let ends = [(shape.a0(), shape.b0(), 0.0), (shape.a1(), shape.b1(), shape.length())];
             let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| pose.rotation * axis);
-            let centres = ends.map(|(_, _, along)| pose.translation + z * along);
-            if ends.iter().zip(centres).any(|((a, b, _), centre)| centre.z - a.max(*b) < NEAREST_END) {
+            let centers = ends.map(|(_, _, along)| pose.translation + z * along);
+            if ends.iter().zip(centers).any(|((a, b, _), center)| center.z - a.max(*b) < NEAREST_END) {
                 continue;
             }
             self.corners.clear();
-            for ((a, b, _), centre) in ends.into_iter().zip(centres) {
+            for ((a, b, _), center) in ends.into_iter().zip(centers) {
                 let (x, y) = (x * a, y * b);
                 self.corners
-                    .extend(CORNERS.iter().filter_map(|[c, s]| camera.project(centre + x * *c + y * *s)).map(cells));
+                    .extend(CORNERS.iter().filter_map(|[c, s]| camera.project(center + x * *c + y * *s)).map(cells));
             }
-            let [Some(start), Some(end)] = centres.map(|centre| camera.project(centre).map(cells)) else { continue };
-            let front = |end: usize| (centres[end].z - 0.5 * (ends[end].0 + ends[end].1)) as f32;
+            let [Some(start), Some(end)] = centers.map(|center| camera.project(center).map(cells)) else { continue };
+            let front = |end: usize| (centers[end].z - 0.5 * (ends[end].0 + ends[end].1)) as f32;
             let along = [end[0] - start[0], end[1] - start[1]];
             let square = (along[0] * along[0] + along[1] * along[1]).max(1.0);
-            let axis = Axis { start, along: along.map(|value| value / square), depth: [front(0), front(1)] };
+            let axis = DepthAxis { start, along: along.map(|value| value / square), depth: [front(0), front(1)] };
             self.find_hull();
             self.fill(index as u16, &axis);
         }
@@ -111,7 +111,7 @@ impl Labels {
         self.drawn = [0..0, 0..0];
     }
 
-    /// The limb that a pixel shows and its depth, metres.
+    /// The limb that a pixel shows and its depth, meters.
     #[inline(always)]
     pub(super) fn at(&self, column: usize, row: usize) -> (u16, f32) {
         let (column, row) = (column >> self.bits, row >> self.bits);
@@ -122,7 +122,7 @@ impl Labels {
         }
     }
 
-    /// The convex hull of the corners, anticlockwise (Andrew's monotone chain).
+    /// The convex hull of the corners, counterclockwise (Andrew's monotone chain).
     fn find_hull(&mut self) {
         let Self { corners, hull, .. } = self;
         corners.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -149,7 +149,7 @@ impl Labels {
     }
 
     /// Fills the hull where nothing nearer is.
-    fn fill(&mut self, limb: u16, axis: &Axis) {
+    fn fill(&mut self, limb: u16, axis: &DepthAxis) {
         let Self { columns, rows, hull, depth, limb: limbs, sides, drawn, .. } = self;
         let (low, high) =
             hull.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), [_, y]| (low.min(*y), high.max(*y)));
@@ -190,11 +190,11 @@ impl Labels {
             let start = (x - axis.start[0]) * axis.along[0] + (y - axis.start[1]) * axis.along[1];
             let cells = row * *columns + range.start..row * *columns + range.end;
             let cells = limbs[cells.clone()].iter_mut().zip(&mut depth[cells]);
-            for (column, (shown, depth)) in cells.enumerate() {
+            for (column, (visible, depth)) in cells.enumerate() {
                 let at = (start + column as f32 * axis.along[0]).clamp(0.0, 1.0);
                 let z = axis.depth[0] + (axis.depth[1] - axis.depth[0]) * at;
                 if z < *depth {
-                    (*shown, *depth) = (limb, z);
+                    (*visible, *depth) = (limb, z);
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Lines across the contour of limbs: where they stand in a picture and what borders the limb there.
 
-use super::labels::{Labels, NOTHING};
+use super::labels::{LimbLabels, NOTHING};
 use crate::body::{Body, Limb};
 use crate::camera::Camera;
 use crate::math::{Pose, Vec3};
@@ -12,9 +12,9 @@ use crate::observation::picture::ColorImage;
 const RIM: usize = 8;
 /// So far inside and outside of the contour one looks which limb is seen, units: labels are coarse.
 pub(super) const BESIDE: f32 = 3.0;
-/// A limb that lies behind by less than this is no background to one that it is joined to, metres.
+/// A limb that lies behind by less than this is no background to one that it is joined to, meters.
 const FAR_BEHIND: f32 = 0.10;
-/// A limb this much nearer than another hides it, metres.
+/// A limb this much nearer than another hides it, meters.
 pub(super) const NEARER_BY: f32 = 0.03;
 
 /// A line across the contour.
@@ -26,9 +26,9 @@ pub(super) struct Line {
     /// Where it is seen, pixels, and the unit vector outward.
     pub place: [f32; 2],
     pub normal: [f32; 2],
-    /// How far the foot is seen to move outward with its place: pixels a metre, camera frame.
+    /// How far the foot is seen to move outward with its place: pixels a meter, camera frame.
     pub motion: Vec3,
-    /// Depth of the limb's surface there, metres.
+    /// Depth of the limb's surface there, meters.
     pub depth: f32,
     /// Width of the limb along the line, units; infinite where it does not end.
     pub width: f32,
@@ -42,21 +42,21 @@ pub(super) struct Line {
     pub hidden: bool,
 }
 
-/// A depth camera this near to another camera sees what that one sees, metres.
+/// A depth camera this near to another camera sees what that one sees, meters.
 const SAME_VIEW: f64 = 0.15;
-/// What is measured this much nearer than a limb hides it, metres: limbs may not have been found yet.
+/// What is measured this much nearer than a limb hides it, meters: limbs may not have been found yet.
 const BEFORE_BY: f64 = 0.15;
 
 /// A depth camera beside a camera: it sees what stands before the body.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Beside<'a> {
+pub(super) struct OcclusionDepth<'a> {
     view: DepthView<'a>,
     depth_from_camera: Pose,
 }
 
-impl<'a> Beside<'a> {
+impl<'a> OcclusionDepth<'a> {
     /// That of a picture, if the frame has one.
-    pub(super) fn of(frame: &Frame<'a>, picture: &ColorImage) -> Option<Self> {
+    pub(super) fn new(frame: &Frame<'a>, picture: &ColorImage) -> Option<Self> {
         let place = picture.world_from_sensor.translation;
         let near = |pose: &Pose| pose.translation.distance(place) < SAME_VIEW;
         let image = frame.images.iter().find(|image| near(&image.world_from_sensor))?;
@@ -66,7 +66,7 @@ impl<'a> Beside<'a> {
     }
 
     /// Whether something stands before a point of the camera's frame.
-    fn hides(&self, point: Vec3) -> bool {
+    fn is_occluded(&self, point: Vec3) -> bool {
         let point = self.depth_from_camera * point;
         matches!(self.view.at(point), Pixel::Foreground(depth) if depth < point.z - BEFORE_BY)
     }
@@ -76,10 +76,10 @@ impl<'a> Beside<'a> {
 pub(super) struct Viewer<'a> {
     pub body: &'a Body,
     pub camera: &'a Camera,
-    pub labels: &'a Labels,
+    pub labels: &'a LimbLabels,
     /// Pixels a unit.
     pub unit: f32,
-    pub beside: Option<Beside<'a>>,
+    pub beside: Option<OcclusionDepth<'a>>,
 }
 
 /// What borders a limb at a place of its contour.
@@ -135,9 +135,9 @@ impl Viewer<'_> {
             let along = camera_from_limb.rotation * along;
             // The picture of the rim's direction; the normal is at right angles to it, away from the limb.
             let motion = [[1.0, 0.0], [0.0, 1.0]].map(|axis| self.camera.gradient(place, axis));
-            let ([Some(x), Some(y)], Some(seen)) = (motion, self.camera.project(place)) else { continue };
+            let ([Some(x), Some(y)], Some(projected)) = (motion, self.camera.project(place)) else { continue };
             let [x, y] = [x.dot(along), y.dot(along)];
-            let out = (seen[0] - middle[0]) * y - (seen[1] - middle[1]) * x;
+            let out = (projected[0] - middle[0]) * y - (projected[1] - middle[1]) * x;
             let normal = if out > 0.0 { [y, -x] } else { [-y, x] };
             lines.extend(self.line(index, camera_from_limb, point, normal));
         }
@@ -154,7 +154,7 @@ impl Viewer<'_> {
         let (normal, motion) = (n.map(|value| value as f32), self.camera.gradient(point, n)?);
         let border = self.border(limb, place, normal)?;
         let Border { outside, depth, clear } = border;
-        let hidden = self.beside.is_some_and(|beside| beside.hides(point));
+        let hidden = self.beside.is_some_and(|beside| beside.is_occluded(point));
         Some(Line {
             limb: limb as u16,
             foot,

@@ -1,19 +1,19 @@
-//! Colour regions: where the contour of limbs lies in pictures, by what limbs and their surroundings look like (R07 section 3).
+//! Color regions: where the contour of limbs lies in pictures, by what limbs and their surroundings look like (R07 section 3).
 //!
 //! R07 alternates between a segmentation of the whole picture with the projected body as prior and a pose from its border. Here
 //! only short lines across the body's contour are segmented, with the same two ingredients: how likely each pixel is the limb's
 //! or the surroundings', and where the body is thought to be. A line's edge is a distance along one direction, as any other
 //! correspondence.
 
-mod claims;
+mod empty_scene;
 mod evidence;
 mod histogram;
 mod labels;
 mod lines;
 mod models;
+mod pixel_gain;
 mod posterior;
 mod scan;
-mod scene;
 mod segment;
 
 use crate::association::correspondence::{Correspondences, RegionPair};
@@ -23,31 +23,31 @@ use crate::error::TrackError;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
-pub(crate) use claims::{Backdrop, Claim};
+use empty_scene::EmptyScene;
 use evidence::Evidence;
 use histogram::Kind;
-use labels::Labels;
-use lines::{Beside, Line, Viewer};
+use labels::LimbLabels;
+use lines::{Line, OcclusionDepth, Viewer};
 use models::ColorModel;
-use scan::{Scanner, Search};
-use scene::Scene;
+pub(crate) use pixel_gain::{Backdrop, PixelGain};
+use scan::{EdgeSearch, Scanner};
 
 /// How the edge is looked for in the steps of a frame: farther at first, and less closely. The first two where nobody knows how the
 /// body moves.
-const SEARCHES: [Search; 6] = [
-    Search { reach: 10, every: 4.0 },
-    Search { reach: 8, every: 4.0 },
-    Search { reach: 8, every: 2.0 },
-    Search { reach: 5, every: 2.0 },
-    Search { reach: 6, every: 1.0 },
-    Search { reach: 5, every: 1.0 },
+const SEARCHES: [EdgeSearch; 6] = [
+    EdgeSearch { reach: 10, every: 4.0 },
+    EdgeSearch { reach: 8, every: 4.0 },
+    EdgeSearch { reach: 8, every: 2.0 },
+    EdgeSearch { reach: 5, every: 2.0 },
+    EdgeSearch { reach: 6, every: 1.0 },
+    EdgeSearch { reach: 5, every: 1.0 },
 ];
 /// How it is looked for where the limb's girth is asked for.
-const OUTLINE: Search = Search { reach: 10, every: 1.0 };
+const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: 10, every: 1.0 };
 const WIDE_SEARCHES: usize = 2;
 /// Which limb is seen where is drawn in cells of two to this power pixels.
 const CELL_BITS: u32 = 1;
-/// Lines stand about so far apart along a limb, metres, and so many on each side at least and at most.
+/// Lines stand about so far apart along a limb, meters, and so many on each side at least and at most.
 const SPACING: f64 = 0.035;
 const LEAST_LINES: usize = 3;
 const MOST_LINES: usize = 16;
@@ -65,11 +65,11 @@ struct Learned {
     /// Pixels a unit in the last picture.
     unit: f32,
     model: ColorModel,
-    scene: Option<Scene>,
-    labels: Labels,
+    scene: Option<EmptyScene>,
+    labels: LimbLabels,
     lines: Vec<Line>,
     /// What was found on each of them.
-    edges: Vec<Option<scan::Found>>,
+    edges: Vec<Option<scan::LineEdge>>,
     camera_from_limb: Vec<Pose>,
     known: bool,
 }
@@ -79,11 +79,11 @@ pub(crate) fn steps(unknown_motion: bool) -> usize {
     SEARCHES.len() - if unknown_motion { 0 } else { WIDE_SEARCHES }
 }
 
-/// Colours of the body and its surroundings, camera by camera, and the lines of the last look.
+/// Colors of the body and its surroundings, camera by camera, and the lines of the last look.
 #[derive(Debug, Default)]
-pub(crate) struct Regions {
+pub(crate) struct ColorRegions {
     cameras: Vec<Learned>,
-    /// Group of every limb: those of one group have the same colours.
+    /// Group of every limb: those of one group have the same colors.
     groups: Vec<u16>,
     /// Time of the last frame, seconds.
     stamp: Option<f64>,
@@ -107,7 +107,7 @@ pub(crate) struct Posed<'a> {
     pub origin: Vec3,
 }
 
-/// A line across the contour of a limb in a picture, and the edge of its colours there; pixels.
+/// A line across the contour of a limb in a picture, and the edge of its colors there; pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionLine {
     /// The limb.
@@ -122,7 +122,7 @@ pub struct RegionLine {
     pub sigma: f32,
 }
 
-impl Regions {
+impl ColorRegions {
     /// Forgets what bodies and surroundings look like.
     pub(crate) fn clear(&mut self) {
         (self.stamp, self.turn) = (None, 0);
@@ -135,7 +135,7 @@ impl Regions {
         camera: u16,
         pictures: &[(ColorPixels, [usize; 2])],
     ) -> Result<(), TrackError> {
-        let scene = if pictures.is_empty() { None } else { Some(Scene::of(pictures)?) };
+        let scene = if pictures.is_empty() { None } else { Some(EmptyScene::from_pictures(pictures)?) };
         self.camera(camera).scene = scene;
         Ok(())
     }
@@ -154,14 +154,14 @@ impl Regions {
         Ok(())
     }
 
-    /// Learns the colours of cameras that are new at the pose where the body is thought to be.
+    /// Learns the colors of cameras that are new at the pose where the body is thought to be.
     pub(crate) fn begin(&mut self, frame: &Frame, posed: Posed) {
         if self.groups != posed.body.roles().groups() {
             posed.body.roles().groups().clone_into(&mut self.groups);
             self.cameras.iter_mut().for_each(|camera| camera.known = false);
         }
         for picture in frame.colors {
-            let kind = Kind::of(&picture.pixels);
+            let kind = Kind::new(&picture.pixels);
             let groups = self.groups.iter().map(|group| usize::from(*group) + 1).max().unwrap_or(0);
             let camera = self.camera(picture.number);
             if camera.known && camera.model.kind == kind {
@@ -170,31 +170,31 @@ impl Regions {
             camera.model.clear(kind, groups);
             camera.known = true;
             self.evidence.clear();
-            self.look(frame, picture, posed);
+            self.place_lines(frame, picture, posed);
             self.teach(picture);
         }
     }
 
-    /// The edges of the limbs that are `wanted` in all pictures, in a step of a frame after which so many are `left`.
+    /// The edges of the limbs that are `is_requested` in all pictures, in a step of a frame after which so many are `left`.
     pub(crate) fn find(
         &mut self,
         frame: &Frame,
         posed: Posed,
         left: usize,
-        wanted: impl Fn(usize) -> bool,
+        is_requested: impl Fn(usize) -> bool,
         found: &mut Correspondences,
     ) {
         let search = SEARCHES[SEARCHES.len() - 1 - left.min(SEARCHES.len() - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
-        self.find_within(frame, posed, search, Some(&wanted), &mut found.regions);
+        self.find_within(frame, posed, search, Some(&is_requested), &mut found.regions);
         found.region_support.clear();
         found.region_support.extend(self.evidence.iter().map(Evidence::support));
     }
 
     /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
-    pub(crate) fn find_outline(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
-        self.find_within(frame, posed, OUTLINE, None, pairs);
+    pub(crate) fn find_single_edges(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
+        self.find_within(frame, posed, SINGLE_EDGES, None, pairs);
     }
 
     /// Edges of limbs that are wanted as a whole, or of all limbs one by one.
@@ -202,28 +202,28 @@ impl Regions {
         &mut self,
         frame: &Frame,
         posed: Posed,
-        search: Search,
-        wanted: Option<&dyn Fn(usize) -> bool>,
+        search: EdgeSearch,
+        is_requested: Option<&dyn Fn(usize) -> bool>,
         pairs: &mut Vec<RegionPair>,
     ) {
-        let together = wanted.is_some();
+        let together = is_requested.is_some();
         pairs.clear();
         for picture in frame.colors {
-            self.look(frame, picture, posed);
+            self.place_lines(frame, picture, posed);
             let Self { cameras, groups, scanner, evidence, .. } = self;
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
             };
             let Learned { unit, model, labels, scene, lines, edges, .. } = camera;
             let unit = *unit;
-            let view = scan::View { picture, model, labels, scene: scene.as_ref(), groups, unit };
+            let view = scan::ScanView { picture, model, labels, scene: scene.as_ref(), groups, unit };
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
             edges.reserve(lines.capacity());
             pairs.reserve(lines.capacity());
             for line in &*lines {
-                let looked = wanted.is_none_or(|wanted| wanted(usize::from(line.limb)));
-                let found = if looked { scanner.edge(&view, line, search, together) } else { None };
+                let searched = is_requested.is_none_or(|is_requested| is_requested(usize::from(line.limb)));
+                let found = if searched { scanner.edge(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
                     let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
@@ -264,7 +264,7 @@ impl Regions {
         })
     }
 
-    /// Learns colours where the body was found: of every second camera in turn, a frame is like the one before.
+    /// Learns colors where the body was found: of every second camera in turn, a frame is like the one before.
     pub(crate) fn learn(&mut self, frame: &Frame) {
         let turn = self.turn;
         frame.colors.iter().skip(turn).step_by(2).for_each(|picture| self.teach(picture));
@@ -281,18 +281,18 @@ impl Regions {
     }
 
     /// Places the lines of one picture.
-    fn look(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
+    fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
         let viewpoint = self.viewpoint(frame, picture, posed);
         let camera = self.camera(picture.number);
         camera.camera_from_limb.clear();
-        camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.of(limb)));
+        camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.limb_pose(limb)));
         camera.unit = unit_of(picture.camera);
         let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
         // Room at once: how many there are differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
-        let beside = Beside::of(frame, picture);
+        let beside = OcclusionDepth::new(frame, picture);
         let viewer = Viewer { body, camera: picture.camera, labels, unit: *unit, beside };
         for (limb, pose) in camera_from_limb.iter().enumerate() {
             let lines_a_side = (body.limbs()[limb].shape.length() / SPACING).round() as usize;
@@ -300,16 +300,16 @@ impl Regions {
         }
     }
 
-    /// Learns the colours along the lines of one picture, of limbs that are not in doubt.
+    /// Learns the colors along the lines of one picture, of limbs that are not in doubt.
     fn teach(&mut self, picture: &ColorImage) {
         let Self { cameras, groups, evidence, .. } = self;
         let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number) else { return };
         let unit = camera.unit;
         // Where many limbs are in doubt at once, it is the light that has changed.
-        let light = evidence.iter().filter(|evidence| evidence.doubts()).count() > MANY;
+        let light = evidence.iter().filter(|evidence| evidence.is_weak()).count() > MANY;
         for line in &camera.lines {
-            let doubtful = evidence.get(usize::from(line.limb)).is_some_and(Evidence::doubts);
-            if !line.hidden && (light || !doubtful) {
+            let weak = evidence.get(usize::from(line.limb)).is_some_and(Evidence::is_weak);
+            if !line.hidden && (light || !weak) {
                 scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
             }
         }
@@ -324,8 +324,8 @@ fn unit_of(camera: &Camera) -> f32 {
 }
 
 /// Where a limb is a share of the last motion later.
-fn moved_on(before: &Pose, now: &Pose, share: f64) -> Pose {
+fn moved_on(before: &Pose, now: &Pose, fraction: f64) -> Pose {
     let turn = (now.rotation * before.rotation.inverse()).to_scaled_axis_shortest();
     let shift = now.translation - before.translation;
-    Pose::from_parts(now.translation + share * shift, Quat::from_scaled_axis(share * turn) * now.rotation)
+    Pose::from_parts(now.translation + fraction * shift, Quat::from_scaled_axis(fraction * turn) * now.rotation)
 }

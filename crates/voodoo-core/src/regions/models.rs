@@ -1,29 +1,29 @@
-//! What colours limbs and their surroundings have in one camera's pictures.
+//! What colors limbs and their surroundings have in one camera's pictures.
 
-use super::histogram::{Histogram, Kind, held};
+use super::histogram::{ColorHistogram, Kind, clamped};
 
-/// Share of what two frames bring in what is known of a limb's colours, and of those around it: a body keeps its clothes.
+/// Share of what two frames bring in what is known of a limb's colors, and of those around it: a body keeps its clothes.
 const RATES: [f32; 2] = [0.19, 0.36];
 /// Fewer pixels than this teach nothing.
 const LEAST_PIXELS: f32 = 15.0;
 
-/// Colours by group of limbs: the two of a pair have the same.
+/// Colors by group of limbs: the two of a pair have the same.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ColorModel {
     pub kind: Kind,
-    pub limbs: Vec<Histogram>,
-    pub around: Vec<Histogram>,
-    /// Log ratios of each group's colours and of those around it, as they count.
+    pub limbs: Vec<ColorHistogram>,
+    pub around: Vec<ColorHistogram>,
+    /// Log ratios of each group's colors and of those around it, as they count.
     ratios: Vec<f32>,
     room: Vec<f32>,
 }
 
 impl ColorModel {
-    /// Forgets all colours.
+    /// Forgets all colors.
     pub(super) fn clear(&mut self, kind: Kind, groups: usize) {
         self.kind = kind;
         for histograms in [&mut self.limbs, &mut self.around] {
-            histograms.resize_with(groups, Histogram::default);
+            histograms.resize_with(groups, ColorHistogram::default);
             histograms.iter_mut().for_each(|histogram| histogram.clear(kind));
         }
         self.ratios.clear();
@@ -38,18 +38,18 @@ impl ColorModel {
         }
         for (group, ratios) in ratios.chunks_exact_mut(kind.bins()).enumerate() {
             let logs = limbs[group].log.iter().zip(&around[group].log);
-            ratios.iter_mut().zip(logs).for_each(|(ratio, (own, other))| *ratio = held(own - other));
+            ratios.iter_mut().zip(logs).for_each(|(ratio, (own, other))| *ratio = clamped(own - other));
         }
     }
 
-    /// Log ratios of a group's colours and of those around it.
+    /// Log ratios of a group's colors and of those around it.
     #[inline(always)]
     pub(super) fn ratios(&self, group: usize) -> &[f32] {
         let bins = self.kind.bins();
         &self.ratios[group * bins..(group + 1) * bins]
     }
 
-    /// Whether a group's colours and those around it are known.
+    /// Whether a group's colors and those around it are known.
     pub(super) fn knows(&self, group: usize) -> bool {
         self.limbs[group].known && self.around[group].known
     }

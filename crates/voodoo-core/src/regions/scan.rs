@@ -1,13 +1,13 @@
-//! Looks along lines: log ratios of limb and surroundings, and what colours there are.
+//! Looks along lines: log ratios of limb and surroundings, and what colors there are.
 
 use std::ops::Range;
 
-use super::histogram::{MOST_RATIO, bin_of, color_bin, held};
-use super::labels::{Labels, NOTHING};
+use super::empty_scene::EmptyScene;
+use super::histogram::{MOST_RATIO, bin_of, clamped, color_bin};
+use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
-use super::posterior::{Edge, MOST_REACH, edge};
-use super::scene::Scene;
+use super::posterior::{ColorEdge, MOST_REACH, edge};
 use crate::observation::picture::{ColorImage, ColorPixels};
 
 /// A limb wider than this is looked for by one edge alone, units.
@@ -18,27 +18,27 @@ const LOCAL: f32 = 12.0;
 const LEAST_SPREAD: f32 = 6.0;
 /// What is beside the contour is so many samples wide.
 const NEXT_TO: usize = 5;
-/// Colours are learnt from this far inside and outside of the contour, units.
+/// Colors are learned from this far inside and outside of the contour, units.
 const LEARN_FROM: f32 = 2.0;
-/// Neighbouring pixels are alike: one is learnt from in so many units.
+/// Neighboring pixels are alike: one is learned from in so many units.
 const LEARN_EVERY: f32 = 2.0;
-/// As far outside of it the surroundings are learnt, units.
+/// As far outside of it the surroundings are learned, units.
 const SURROUND: f32 = 30.0;
 
 /// How an edge is looked for: within so many samples on either side of the contour, so many units apart.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
+pub(super) struct EdgeSearch {
     pub reach: usize,
     pub every: f32,
 }
 
 /// What a line is looked along in.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View<'a> {
+pub(super) struct ScanView<'a> {
     pub picture: &'a ColorImage<'a>,
     pub model: &'a ColorModel,
-    pub labels: &'a Labels,
-    pub scene: Option<&'a Scene>,
+    pub labels: &'a LimbLabels,
+    pub scene: Option<&'a EmptyScene>,
     pub groups: &'a [u16],
     pub unit: f32,
 }
@@ -57,30 +57,36 @@ impl Default for Scanner {
 
 /// What is found on a line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
-    pub edge: Edge,
+pub(super) struct LineEdge {
+    pub edge: ColorEdge,
     /// Mean log ratios inside and outside of the contour.
     pub beside: [f32; 2],
 }
 
 impl Scanner {
     /// The edge on a line; `None` where it cannot be told.
-    pub(super) fn edge(&mut self, view: &View, line: &Line, search: Search, together: bool) -> Option<Found> {
+    pub(super) fn edge(
+        &mut self,
+        view: &ScanView,
+        line: &Line,
+        search: EdgeSearch,
+        together: bool,
+    ) -> Option<LineEdge> {
         let group = view.group(line.limb);
         if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
             return None;
         }
-        let Search { reach, every } = search;
+        let EdgeSearch { reach, every } = search;
         let width = if together && line.both && line.width < WIDEST { (line.width / every + 0.5) as usize } else { 0 };
         // The samples about this edge and those about the other one, which may overlap.
         let span = 2 * reach;
         let far = width.min(span);
         let start = 0.5 - reach as f32;
         if far == width {
-            self.look(view, line, [start - far as f32, every], 0..far + span);
+            self.fill_ratios(view, line, [start - far as f32, every], 0..far + span);
         } else {
-            self.look(view, line, [start - width as f32, every], 0..far);
-            self.look(view, line, [start, every], far..far + span);
+            self.fill_ratios(view, line, [start - width as f32, every], 0..far);
+            self.fill_ratios(view, line, [start, every], far..far + span);
         }
         let ratios = &self.ratios[..far + span];
         let (inside, outside) = ratios.split_at(far + reach);
@@ -88,18 +94,18 @@ impl Scanner {
         let next = NEXT_TO.min(reach);
         let beside = [mean(&inside[inside.len() - next..]), mean(&outside[..next])];
         let found = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
-        Some(Found {
-            edge: Edge { mean: every * found.mean, information: found.information / (every * every) },
+        Some(LineEdge {
+            edge: ColorEdge { mean: every * found.mean, information: found.information / (every * every) },
             beside,
         })
     }
 
     /// Fills a range of ratios with those of samples outward, from so many of them on.
-    fn look(&mut self, view: &View, line: &Line, [start, every]: [f32; 2], range: Range<usize>) {
+    fn fill_ratios(&mut self, view: &ScanView, line: &Line, [start, every]: [f32; 2], range: Range<usize>) {
         let ratios = &mut self.ratios[range];
         match view.picture.pixels {
             ColorPixels::Color(pixels) => view.fill(line, [start, every], ratios, |pixel| color_bin(pixels[pixel])),
-            ColorPixels::Grey(pixels) => {
+            ColorPixels::Gray(pixels) => {
                 view.fill(line, [start, every], ratios, |pixel| usize::from(pixels[pixel]));
                 compare_locally(view, line, [start, every], ratios);
             }
@@ -116,7 +122,7 @@ struct Local {
 }
 
 impl Local {
-    fn of(values: impl Iterator<Item = f32>) -> Self {
+    fn fit(values: impl Iterator<Item = f32>) -> Self {
         values.fold(Self::default(), |all, value| Self {
             count: all.count + 1.0,
             sum: all.sum + value,
@@ -132,15 +138,15 @@ impl Local {
     }
 }
 
-/// Grey alone says little of a whole limb: the ratios become the mean of theirs and of those of what is beside the contour.
-fn compare_locally(view: &View, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
+/// Gray alone says little of a whole limb: the ratios become the mean of theirs and of those of what is beside the contour.
+fn compare_locally(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
     let picture = view.picture;
     let side = |from: f32, to: f32| {
         let steps = (to - from).max(0.0) as usize;
-        let mut walk = Walk::of(line, from * view.unit, view.unit);
-        Local::of((0..steps).filter_map(|_| {
+        let mut walk = Walk::new(line, from * view.unit, view.unit);
+        Local::fit((0..steps).filter_map(|_| {
             let pixel = walk.pixel(picture);
-            walk.go_on();
+            walk.advance();
             pixel.map(|(column, row)| brightness(picture, column, row))
         }))
     };
@@ -148,14 +154,14 @@ fn compare_locally(view: &View, line: &Line, [start, every]: [f32; 2], ratios: &
     if inside.count < 3.0 || outside.count < 3.0 {
         return;
     }
-    let mut walk = Walk::of(line, start * every * view.unit, every * view.unit);
+    let mut walk = Walk::new(line, start * every * view.unit, every * view.unit);
     for ratio in ratios {
         if let Some((column, row)) = walk.pixel(picture).filter(|_| *ratio != 0.0) {
             let value = brightness(picture, column, row);
-            let local = held(inside.log(value) - outside.log(value));
+            let local = clamped(inside.log(value) - outside.log(value));
             *ratio = 0.5 * (*ratio + local);
         }
-        walk.go_on();
+        walk.advance();
     }
 }
 
@@ -163,12 +169,12 @@ fn brightness(picture: &ColorImage, column: usize, row: usize) -> f32 {
     f32::from(picture.pixels.get(row * picture.camera.width() + column)[0])
 }
 
-impl View<'_> {
+impl ScanView<'_> {
     fn group(&self, limb: u16) -> usize {
         usize::from(self.groups[usize::from(limb)])
     }
 
-    /// Whether what borders the limb has its colours.
+    /// Whether what borders the limb has its colors.
     fn outside_is(&self, line: &Line, group: usize) -> bool {
         line.outside != NOTHING && self.group(line.outside) == group
     }
@@ -179,7 +185,7 @@ impl View<'_> {
         let (model, group) = (self.model, self.group(line.limb));
         let known = model.ratios(group);
         let mut r = start * every;
-        let mut walk = Walk::of(line, r * self.unit, every * self.unit);
+        let mut walk = Walk::new(line, r * self.unit, every * self.unit);
         for ratio in ratios {
             *ratio = 0.0;
             if let Some((column, row)) = walk.pixel(self.picture)
@@ -193,25 +199,25 @@ impl View<'_> {
                     self.ratio(group, other, pixel, bin)
                 };
             }
-            walk.go_on();
+            walk.advance();
             r += every;
         }
     }
 
-    /// Log ratio of a pixel, whose bin is given, between a group's colours and those of what else would be there.
+    /// Log ratio of a pixel, whose bin is given, between a group's colors and those of what else would be there.
     #[inline(always)]
     pub(super) fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
         let own = self.model.limbs[group].log[bin];
         if other == NOTHING {
             let around = self.model.around[group].log[bin];
-            let log = |scene: &Scene| scene.log(pixel, self.picture.pixels.get(pixel), around);
-            return held(own - self.scene.map_or(around, log));
+            let log = |scene: &EmptyScene| scene.log(pixel, self.picture.pixels.get(pixel), around);
+            return clamped(own - self.scene.map_or(around, log));
         }
         let other = self.group(other);
         if other == group || !self.model.limbs[other].known {
             return 0.0;
         }
-        held(own - self.model.limbs[other].log[bin])
+        clamped(own - self.model.limbs[other].log[bin])
     }
 
     /// The same as a share of the most it can be.
@@ -248,12 +254,12 @@ struct Walk {
 }
 
 /// So many bits of a walk's places are parts of a pixel.
-const PART_BITS: u32 = 32;
+const FRACTION_BITS: u32 = 32;
 
 impl Walk {
     /// From `from` pixels outward, `step` pixels a step.
-    fn of(line: &Line, from: f32, step: f32) -> Self {
-        let part = |value: f32| (f64::from(value) * (1_i64 << PART_BITS) as f64) as i64;
+    fn new(line: &Line, from: f32, step: f32) -> Self {
+        let part = |value: f32| (f64::from(value) * (1_i64 << FRACTION_BITS) as f64) as i64;
         let place = [0, 1].map(|axis| part(line.place[axis] + from * line.normal[axis] + 0.5));
         Self { place, step: line.normal.map(|n| part(step * n)) }
     }
@@ -262,20 +268,20 @@ impl Walk {
     #[inline(always)]
     fn pixel(&self, picture: &ColorImage) -> Option<(usize, usize)> {
         // What lies left of the picture, or above it, is beyond any size as a number without sign.
-        let [column, row] = self.place.map(|place| (place >> PART_BITS) as usize);
+        let [column, row] = self.place.map(|place| (place >> FRACTION_BITS) as usize);
         (column < picture.camera.width() && row < picture.camera.height()).then_some((column, row))
     }
 
     #[inline(always)]
-    fn go_on(&mut self) {
+    fn advance(&mut self) {
         self.place = [0, 1].map(|axis| self.place[axis] + self.step[axis]);
     }
 }
 
-/// Counts the colours along a line, of the limb as far as its middle and of what is around it.
+/// Counts the colors along a line, of the limb as far as its middle and of what is around it.
 pub(super) fn count(
     picture: &ColorImage,
-    labels: &Labels,
+    labels: &LimbLabels,
     groups: &[u16],
     unit: f32,
     line: &Line,
@@ -284,18 +290,18 @@ pub(super) fn count(
     let group = usize::from(groups[usize::from(line.limb)]);
     let inner = (0.5 * line.width).min(SURROUND);
     let ColorModel { limbs, around, .. } = model;
-    for (histogram, shown, to, sign) in
+    for (histogram, visible, to, sign) in
         [(&mut limbs[group], line.limb, inner, -1.0), (&mut around[group], NOTHING, SURROUND, 1.0)]
     {
-        let mut walk = Walk::of(line, sign * LEARN_FROM * unit, sign * LEARN_EVERY * unit);
+        let mut walk = Walk::new(line, sign * LEARN_FROM * unit, sign * LEARN_EVERY * unit);
         let steps = ((to - LEARN_FROM) / LEARN_EVERY + 1.0).max(0.0) as usize;
         for _ in 0..steps {
             if let Some((column, row)) = walk.pixel(picture)
-                && labels.at(column, row).0 == shown
+                && labels.at(column, row).0 == visible
             {
                 histogram.count(bin_of(&picture.pixels, row * picture.camera.width() + column));
             }
-            walk.go_on();
+            walk.advance();
         }
     }
 }

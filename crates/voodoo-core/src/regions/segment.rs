@@ -1,11 +1,11 @@
-//! Which pixels of a picture are the body: colours, with the body where it is thought to be as the shape prior (R07 section 3.1).
+//! Which pixels of a picture are the body: colors, with the body where it is thought to be as the shape prior (R07 section 3.1).
 //!
-//! The log odds of a pixel are those of its colours, the mean of its neighbours' as well, and a prior that falls with the
+//! The log odds of a pixel are those of its colors, the mean of its neighbors' as well, and a prior that falls with the
 //! distance from the projected contour.
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
-use super::{Posed, Regions, scan};
+use super::{ColorRegions, Posed, scan};
 use crate::association::correspondence::Correspondences;
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
@@ -14,9 +14,9 @@ use crate::observation::picture::ColorImage;
 const FALL: f32 = 3.0;
 /// Farther outside than this, units, nothing is the body.
 const FARTHEST: f32 = 20.0;
-/// Colours of so many pixels on every side count as well: noise is no region.
-const NEIGHBOURS: usize = 2;
-/// Steps to a neighbour of a side and of a corner in the distance transform (Borgefors 1986), cells.
+/// Colors of so many pixels on every side count as well: noise is no region.
+const NEIGHBORS: usize = 2;
+/// Steps to a neighbor of a side and of a corner in the distance transform (Borgefors 1986), cells.
 const CHAMFER: [f32; 2] = [1.0, 1.414];
 
 /// A grid of cells about the body: the nearest limb, and how far outside of the contour it lies, units; negative inside.
@@ -26,15 +26,15 @@ struct Near {
     outside: Vec<f32>,
 }
 
-impl Regions {
+impl ColorRegions {
     /// How likely each pixel of a frame's pictures shows the body, picture after picture, row by row: 0 to 1. Cameras that are
-    /// new learn its colours at this pose first.
+    /// new learn its colors at this pose first.
     pub(crate) fn segment(&mut self, frame: &Frame, posed: Posed) -> Vec<Vec<f32>> {
         self.begin(frame, posed);
         frame.colors.iter().map(|picture| self.segment_picture(frame, picture, posed)).collect()
     }
 
-    /// Learns the body's colours and those about it where it is.
+    /// Learns the body's colors and those about it where it is.
     pub(crate) fn learn_at(&mut self, frame: &Frame, posed: Posed) {
         self.begin(frame, posed);
         self.find(frame, posed, 0, |_| true, &mut Correspondences::default());
@@ -42,12 +42,12 @@ impl Regions {
     }
 
     fn segment_picture(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) -> Vec<f32> {
-        self.look(frame, picture, posed);
+        self.place_lines(frame, picture, posed);
         let mut likely = vec![0.0; picture.camera.width() * picture.camera.height()];
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
         let (model, labels, scene) = (&camera.model, &camera.labels, camera.scene.as_ref());
         let unit = camera.unit;
-        let view = scan::View { picture, model, labels, scene, groups: &self.groups, unit };
+        let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
         let cell = 1_usize << super::CELL_BITS;
         let near = distances(labels, [picture.camera.width(), picture.camera.height()], cell as f32 / unit);
         // Log ratios, and then sums of them along rows.
@@ -79,10 +79,10 @@ impl Regions {
 
 /// Means of so many values on both sides, at a stride; beyond a row's end there are none.
 fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
-    let reach = NEIGHBOURS * stride;
+    let reach = NEIGHBORS * stride;
     let mean = |index: usize| {
         let (mut sum, mut count) = (0.0, 0.0);
-        for step in 0..=2 * NEIGHBOURS {
+        for step in 0..=2 * NEIGHBORS {
             let Some(other) = (index + step * stride).checked_sub(reach) else { continue };
             if other < values.len() && (stride > 1 || other / width == index / width) {
                 sum += values[other];
@@ -95,11 +95,11 @@ fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
 }
 
 /// Distances of all cells from the contour of what is drawn; a cell is `side` units wide.
-fn distances(labels: &super::Labels, size: [usize; 2], side: f32) -> Near {
+fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Near {
     let cell = 1_usize << super::CELL_BITS;
     let [columns, rows] = size.map(|size| size.div_ceil(cell));
-    let shown = |index: usize| labels.at(index % columns * cell, index / columns * cell).0;
-    let mut limb: Vec<u16> = (0..columns * rows).map(shown).collect();
+    let visible = |index: usize| labels.at(index % columns * cell, index / columns * cell).0;
+    let mut limb: Vec<u16> = (0..columns * rows).map(visible).collect();
     let far = |inside: bool| move |limb: &u16| if (*limb == NOTHING) == inside { 0.0 } else { f32::INFINITY };
     let mut outward: Vec<f32> = limb.iter().map(far(false)).collect();
     let mut inward: Vec<f32> = limb.iter().map(far(true)).collect();

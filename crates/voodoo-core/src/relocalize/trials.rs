@@ -22,20 +22,20 @@ pub(super) struct Trials {
 
 impl Trials {
     /// The poses that were tried last.
-    pub(super) fn tried(&self) -> &[Pose] {
+    pub(super) fn poses(&self) -> &[Pose] {
         &self.poses
     }
 
     /// Tries the body where a detector saw it, with the points there as the candidates of `context`; whether it explains them no
     /// worse than the present pose does.
-    pub(super) fn at_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
+    pub(super) fn try_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
         // Depth hardly tells a person's front from the back; the detector does.
-        self.at(context, fit, present, place, SURE_GAIN)
+        self.try_at(context, fit, present, place, SURE_GAIN)
     }
 
     /// Tries the body at a place; whether it explains the points there no worse than the present pose does, or by less than
     /// `turning` worse where it faces the other way.
-    pub(super) fn at(
+    pub(super) fn try_at(
         &mut self,
         context: Context,
         fit: &mut Fit,
@@ -49,7 +49,7 @@ impl Trials {
         self.poses.extend_from_slice(place);
         self.refine(context, fit);
         let poses = std::mem::take(&mut self.poses);
-        let stray = self.stray_share(context, &poses);
+        let stray = self.stray_fraction(context, &poses);
         self.poses = poses;
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
         let allowed = present_score + if turned { turning } else { 0.0 };
@@ -57,9 +57,9 @@ impl Trials {
     }
 
     /// Share of some of the points there that lie far from a body.
-    pub(super) fn stray_share(&mut self, context: Context, poses: &[Pose]) -> f64 {
+    pub(super) fn stray_fraction(&mut self, context: Context, poses: &[Pose]) -> f64 {
         let Self { sample, nearest, distances, .. } = self;
-        let candidates = context.seen.candidates;
+        let candidates = context.observation.candidates;
         sample.assign(&candidates.points, &candidates.weight);
         sample.subsample(ROUGH_SAMPLE);
         nearest.clear();

@@ -4,7 +4,7 @@ use super::TaperedEllipticCylinder;
 use crate::math::{Mat3, Points, Pose, Vec3, widest};
 
 impl TaperedEllipticCylinder {
-    /// An approximate signed distance from `q` to the closed surface, limb frame, metres, negative inside.
+    /// An approximate signed distance from `q` to the closed surface, limb frame, meters, negative inside.
     ///
     /// To the side it is the first-order distance `(ρ - 1) / |∇ρ|` of the level function `ρ = sqrt((x/a(z))² + (y/b(z))²)`,
     /// exact to about 1 mm (95 % of points within 5 cm of limb-like shapes); beyond a cap it is joined with the height above
@@ -55,7 +55,7 @@ struct Rough {
     /// Rows of the rotation, and the shift, from the world to the limb.
     rows: [[f32; 4]; 3],
     length: f32,
-    /// Semi-axes at the proximal end, and their growth by the metre.
+    /// Semi-axes at the proximal end, and their growth by the meter.
     start: [f32; 2],
     growth: [f32; 2],
 }

@@ -8,17 +8,17 @@ use crate::math::has_avx512;
 use crate::math::{LANES, Points, Pose, Vec3};
 use std::ops::Range;
 
-/// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted in what it settles: no error beyond a micrometre in a million queries at 0.4.
+/// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted in what it settles: no error beyond a micrometer in a million queries at 0.4.
 const SETTLED: f64 = 0.2;
 
 /// Closest points of a batch of queries, in the frame of the queries; index i belongs to query i.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceBatch {
-    /// Points on the surface, metres.
+    /// Points on the surface, meters.
     pub points: Points,
     /// Outward unit normals.
     pub normals: Points,
-    /// Distances, metres, negative inside.
+    /// Distances, meters, negative inside.
     pub signed_distance: Vec<f32>,
     /// Faces, [`Region`](super::Region) as a number; read them with [`Region::from_u8`](super::Region::from_u8).
     pub region: Vec<u8>,
@@ -64,7 +64,7 @@ impl TaperedEllipticCylinder {
     /// [`Self::closest_point`] of every query, queries and results in the frame `world`.
     ///
     /// Single precision on SIMD lanes, within 1 µm of the exact answer for queries within 1.5 m of the limb in a frame a few
-    /// metres wide. What the fixed number of Newton steps does not settle (queries near the medial axis, on a rim, not
+    /// meters wide. What the fixed number of Newton steps does not settle (queries near the medial axis, on a rim, not
     /// finite; shapes whose end ellipses differ in aspect, or one of which is nearly a tip) is redone in double precision. A result depends on its query, shape
     /// and pose only, not on its place in the batch. `out` is resized; nothing is allocated once it is large enough.
     pub fn closest_points(&self, world_from_limb: &Pose, queries: &Points, out: &mut SurfaceBatch) {
@@ -98,11 +98,11 @@ impl TaperedEllipticCylinder {
         let rest = xs.len() % BLOCK;
         let whole = if 2 * rest > BLOCK { xs.len() } else { xs.len() - rest };
         let queries = [xs, ys, zs];
-        let mut batch = Batch { shape: self, world_from_limb, constants, out, doubtful: Few::new(), open: Few::new() };
+        let mut batch = Batch { shape: self, world_from_limb, constants, out, unsettled: Few::new(), open: Few::new() };
         batch.closest_blocks(kernel::<BLOCK, FEW>(), queries, 0..whole);
         batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..xs.len());
-        batch.go_on();
-        batch.settle();
+        batch.refine_unsettled();
+        batch.finish_exactly();
     }
 }
 
@@ -137,7 +137,7 @@ struct Batch<'a> {
     constants: Constants,
     out: &'a mut SurfaceBatch,
     /// Left by few steps of single precision; left by more of them.
-    doubtful: Few,
+    unsettled: Few,
     open: Few,
 }
 
@@ -163,38 +163,38 @@ impl Batch<'_> {
             store(&mut out.normals.z[span.clone()], &found.normals.z);
             store(&mut out.signed_distance[span.clone()], &found.signed_distance);
             store(&mut out.region[span], &found.region);
-            if found.doubtful.iter().fold(0, |any, doubt| any | doubt) == 0 {
+            if found.unsettled.iter().fold(0, |any, flag| any | flag) == 0 {
                 continue;
             }
-            for i in (0..count).filter(|i| found.doubtful[*i] != 0) {
-                if self.doubtful.push(start + i, [block.x[i], block.y[i], block.z[i]]) {
-                    self.go_on();
+            for i in (0..count).filter(|i| found.unsettled[*i] != 0) {
+                if self.unsettled.push(start + i, [block.x[i], block.y[i], block.z[i]]) {
+                    self.refine_unsettled();
                 }
             }
         }
     }
 
     /// Takes more steps in single precision with those that few did not settle.
-    fn go_on(&mut self) {
+    fn refine_unsettled(&mut self) {
         let mut found = BlockResult::ZERO;
-        if self.doubtful.count > 0 {
-            kernel::<SHORT, MORE>()(&self.constants, &self.doubtful.queries, &mut found);
+        if self.unsettled.count > 0 {
+            kernel::<SHORT, MORE>()(&self.constants, &self.unsettled.queries, &mut found);
         }
-        for i in 0..self.doubtful.count {
-            let (index, query) = (self.doubtful.indices[i], self.doubtful.queries.get(i));
-            if found.doubtful[i] == 0 {
+        for i in 0..self.unsettled.count {
+            let (index, query) = (self.unsettled.indices[i], self.unsettled.queries.get(i));
+            if found.unsettled[i] == 0 {
                 self.out.points.set(index, found.points.get(i));
                 self.out.normals.set(index, found.normals.get(i));
                 (self.out.signed_distance[index], self.out.region[index]) = (found.signed_distance[i], found.region[i]);
             } else if self.open.push(index, query) {
-                self.settle();
+                self.finish_exactly();
             }
         }
-        self.doubtful.count = 0;
+        self.unsettled.count = 0;
     }
 
     /// Decides what is still open in double precision.
-    fn settle(&mut self) {
+    fn finish_exactly(&mut self) {
         let Self { shape, world_from_limb, out, open, .. } = self;
         let mut queries = [Vec3::ZERO; SHORT];
         for (at, query) in queries.iter_mut().enumerate().take(open.count) {
@@ -326,13 +326,13 @@ mod tests {
             let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)?;
             let constants = Constants::new(&shape, &Pose::IDENTITY);
             let mut found = BlockResult::ZERO;
-            let mut doubtful = 0;
+            let mut unsettled = 0;
             for queries in shell(&shape) {
                 kernel::<BLOCK, FEW>()(&constants, &queries, &mut found);
-                doubtful += found.doubtful.iter().filter(|&&doubt| doubt != 0).count();
+                unsettled += found.unsettled.iter().filter(|&&flag| flag != 0).count();
             }
-            let share = doubtful as f64 / (200 * BLOCK) as f64;
-            assert!(shape.aspect_change() <= ONE_BASIN && share < 0.01, "{share} of {shape:?}");
+            let fraction = unsettled as f64 / (200 * BLOCK) as f64;
+            assert!(shape.aspect_change() <= ONE_BASIN && fraction < 0.01, "{fraction} of {shape:?}");
         }
         Ok(())
     }
@@ -345,7 +345,7 @@ mod tests {
         for queries in shell(&shape) {
             kernel::<BLOCK, FEW>()(&constants, &queries, &mut fast);
             closest_baseline::<BLOCK, FEW>(&constants, &queries, &mut plain);
-            for i in (0..BLOCK).filter(|&i| fast.doubtful[i] | plain.doubtful[i] == 0) {
+            for i in (0..BLOCK).filter(|&i| fast.unsettled[i] | plain.unsettled[i] == 0) {
                 assert!((fast.points.x[i] - plain.points.x[i]).abs() < 1e-6);
                 assert!((fast.points.y[i] - plain.points.y[i]).abs() < 1e-6);
                 assert!((fast.signed_distance[i] - plain.signed_distance[i]).abs() < 5e-7);
@@ -383,7 +383,7 @@ mod tests {
                 .map(|values| values.map(f32::to_bits))
             };
             assert_eq!(bits(&wider), bits(&wide));
-            assert_eq!((wider.doubtful, wider.region), (wide.doubtful, wide.region));
+            assert_eq!((wider.unsettled, wider.region), (wide.unsettled, wide.region));
         }
         Ok(())
     }

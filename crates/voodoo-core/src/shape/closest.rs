@@ -39,7 +39,7 @@ pub(super) fn folded(q: Vec3) -> Vec3 {
 }
 
 impl TaperedEllipticCylinder {
-    /// The closest point of the closed surface to `q`, limb frame, metres.
+    /// The closest point of the closed surface to `q`, limb frame, meters.
     ///
     /// For a query folded to `x, y >= 0` the side asks for the least of `g(θ) = min_t |P(θ, t) - q|²` on a quadrant, where
     /// `g'(0) <= 0 <= g'(π/2)`: Newton's iteration, kept in a bracket by bisection, always ends in a minimum. `g` has only
@@ -112,7 +112,7 @@ impl TaperedEllipticCylinder {
         SurfacePoint { point, normal, signed_distance, region }
     }
 
-    /// Distance from `q` to the closed surface, limb frame, metres, negative inside. Exact.
+    /// Distance from `q` to the closed surface, limb frame, meters, negative inside. Exact.
     pub fn signed_distance(&self, q: Vec3) -> f64 {
         self.closest_point(q).signed_distance
     }
@@ -163,7 +163,7 @@ impl TaperedEllipticCylinder {
         let feet: [Foot; SCAN + 1] = std::array::from_fn(|k| {
             let (c, s) = (COSINES[k], COSINES[SCAN - k]);
             let angle = match stretch {
-                Some(stretch) => Angle::of(c * stretch.c, s * stretch.s).unwrap_or(Angle::ZERO),
+                Some(stretch) => Angle::from_vector(c * stretch.c, s * stretch.s).unwrap_or(Angle::ZERO),
                 None => Angle { c, s },
             };
             self.foot(angle, q)
@@ -190,13 +190,13 @@ impl TaperedEllipticCylinder {
     pub(super) fn guess(&self, q: Vec3) -> Angle {
         // Not the very ends: a tip has no ellipse.
         let (a, b) = self.semi_axes(q.z.clamp(0.1 * self.length, 0.9 * self.length));
-        let near = Angle::of(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });
+        let near = Angle::from_vector(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });
         let focus = a * a - b * b;
         let x = a * q.x - focus * near.c.powi(3);
         let y = b * q.y + focus * near.s.powi(3);
-        let start = Angle::of(x.max(0.0), y.max(0.0)).unwrap_or(near);
+        let start = Angle::from_vector(x.max(0.0), y.max(0.0)).unwrap_or(near);
         // An end of the quadrant may be a maximum of g; start beside it.
-        Angle::of(start.c.max(1e-9), start.s.max(1e-9)).unwrap_or(near)
+        Angle::from_vector(start.c.max(1e-9), start.s.max(1e-9)).unwrap_or(near)
     }
 
     /// The minimum of `g` between two angles by Newton's iteration with bisection, the best foot seen.
@@ -215,14 +215,14 @@ impl TaperedEllipticCylinder {
             let converging = foot.bend > 0.0 && step.abs() < 0.5 * last_step;
             if foot.slope == 0.0 && foot.bend >= 0.0
                 || converging && step.abs() * scale < 1e-14
-                || low.to(high) * scale < 1e-15
+                || low.sine_to(high) * scale < 1e-15
             {
                 break;
             }
             let mut next = foot.angle.turned(step);
-            if !converging || low.to(next) <= 0.0 || next.to(high) <= 0.0 {
+            if !converging || low.sine_to(next) <= 0.0 || next.sine_to(high) <= 0.0 {
                 next = low.middle(high);
-                last_step = low.to(high);
+                last_step = low.sine_to(high);
             } else {
                 last_step = step.abs();
             }

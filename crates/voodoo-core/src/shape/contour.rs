@@ -1,6 +1,6 @@
 //! The contour of the side as a camera sees it, in closed form.
 //!
-//! With `a' = a1 - a0`, `b' = b1 - b0` and the camera's centre `C` in the limb frame, the point `P(θ, t)` lies on the contour where
+//! With `a' = a1 - a0`, `b' = b1 - b0` and the camera's center `C` in the limb frame, the point `P(θ, t)` lies on the contour where
 //! the ray touches the surface, `(P - C) · (P_θ × P_t) = 0`:
 //! `L a b - L (b C_x cos θ + a C_y sin θ) + (C_z - L t) (a b' sin² θ + b a' cos² θ) = 0`.
 //! Where both axes taper alike (`m = a'/a = b'/b`), `cos(θ - θ0) = (1 + m (C_z - L t) / L) / hypot(C_x / a, C_y / b)` with
@@ -17,14 +17,14 @@ const ALIKE: f64 = 1e-9;
 /// A point of the contour, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ContourPoint {
-    /// The point, metres.
+    /// The point, meters.
     pub point: Vec3,
     /// Outward normal of the surface there, any length above zero: the ray from the camera lies in the tangent plane.
     pub normal: Vec3,
 }
 
 impl TaperedEllipticCylinder {
-    /// The two points of the contour at the share `t` of the length, seen from `camera` (limb frame, metres); `None` where one
+    /// The two points of the contour at the share `t` of the length, seen from `camera` (limb frame, meters); `None` where one
     /// looks along the limb, or from within it. The first lies to the side of smaller angles about the axis.
     pub(crate) fn contour(&self, t: f64, camera: Vec3) -> Option<[ContourPoint; 2]> {
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
@@ -58,7 +58,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// The point of an end's rim at an angle given by its cosine and sine, and the direction of the rim there, where it is on
-    /// the contour seen from `camera` (limb frame, metres): one of the two faces that meet there is seen, the other is not.
+    /// the contour seen from `camera` (limb frame, meters): one of the two faces that meet there is seen, the other is not.
     pub(crate) fn rim_contour(&self, distal: bool, [c, s]: [f64; 2], camera: Vec3) -> Option<[Vec3; 2]> {
         let (a, b, z) = if distal { (self.a1, self.b1, self.length) } else { (self.a0, self.b0, 0.0) };
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
@@ -77,7 +77,7 @@ mod tests {
 
     prop_compose! {
         /// A limb whose aspect changes by up to 15 % and whose side is no steeper than 45 degrees, and a camera beside it.
-        fn seen()(length in 0.1..0.6, a0 in 0.03..0.2, aspect in 0.6..1.6, taper in 0.6..1.5, change in 0.85..1.15, away in 1.5..6.0, round in 0.0..std::f64::consts::TAU, rise in -0.6..0.6)
+        fn limb_and_camera()(length in 0.1..0.6, a0 in 0.03..0.2, aspect in 0.6..1.6, taper in 0.6..1.5, change in 0.85..1.15, away in 1.5..6.0, round in 0.0..std::f64::consts::TAU, rise in -0.6..0.6)
             -> (TaperedEllipticCylinder, Vec3) {
             let (b0, a1, b1) = (a0 * aspect, a0 * taper, a0 * aspect * taper * change);
             let length = f64::max(length, f64::max(f64::abs(a1 - a0), f64::abs(b1 - b0)));
@@ -136,12 +136,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rays_just_outside_the_contour_miss_the_limb_and_those_just_inside_hit_it((shape, camera) in seen(), t in 0.3..0.7) {
+        fn rays_just_outside_the_contour_miss_the_limb_and_those_just_inside_hit_it((shape, camera) in limb_and_camera(), t in 0.3..0.7) {
             check(&shape, t, camera)?;
         }
 
         #[test]
-        fn the_points_lie_on_the_surface_to_both_sides((shape, camera) in seen(), t in 0.0..1.0) {
+        fn the_points_lie_on_the_surface_to_both_sides((shape, camera) in limb_and_camera(), t in 0.0..1.0) {
             let Some([first, second]) = shape.contour(t, camera) else { return Ok(()) };
             for found in [first, second] {
                 prop_assert!(shape.closest_point(found.point).signed_distance.abs() < 1e-9);
@@ -157,11 +157,11 @@ mod tests {
         assert_eq!(shape.contour(0.5, Vec3::new(0.01, 0.0, 3.0)), None);
         assert_eq!(shape.contour(0.5, Vec3::new(0.0, 0.0, 0.2)), None);
         let rim = |camera: Vec3, distal| {
-            let seen = |k: usize| {
+            let limb_and_camera = |k: usize| {
                 let (s, c) = f64::sin_cos(k as f64 * std::f64::consts::FRAC_PI_4);
                 shape.rim_contour(distal, [c, s], camera).is_some()
             };
-            (0..8).filter(|k| seen(*k)).count()
+            (0..8).filter(|k| limb_and_camera(*k)).count()
         };
         // From the side, half of either rim bounds the picture; from ahead all of the nearer one does, as the sides are hidden.
         assert_eq!((rim(Vec3::new(3.0, 0.1, 0.2), true), rim(Vec3::new(3.0, 0.1, 0.2), false)), (4, 4));

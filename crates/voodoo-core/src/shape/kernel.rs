@@ -11,7 +11,7 @@ pub(super) const SHORT: usize = 8;
 /// Steps of Newton's iteration before the last one: of all points, and of the hundredth of them for which that is too few.
 pub(super) const FEW: usize = 1;
 pub(super) const MORE: usize = 3;
-/// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, metres, that passes.
+/// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, meters, that passes.
 const FOOT_ERROR: f32 = 3e-8;
 /// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
 const CONDITIONED: f32 = DISTINCT as f32;
@@ -39,12 +39,17 @@ pub(super) struct BlockResult<const N: usize> {
     pub signed_distance: [f32; N],
     pub region: [u8; N],
     /// Not zero where the exact path must decide.
-    pub doubtful: [u8; N],
+    pub unsettled: [u8; N],
 }
 
 impl<const N: usize> BlockResult<N> {
-    pub(super) const ZERO: Self =
-        Self { points: Block::ZERO, normals: Block::ZERO, signed_distance: [0.0; N], region: [0; N], doubtful: [0; N] };
+    pub(super) const ZERO: Self = Self {
+        points: Block::ZERO,
+        normals: Block::ZERO,
+        signed_distance: [0.0; N],
+        region: [0; N],
+        unsettled: [0; N],
+    };
 }
 
 /// What the kernel needs of shape and pose, in single precision.
@@ -56,7 +61,7 @@ pub(super) struct Constants {
     columns: [[f32; 3]; 3],
     origin: [f32; 3],
     rest: [f32; 3],
-    /// What the square of the last Newton step is multiplied with to bound the error it leaves, metres.
+    /// What the square of the last Newton step is multiplied with to bound the error it leaves, meters.
     second_order: f32,
     length: f32,
     inverse_length: f32,
@@ -147,7 +152,7 @@ fn select(condition: bool, yes: f32, no: f32) -> f32 {
 }
 
 /// The foot on one ruling and the derivatives of `g`, as in `ruling`.
-struct Foot {
+struct LaneFoot {
     /// The parameter along the ruling before it is clamped to 0..1, and its derivative by θ.
     free: f32,
     drift: f32,
@@ -157,7 +162,7 @@ struct Foot {
 }
 
 #[inline(always)]
-fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> Foot {
+fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> LaneFoot {
     let (dx, dy) = (k.da * c, k.db * s);
     let along = fma::<FMA>(dx, dx, fma::<FMA>(dy, dy, k.length * k.length));
     let inverse = 1.0 / along;
@@ -176,7 +181,7 @@ fn foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) 
     let mixed = fma::<FMA>(tx, dx, fma::<FMA>(ty, dy, turned));
     let drift = -mixed * inverse;
     let coupling = select(t == free, mixed * drift, 0.0);
-    Foot { free, drift, slope, bend: tangent - curved + coupling, tangent }
+    LaneFoot { free, drift, slope, bend: tangent - curved + coupling, tangent }
 }
 
 #[inline(always)]
@@ -195,7 +200,7 @@ fn nearly_unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
 
 /// The Newton step of `foot`, with `g''` kept positive and the step small enough for [`nearly_unit`].
 #[inline(always)]
-fn newton(foot: &Foot) -> f32 {
+fn newton(foot: &LaneFoot) -> f32 {
     let step = -foot.slope / max(foot.bend, 0.1 * foot.tangent + 1e-20);
     max(min(step, 0.2), -0.2)
 }
@@ -361,6 +366,6 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         let clear = (side.trusted | face.decided)
             & (cap | (norm > 1e-12))
             & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));
-        out.doubtful[i] = u8::from(!clear);
+        out.unsettled[i] = u8::from(!clear);
     }
 }

@@ -29,10 +29,10 @@ impl Feet {
         bend: [0.0; LANES],
     };
 
-    /// Replaces one lane if `wanted`.
+    /// Replaces one lane if `replace`.
     #[inline(always)]
-    fn set(&mut self, lane: usize, wanted: bool, foot: &Foot) {
-        let put = |slot: &mut f64, value: f64| *slot = if wanted { value } else { *slot };
+    fn set(&mut self, lane: usize, replace: bool, foot: &Foot) {
+        let put = |slot: &mut f64, value: f64| *slot = if replace { value } else { *slot };
         put(&mut self.angle[0][lane], foot.angle.c);
         put(&mut self.angle[1][lane], foot.angle.s);
         put(&mut self.t[lane], foot.t);
@@ -103,14 +103,14 @@ impl TaperedEllipticCylinder {
                 let converging = (foot.bend > 0.0) & (step.abs() < 0.5 * last_step[lane]);
                 let ended = (foot.slope == 0.0) & (foot.bend >= 0.0)
                     | converging & (step.abs() * scale < 1e-14)
-                    | (from.to(to) * scale < 1e-15);
+                    | (from.sine_to(to) * scale < 1e-15);
                 open[lane] &= !ended;
                 let next = foot.angle.turned(step);
-                let bisected = !converging | (from.to(next) <= 0.0) | (next.to(to) <= 0.0);
+                let bisected = !converging | (from.sine_to(next) <= 0.0) | (next.sine_to(to) <= 0.0);
                 let middle = from.middle(to);
                 let next =
                     Angle { c: if bisected { middle.c } else { next.c }, s: if bisected { middle.s } else { next.s } };
-                last_step[lane] = if bisected { from.to(to) } else { step.abs() };
+                last_step[lane] = if bisected { from.sine_to(to) } else { step.abs() };
                 let foot = self.foot(next, Vec3::new(x[lane], y[lane], z[lane]));
                 let better = open[lane] & (foot.squared < best.squared[lane]);
                 feet.set(lane, open[lane], &foot);

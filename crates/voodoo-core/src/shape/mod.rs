@@ -33,11 +33,11 @@ use thiserror::Error;
 pub use batch::SurfaceBatch;
 pub(crate) use section::FacingSection;
 
-/// A length below this, metres, is taken for a mistake: it is the accuracy of the queries.
+/// A length below this, meters, is taken for a mistake: it is the accuracy of the queries.
 pub(crate) const MIN_SIZE: f64 = 1e-6;
-/// A length above this, metres, is taken for a mistake (of units, most likely).
+/// A length above this, meters, is taken for a mistake (of units, most likely).
 pub(crate) const MAX_SIZE: f64 = 1e3;
-/// On a rim the normal is the direction to the query when it is farther than this, metres, and the mean of the two adjacent
+/// On a rim the normal is the direction to the query when it is farther than this, meters, and the mean of the two adjacent
 /// faces' normals when it is nearer.
 pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
 
@@ -50,7 +50,7 @@ pub enum ShapeError {
     OutOfRange {
         /// The parameter.
         name: &'static str,
-        /// The least value allowed, metres.
+        /// The least value allowed, meters.
         min: f64,
         /// The value found.
         value: f64,
@@ -64,9 +64,9 @@ pub enum ShapeError {
         first: &'static str,
         /// The semi-axis of the distal end.
         second: &'static str,
-        /// Its value, metres.
+        /// Its value, meters.
         first_value: f64,
-        /// Its value, metres.
+        /// Its value, meters.
         second_value: f64,
     },
     /// A scale factor is not a positive number.
@@ -105,17 +105,17 @@ impl Region {
 /// The point of the surface that is closest to a query, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The point on the surface, metres.
+    /// The point on the surface, meters.
     pub point: Vec3,
     /// Outward unit normal there; on a rim a direction in the cone between the normals of the two faces.
     pub normal: Vec3,
-    /// Distance from the query to the point, metres, negative inside.
+    /// Distance from the query to the point, meters, negative inside.
     pub signed_distance: f64,
     /// Face of the surface.
     pub region: Region,
 }
 
-/// A tapered elliptic cylinder in its limb frame, metres.
+/// A tapered elliptic cylinder in its limb frame, meters.
 ///
 /// A semi-axis may be zero at one end (needle tip, wedge), not at both. The type is small and is copied.
 ///
@@ -139,7 +139,7 @@ pub struct TaperedEllipticCylinder {
 }
 
 impl TaperedEllipticCylinder {
-    /// A shape from its length and its semi-axes along x and y at `z = 0` (`a0`, `b0`) and `z = length` (`a1`, `b1`), metres.
+    /// A shape from its length and its semi-axes along x and y at `z = 0` (`a0`, `b0`) and `z = length` (`a1`, `b1`), meters.
     ///
     /// # Errors
     /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above [`MAX_SIZE`], or the length below
@@ -160,27 +160,27 @@ impl TaperedEllipticCylinder {
         Ok(Self { length, a0, b0, a1, b1 })
     }
 
-    /// Length along z, metres.
+    /// Length along z, meters.
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// Semi-axis along x at the proximal end, metres.
+    /// Semi-axis along x at the proximal end, meters.
     pub fn a0(&self) -> f64 {
         self.a0
     }
 
-    /// Semi-axis along y at the proximal end, metres.
+    /// Semi-axis along y at the proximal end, meters.
     pub fn b0(&self) -> f64 {
         self.b0
     }
 
-    /// Semi-axis along x at the distal end, metres.
+    /// Semi-axis along x at the distal end, meters.
     pub fn a1(&self) -> f64 {
         self.a1
     }
 
-    /// Semi-axis along y at the distal end, metres.
+    /// Semi-axis along y at the distal end, meters.
     pub fn b1(&self) -> f64 {
         self.b1
     }
@@ -196,7 +196,7 @@ impl TaperedEllipticCylinder {
         Self::new(self.length * factor, self.a0 * factor, self.b0 * factor, self.a1 * factor, self.b1 * factor)
     }
 
-    /// The semi-axes `(a, b)` of the slice at height `z`, clamped to the ends, metres.
+    /// The semi-axes `(a, b)` of the slice at height `z`, clamped to the ends, meters.
     fn semi_axes(&self, z: f64) -> (f64, f64) {
         let t = (z / self.length).clamp(0.0, 1.0);
         (self.a0 + (self.a1 - self.a0) * t, self.b0 + (self.b1 - self.b0) * t)

@@ -7,9 +7,9 @@ use crate::math::Vec3;
 /// Where a ray enters the solid, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// Distance from the origin of the ray, metres.
+    /// Distance from the origin of the ray, meters.
     pub distance: f64,
-    /// The point on the surface, metres.
+    /// The point on the surface, meters.
     pub point: Vec3,
     /// Outward unit normal there.
     pub normal: Vec3,
@@ -21,7 +21,7 @@ pub struct RayHit {
 type Quartic = [f64; 5];
 
 impl TaperedEllipticCylinder {
-    /// The first point at which a ray passes from outside to inside, limb frame, at most `max_distance` metres away.
+    /// The first point at which a ray passes from outside to inside, limb frame, at most `max_distance` meters away.
     ///
     /// `direction` need not be a unit vector. `None` when the ray misses, only touches the surface, or is not finite; a ray
     /// that starts inside is followed out of the solid, which, not being convex, it may enter again.
@@ -73,7 +73,7 @@ impl TaperedEllipticCylinder {
         None
     }
 
-    /// Where a ray of unit direction enters and leaves the box around the shape, metres from its origin, and whether it enters
+    /// Where a ray of unit direction enters and leaves the box around the shape, meters from its origin, and whether it enters
     /// through the plane of a cap: of the proximal one when true. `None` when it misses.
     fn cross_box(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<(f64, f64, Option<bool>)> {
         let (mut near, mut far) = (0.0, max_distance);
@@ -105,8 +105,8 @@ impl TaperedEllipticCylinder {
     /// Outward normal at a point of the side.
     fn normal_at(&self, point: Vec3) -> Vec3 {
         let (a, b) = self.semi_axes(point.z);
-        let angle = Angle::of(point.x.abs() * b, point.y.abs() * a)
-            .or(Angle::of(point.x.abs(), point.y.abs()))
+        let angle = Angle::from_vector(point.x.abs() * b, point.y.abs() * a)
+            .or(Angle::from_vector(point.x.abs(), point.y.abs()))
             .unwrap_or(Angle::ZERO);
         let normal = self.side_normal(angle, (point.z / self.length).clamp(0.0, 1.0));
         Vec3::new(normal.x.copysign(point.x), normal.y.copysign(point.y), normal.z)

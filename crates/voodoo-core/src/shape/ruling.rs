@@ -16,7 +16,7 @@ impl Angle {
 
     /// The angle of the vector `(x, y)`, `None` for the zero vector.
     #[inline(always)]
-    pub(super) fn of(x: f64, y: f64) -> Option<Self> {
+    pub(super) fn from_vector(x: f64, y: f64) -> Option<Self> {
         // Lengths and their products: far from where the squares overflow or vanish, so no need for the slower `hypot`.
         let norm = (x * x + y * y).sqrt();
         (norm > 0.0 && norm.is_finite()).then(|| Self { c: x / norm, s: y / norm })
@@ -24,20 +24,20 @@ impl Angle {
 
     /// Sine of `other - self`: positive when `other` is the larger angle.
     #[inline(always)]
-    pub(super) fn to(self, other: Self) -> f64 {
+    pub(super) fn sine_to(self, other: Self) -> f64 {
         self.c * other.s - self.s * other.c
     }
 
     /// The angle half-way to `other`.
     #[inline(always)]
     pub(super) fn middle(self, other: Self) -> Self {
-        Self::of(self.c + other.c, self.s + other.s).unwrap_or(self)
+        Self::from_vector(self.c + other.c, self.s + other.s).unwrap_or(self)
     }
 
     /// This angle plus `atan(d)`.
     #[inline(always)]
     pub(super) fn turned(self, d: f64) -> Self {
-        Self::of(self.c - d * self.s, self.s + d * self.c).unwrap_or(self)
+        Self::from_vector(self.c - d * self.s, self.s + d * self.c).unwrap_or(self)
     }
 }
 
@@ -47,7 +47,7 @@ pub(super) struct Foot {
     pub angle: Angle,
     pub t: f64,
     pub point: Vec3,
-    /// `g`, square metres.
+    /// `g`, square meters.
     pub squared: f64,
     /// `g'/2 = e · P_θ` with `e = P - q`.
     pub slope: f64,

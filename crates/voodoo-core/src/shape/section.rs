@@ -3,7 +3,7 @@
 use super::TaperedEllipticCylinder;
 use crate::math::{Pose, Vec3};
 
-/// The ellipse in which a plane across the axis cuts the side, limb frame, metres.
+/// The ellipse in which a plane across the axis cuts the side, limb frame, meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
     /// Semi-axis along x.
@@ -19,9 +19,9 @@ pub(crate) struct Section {
 pub(crate) struct FacingSection {
     /// The section.
     pub section: Section,
-    /// From its centre to the camera, metres.
+    /// From its center to the camera, meters.
     pub to_camera: Vec3,
-    /// The part of that across the axis, metres.
+    /// The part of that across the axis, meters.
     pub across: Vec3,
     /// The unit vector along that part: the middle of what the camera sees lies there.
     pub ahead: Vec3,
@@ -38,30 +38,30 @@ impl TaperedEllipticCylinder {
 }
 
 impl Section {
-    /// Its centre, on the axis.
+    /// Its center, on the axis.
     #[inline]
-    pub(crate) fn centre(&self) -> Vec3 {
+    pub(crate) fn center(&self) -> Vec3 {
         Vec3::new(0.0, 0.0, self.z)
     }
 
     /// What of it faces a camera; `None` when the camera looks along the axis.
     #[inline]
     pub(crate) fn facing(self, camera_from_limb: &Pose) -> Option<FacingSection> {
-        let to_camera = camera_from_limb.inverse_transform_vector(-(*camera_from_limb * self.centre()));
+        let to_camera = camera_from_limb.inverse_transform_vector(-(*camera_from_limb * self.center()));
         let across = to_camera.with_z(0.0);
         let ahead = across.try_normalize()?;
         let side = Vec3::new(-ahead.y, ahead.x, 0.0);
         Some(FacingSection { section: self, to_camera, across, ahead, side })
     }
 
-    /// How far the ellipse reaches along a unit vector across the axis, metres: the distance of its tangent from the centre.
+    /// How far the ellipse reaches along a unit vector across the axis, meters: the distance of its tangent from the center.
     #[inline]
     pub(crate) fn extent(&self, direction: Vec3) -> f64 {
         let (x, y) = (self.a * direction.x, self.b * direction.y);
         (x * x + y * y).sqrt()
     }
 
-    /// The point of the ellipse that reaches farthest along a unit vector across the axis, metres.
+    /// The point of the ellipse that reaches farthest along a unit vector across the axis, meters.
     #[inline]
     pub(crate) fn farthest_point(&self, direction: Vec3) -> Vec3 {
         let extent = self.extent(direction);
@@ -106,8 +106,8 @@ mod tests {
             prop_assert!(shape.closest_point(point).signed_distance.abs() < 1e-9);
             // The camera stands where the pose says: the origin of its frame, seen from the limb.
             let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
-            prop_assert!((section.centre() + facing.to_camera - camera).length() < 1e-9);
-            prop_assert!((facing.point(0.0) - section.centre()).dot(facing.ahead) > 0.0, "the middle faces the camera");
+            prop_assert!((section.center() + facing.to_camera - camera).length() < 1e-9);
+            prop_assert!((facing.point(0.0) - section.center()).dot(facing.ahead) > 0.0, "the middle faces the camera");
             prop_assert!(facing.ahead.dot(facing.side).abs() < 1e-12 && facing.side.z == 0.0);
         }
 

@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
-use crate::association::contour::Edge;
+use crate::association::contour::DepthEdge;
 use crate::association::correspondence::LimbMatches;
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
@@ -13,16 +13,16 @@ use crate::shape::TaperedEllipticCylinder;
 pub(super) const GIRTH_STEPS: usize = 6;
 /// A limb's tip in the first frame makes it shorter or longer by these factors at most.
 pub(super) const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
-/// Standard deviation of the shift of a limb's surface against its joints (metres) and of its relative girth: what
-/// anthropometry leaves open between persons, clothes and definitions of joint centres.
+/// Standard deviation of the shift of a limb's surface against its joints (meters) and of its relative girth: what
+/// anthropometry leaves open between persons, clothes and definitions of joint centers.
 pub(super) const SHIFT_SIGMA: f64 = 0.03;
 pub(super) const GIRTH_SIGMA: f64 = 0.15;
-/// Scatter of a surface point about the model, and how many independent ones a limb shows at most: neighbours err alike.
+/// Scatter of a surface point about the model, and how many independent ones a limb shows at most: neighbors err alike.
 const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
 /// Scatter of an edge of the outline: about a pixel.
 const EDGE_SIGMA: f64 = 0.01;
-/// How far the axis of a tracked limb is off across the line of sight, metres.
+/// How far the axis of a tracked limb is off across the line of sight, meters.
 const ASIDE_SIGMA: f64 = 0.01;
 /// Edges of following frames err alike: this many frames tell as much as one.
 pub(crate) const ALIKE: f64 = 10.0;
@@ -34,7 +34,7 @@ const ENOUGH: usize = 15;
 /// Change of a limb's surface in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GirthFit {
-    /// Shift across the axis, metres; z is 0.
+    /// Shift across the axis, meters; z is 0.
     pub shift: Vec3,
     /// Factors of the semi-axes along x, of those along y, and of both at the distal end. Three, not four: both axes taper
     /// alike, so that the side of the limb stays nearly developable and its closest points cheap.
@@ -55,7 +55,7 @@ pub(crate) fn girth_step(
     shape: &TaperedEllipticCylinder,
     matches: &LimbMatches,
     working_from_limb: &Pose,
-    edges: &[Edge],
+    edges: &[DepthEdge],
     total: &GirthFit,
 ) -> Option<GirthFit> {
     let (points, _) = matches.accepted();
@@ -88,7 +88,7 @@ pub(crate) fn girth_step(
     let mut h = h * information + SMatrix::from_diagonal(&prior);
     let mut g = g * information - prior.component_mul(&so_far);
     for edge in edges {
-        let distance = edge.seen - edge.rim;
+        let distance = edge.reach - edge.rim;
         let row = row(edge.foot, edge.side);
         let weight = kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA);
         h += weight * row * row.transpose();
@@ -107,7 +107,7 @@ pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) ->
     Vector3::new(a, b, a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1()))
 }
 
-/// Cauchy's weight of a distance, metres.
+/// Cauchy's weight of a distance, meters.
 pub(super) fn kernel(distance: f64) -> f64 {
     1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
 }
@@ -132,7 +132,7 @@ impl Girth {
     pub(crate) fn follow(
         &mut self,
         shape: &TaperedEllipticCylinder,
-        edges: impl Iterator<Item = Edge>,
+        edges: impl Iterator<Item = DepthEdge>,
     ) -> Option<[f64; 4]> {
         let mut aside = Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * ALIKE);
         let (mut mixed, mut pull) = (Matrix3x2::zeros(), Vector2::zeros());
@@ -141,7 +141,7 @@ impl Girth {
         for edge in edges {
             let row = girth_row(shape, edge.foot, edge.side);
             let side = Vector2::new(edge.side.x, edge.side.y);
-            let wider = edge.seen - edge.rim;
+            let wider = edge.reach - edge.rim;
             let weight = kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA * ALIKE);
             h += weight * row * row.transpose();
             g += weight * wider * row;
@@ -169,14 +169,14 @@ impl Girth {
             return None;
         }
         let step = GirthFit { shift: Vec3::ZERO, factors: [0, 1, 2].map(|index: usize| 1.0 + step[index]) };
-        let (total, step) = self.total.then(&step);
+        let (total, step) = self.total.followed_by(&step);
         self.total = total;
         Some(step.axes())
     }
 }
 
 impl Girth {
-    /// Standard deviation of the mean radius of a limb of this shape, metres.
+    /// Standard deviation of the mean radius of a limb of this shape, meters.
     pub(crate) fn sigma(&self, shape: &TaperedEllipticCylinder) -> f64 {
         let radii = 0.25 * Vector3::new(shape.a0() + shape.a1(), shape.b0() + shape.b1(), shape.a1() + shape.b1());
         let known = self.information.cholesky().map(|factor| factor.solve(&radii));
@@ -192,7 +192,7 @@ impl GirthFit {
     }
 
     /// This change followed by another, held to what a person may differ by; and the part of the other that is left.
-    pub(crate) fn then(&self, step: &Self) -> (Self, Self) {
+    pub(crate) fn followed_by(&self, step: &Self) -> (Self, Self) {
         let mut total = Self { shift: self.shift + step.shift, factors: self.factors };
         let mut done = *step;
         for index in 0..3 {
@@ -208,24 +208,24 @@ mod tests {
     use super::*;
 
     /// Edges of a limb seen along x whose rims lie `wider` beyond the shape's and whose axis is off by `aside`.
-    fn sides(shape: &TaperedEllipticCylinder, wider: f64, aside: f64) -> Vec<[Edge; 2]> {
+    fn sides(shape: &TaperedEllipticCylinder, wider: f64, aside: f64) -> Vec<[DepthEdge; 2]> {
         let edge = |t: f64, sign: f64| {
             let rim = shape.b0() + t * (shape.b1() - shape.b0());
             let foot = Vec3::new(0.0, sign * rim, t * shape.length());
-            Edge { side: Vec3::Y * sign, rim, foot, seen: rim + wider + sign * aside, place: Vec3::ZERO }
+            DepthEdge { side: Vec3::Y * sign, rim, foot, reach: rim + wider + sign * aside, place: Vec3::ZERO }
         };
         [0.2, 0.35, 0.5, 0.65, 0.8].map(|t| [edge(t, 1.0), edge(t, -1.0)]).to_vec()
     }
 
     #[test]
-    fn girths_follow_the_outline_and_keep_their_thickness() {
+    fn girths_follow_the_contour_and_keep_their_thickness() {
         let truth = 0.20;
         let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
         let mut girth = Girth::default();
         let mut after_one = 0.0;
         for frame in 0..60 {
-            let seen = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen.into_iter().flatten()).unwrap();
+            let found = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found.into_iter().flatten()).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
             if frame == 0 {
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_on_one_side_tell_as_far_as_the_axis_is_known() {
+    fn edges_on_one_side_report_as_far_as_the_axis_is_known() {
         let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
         let mut girth = Girth::default();
         let both = Girth::default().follow(&shape, sides(&shape, 0.02, 0.0).into_iter().flatten()).unwrap();
@@ -248,8 +248,8 @@ mod tests {
         assert!(1.0 < after_one && after_one < both[1], "one side tells less: {after_one}, both {}", both[1]);
         for _ in 0..100 {
             let wider = 0.2 - 0.5 * (shape.b0() + shape.b1());
-            let seen = sides(&shape, wider, 0.0).into_iter().map(|[left, _]| left);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, seen).unwrap();
+            let found = sides(&shape, wider, 0.0).into_iter().map(|[left, _]| left);
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
         }

@@ -1,9 +1,9 @@
 //! Sizes of the body: what the first frame corrects and fits, and what those that follow refine.
 
+mod color_girth;
+mod equalize;
 pub(crate) mod girth;
-mod outline;
 mod reported;
-mod unlike;
 
 use crate::association::contour::edges;
 use crate::body::{Body, Model, Pair};
@@ -12,10 +12,10 @@ use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::solver::LENGTH_INFORMATION;
+use color_girth::ColorGirths;
+use equalize::{START_GATE, equalize_limb_lengths};
 use girth::{GIRTH_STEPS, Girth, GirthFit, TIP_FACTORS, girth_step};
-use outline::Outlines;
 use reported::ReportedLengths;
-use unlike::{START_GATE, equalise_limb_lengths};
 
 /// A limb becomes longer or shorter by at most this share in one frame.
 const LENGTH_STEP: f64 = 0.02;
@@ -43,8 +43,8 @@ pub(crate) struct Sizes {
     set: Option<Body>,
     /// What is known about the girths since the first frame fitted them; empty when they were given.
     girths: Vec<Girth>,
-    /// The same by colours.
-    outlines: Outlines,
+    /// The same by colors.
+    color_girths: ColorGirths,
     /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
@@ -61,7 +61,7 @@ impl Sizes {
         (self.open, self.rough) = (fit, start == Start::Detected);
         self.set = fit.then(|| model.body.clone());
         self.girths.clear();
-        self.outlines.clear();
+        self.color_girths.clear();
         self.pairs.clear();
         self.reported.clear();
         if fit && config.fit_lengths {
@@ -71,13 +71,13 @@ impl Sizes {
 
     /// Takes in what a detector reports of the sizes of a body that it found: the lengths are drawn to the mean of all reports.
     pub(crate) fn update(&mut self, detected: Detected) {
-        if self.found() {
+        if self.found_with_pose() {
             self.reported.update(detected);
         }
     }
 
     /// Whether what a detector reported of a body that it found does not fix its sizes yet.
-    pub(crate) fn unsure(&self) -> bool {
+    pub(crate) fn is_uncertain(&self) -> bool {
         self.reported.is_uncertain()
     }
 
@@ -87,16 +87,16 @@ impl Sizes {
     }
 
     /// The sizes were found with the pose: nobody told how large the body is.
-    pub(crate) fn found(&self) -> bool {
+    pub(crate) fn found_with_pose(&self) -> bool {
         self.rough
     }
 
     /// Limbs of one length whose lengths are refined; none where they are known.
-    pub(crate) fn followed(&self) -> &[Pair] {
+    pub(crate) fn refined_pairs(&self) -> &[Pair] {
         &self.pairs
     }
 
-    /// Standard deviation of the mean radius of a limb, metres; NaN where it was given.
+    /// Standard deviation of the mean radius of a limb, meters; NaN where it was given.
     pub(crate) fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
         self.girths.get(limb).map_or(f64::NAN, |girth| girth.sigma(&body.limbs()[limb].shape))
     }
@@ -107,7 +107,7 @@ impl Sizes {
     }
 
     /// The body as it was set, before frames changed its sizes.
-    pub(crate) fn as_set(&self) -> Option<&Body> {
+    pub(crate) fn initial_body(&self) -> Option<&Body> {
         self.set.as_ref()
     }
 
@@ -115,7 +115,7 @@ impl Sizes {
     pub(crate) fn edited(&mut self, model: &Model, map: &JointMap) {
         self.reported.bind(map);
         self.girths.clear();
-        self.outlines.clear();
+        self.color_girths.clear();
         self.set = self.set.is_some().then(|| model.body.clone());
         if !self.pairs.is_empty() {
             self.follow_lengths(model);
@@ -129,45 +129,45 @@ impl Sizes {
     }
 
     /// Fits the sizes to the first frame after a reset, whose pose is known.
-    pub(crate) fn initialise(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
+    pub(crate) fn initialize(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
         if !self.open {
             return;
         }
         self.open = false;
         if setting.config.fit_lengths {
-            equalise_limb_lengths(setting, model, poses, fit);
+            equalize_limb_lengths(setting, model, poses, fit);
         }
         if setting.config.fit_girths {
             self.fit_girths(setting, model, poses, fit);
-            self.outlines.start(setting, model, poses, fit);
+            self.color_girths.start(setting, model, poses, fit);
         }
     }
 
     fn fit_girths(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         self.girths = vec![Girth::default(); poses.len()];
         let mut totals = vec![GirthFit::default(); poses.len()];
-        let mut seen = Vec::new();
+        let mut edges_found = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known: what is closest is what was seen.
-            fit.match_points(setting.of(model), poses, &START_GATE);
+            fit.match_points(setting.with_model(model), poses, &START_GATE);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = model.body.limbs()[limb].shape;
-                seen.clear();
-                for view in setting.seen.views.iter() {
+                edges_found.clear();
+                for view in setting.observation.views.iter() {
                     edges(&view, &model.body.limbs()[limb], &poses[limb], |edge| {
                         // Beyond the rim, the edge may be another limb's.
-                        if edge.seen <= edge.rim || model.body.closest_limb(poses, edge.place) == limb {
-                            seen.push(edge);
+                        if edge.reach <= edge.rim || model.body.closest_limb(poses, edge.place) == limb {
+                            edges_found.push(edge);
                         }
                     });
                 }
-                if let Some(tip) = seen.iter().find(|edge| edge.side == Vec3::Z) {
-                    let longer = 1.0 + (tip.seen - tip.rim) / shape.length();
+                if let Some(tip) = edges_found.iter().find(|edge| edge.side == Vec3::Z) {
+                    let longer = 1.0 + (tip.reach - tip.rim) / shape.length();
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let matches = &fit.correspondences().limbs[limb];
-                let Some(step) = girth_step(&shape, matches, &poses[limb], &seen, total) else { continue };
-                let (sum, step) = total.then(&step);
+                let Some(step) = girth_step(&shape, matches, &poses[limb], &edges_found, total) else { continue };
+                let (sum, step) = total.followed_by(&step);
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
@@ -190,13 +190,13 @@ impl Sizes {
     ) {
         if !(self.pairs.is_empty() && self.girths.is_empty()) && setting.config.max_steps >= CONTOUR_FROM {
             // Sizes follow the contour.
-            fit.match_contour(setting.of(model), poses);
+            fit.match_contour(setting.with_model(model), poses);
         }
         if !self.pairs.is_empty() && !reliance.lost {
             self.refine_lengths(setting, model, poses, predicted, fit);
         }
         if reliance.girths {
-            self.outlines.follow(setting, model, poses, fit);
+            self.color_girths.follow(setting, model, poses, fit);
         }
         if reliance.girths {
             self.refine_girths(model, fit, reliance.limb);
@@ -216,11 +216,11 @@ impl Sizes {
         change.clear();
         pull.clear();
         for (pair, stretched) in pairs.iter().zip(stretched.iter()) {
-            let (factor, information) = reported.of(pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
+            let (factor, information) = reported.factor(pair[0]).unwrap_or((1.0, LENGTH_INFORMATION[1]));
             change.push(factor - stretched);
             pull.push(information);
         }
-        if !fit.lengths(setting.of(model), predicted, poses, pairs, pull, change) {
+        if !fit.lengths(setting.with_model(model), predicted, poses, pairs, pull, change) {
             return;
         }
         let [shortest, longest] = LENGTH_FACTORS;
@@ -249,7 +249,7 @@ impl Sizes {
     }
 }
 
-/// What may be learnt from a frame.
+/// What may be learned from a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reliance<F> {
     /// The body was lost.
@@ -291,10 +291,10 @@ mod tests {
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
         sizes.restart(&model, Start::Positions, config);
         with_setting(&pixels, config, &before, &start, |setting| {
-            sizes.initialise(setting, &mut model, &mut poses, &mut fit);
+            sizes.initialize(setting, &mut model, &mut poses, &mut fit);
             // The next frame is not the first.
             let fitted = (model.body.clone(), poses.clone());
-            sizes.initialise(setting, &mut model, &mut poses, &mut fit);
+            sizes.initialize(setting, &mut model, &mut poses, &mut fit);
             assert_eq!((&model.body, &poses), (&fitted.0, &fitted.1));
         });
         model.body
@@ -338,13 +338,13 @@ mod tests {
         let ratios = |found: &Body| {
             ["thigh", "calf"].map(|name| length(found, &format!("l_{name}")) / length(&body, &format!("r_{name}")))
         };
-        let near = |ratios: [f64; 2], wanted: f64| ratios.iter().all(|ratio| (ratio - wanted).abs() < 1e-6);
+        let near = |ratios: [f64; 2], expected: f64| ratios.iter().all(|ratio| (ratio - expected).abs() < 1e-6);
         let (wrong, real) =
             (ratios(&first_frame(&body, &short, &config)), ratios(&first_frame(&short, &short, &config)));
-        let asked = ratios(&first_frame(&body, &short, &Config { fit_lengths: false, ..config.clone() }));
+        let girth_system = ratios(&first_frame(&body, &short, &Config { fit_lengths: false, ..config.clone() }));
         // What differs by less may be a person's.
         let little = ratios(&first_frame(&body, &changed(&body, &left, 0.9, 1.0), &config));
-        assert!(near(wrong, 1.0) && near(real, 0.85) && near(asked, 0.85) && near(little, 0.9));
+        assert!(near(wrong, 1.0) && near(real, 0.85) && near(girth_system, 0.85) && near(little, 0.9));
         // Joints that were set wrong turn it as well.
         for turns in [[0.0, 0.5], [0.3, -0.3], [-0.2, 0.4]] {
             let mut poses = stand(&short);
@@ -367,7 +367,7 @@ mod tests {
         for _ in 0..frames {
             let (before, predicted) = (model.clone(), poses.clone());
             with_setting(&pixels, config, &before, &predicted, |setting| {
-                fit.run(setting.of(&model), &predicted, &mut poses);
+                fit.run(setting.with_model(&model), &predicted, &mut poses);
                 let reliance = Reliance { lost, girths: true, limb: |_| true };
                 sizes.refine(setting, &mut model, &mut poses, &predicted, &mut fit, reliance);
             });
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_draw_the_lengths_to_what_is_seen() {
+    fn frames_draw_the_lengths_to_what_is_visible() {
         let body = standing().0.body;
         let names = ["l_thigh", "r_thigh", "l_calf", "r_calf"];
         for wrong in [0.92, 1.08] {
@@ -405,7 +405,7 @@ mod tests {
         for _ in 0..20 {
             let (before, predicted) = (model.clone(), poses.clone());
             with_setting(&pixels, &config, &before, &predicted, |setting| {
-                fit.run(setting.of(&model), &predicted, &mut poses);
+                fit.run(setting.with_model(&model), &predicted, &mut poses);
                 let reliance = Reliance { lost: false, girths: true, limb: left };
                 sizes.refine(setting, &mut model, &mut poses, &predicted, &mut fit, reliance);
             });

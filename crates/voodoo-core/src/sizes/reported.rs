@@ -9,7 +9,7 @@ const KNOWN: f64 = 0.03;
 /// Logarithms of lengths, numbered as the detector does.
 #[derive(Debug, Default)]
 pub(super) struct ReportedLengths {
-    lengths: Vec<Estimate>,
+    lengths: Vec<LengthEstimate>,
     /// The length of every limb, and which one is the stature.
     of_limb: Vec<Option<usize>>,
     stature: Option<usize>,
@@ -17,7 +17,7 @@ pub(super) struct ReportedLengths {
 
 /// One of them.
 #[derive(Clone, Copy, Debug, Default)]
-struct Estimate {
+struct LengthEstimate {
     /// Of the look that set the sizes.
     set: f64,
     /// Of all looks, and the information of the surest of them.
@@ -35,7 +35,7 @@ impl ReportedLengths {
     /// as much as the surest of them.
     pub(super) fn update(&mut self, detected: Detected) {
         let reported = &detected.detection.lengths;
-        self.lengths.resize(self.lengths.len().max(reported.len()), Estimate::default());
+        self.lengths.resize(self.lengths.len().max(reported.len()), LengthEstimate::default());
         for ([length, sigma], known) in reported.iter().zip(&mut self.lengths) {
             let (length, information, before) = (length.ln(), 1.0 / (sigma * sigma), known.information);
             if before == 0.0 {
@@ -62,7 +62,7 @@ impl ReportedLengths {
 
     /// By how much longer a limb is than the sizes were set, as all looks report, and the information of that against a frame's, whose
     /// points err alike; none of what was not reported.
-    pub(super) fn of(&self, limb: usize) -> Option<(f64, f64)> {
+    pub(super) fn factor(&self, limb: usize) -> Option<(f64, f64)> {
         let known = self.lengths.get(self.of_limb.get(limb).copied().flatten()?)?;
         (known.information > 0.0).then(|| ((known.mean - known.set).exp(), ALIKE * known.information))
     }
@@ -75,34 +75,34 @@ mod tests {
     use crate::detect::Detection;
 
     /// What is reported of the thigh after looks at somebody: factor and information, and whether the sizes are uncertain.
-    fn reported(looks: &[[f64; 2]]) -> (f64, f64, bool) {
+    fn reported(detections: &[[f64; 2]]) -> (f64, f64, bool) {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let names = ["stature", "thigh", "trunk"].map(String::from);
         let map = JointMap::new(&body, &[], &names);
         let mut lengths = ReportedLengths::default();
         assert!(!lengths.is_uncertain(), "nobody was found");
-        for look in looks {
-            let detection = Detection { lengths: vec![*look; names.len()], ..Detection::default() };
+        for given in detections {
+            let detection = Detection { lengths: vec![*given; names.len()], ..Detection::default() };
             lengths.update(Detected { detection: &detection, map: &map });
         }
-        let of = |limb| body.limb_index(limb).ok().and_then(|limb| lengths.of(limb));
-        let (factor, information) = of("l_thigh").unwrap_or((f64::NAN, f64::NAN));
-        assert_eq!(of("pelvis"), of("thorax"));
-        assert_eq!(of("l_calf"), None, "no shank is reported");
+        let factor_of = |limb| body.limb_index(limb).ok().and_then(|limb| lengths.factor(limb));
+        let (factor, information) = factor_of("l_thigh").unwrap_or((f64::NAN, f64::NAN));
+        assert_eq!(factor_of("pelvis"), factor_of("thorax"));
+        assert_eq!(factor_of("l_calf"), None, "no shank is reported");
         (factor, information, lengths.is_uncertain())
     }
 
     #[test]
-    fn who_stands_up_is_as_tall_as_the_surer_looks_say_and_looks_that_follow_are_worth_no_more() {
+    fn who_stands_up_is_as_tall_as_the_surer_detections_report_and_later_ones_that_follow_are_worth_no_more() {
         let (sitting, standing) = ([1.0, 0.05], [0.9, 0.02]);
         let (factor, information, uncertain) = reported(&[sitting; 9]);
         assert!((factor - 1.0).abs() < 1e-12 && (information - ALIKE / 0.0025).abs() < 1e-6 && uncertain);
-        let mut looks = vec![sitting; 9];
-        looks.extend([standing; 2]);
-        let (factor, information, uncertain) = reported(&looks);
+        let mut detections = vec![sitting; 9];
+        detections.extend([standing; 2]);
+        let (factor, information, uncertain) = reported(&detections);
         assert!((0.9..0.91).contains(&factor) && (information - ALIKE / 0.0004).abs() < 1e-6 && !uncertain, "{factor}");
-        looks.push(sitting);
-        let (again, after, uncertain) = reported(&looks);
+        detections.push(sitting);
+        let (again, after, uncertain) = reported(&detections);
         assert!(again - factor < 0.02 && after == information && !uncertain, "{again} after {factor}");
     }
 

@@ -135,9 +135,9 @@ fn list_screws(body: &Body, poses: &[Pose], screws: &mut Vec<Vector6<f64>>) {
     screws.extend((0..6).map(|i| Vector6::ith(i, 1.0)));
     for limb in &body.limbs()[1..] {
         if let Some((parent, joint)) = &limb.parent {
-            let centre = poses[*parent] * joint.parent_from_joint.translation;
+            let center = poses[*parent] * joint.parent_from_joint.translation;
             let (axes, count) = joint_axes(joint, &poses[*parent]);
-            screws.extend(axes[..count].iter().map(|axis| screw(*axis, centre)));
+            screws.extend(axes[..count].iter().map(|axis| screw(*axis, center)));
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::association::correspondence::LimbMatches;
 use crate::config::Config;
 use crate::math::{Mat3, Moments, Pose, Vec3};
 
-/// Lever of the wish not to turn where the pairs fix no rotation, metres: the girth of a limb.
+/// Lever of the wish not to turn where the pairs fix no rotation, meters: the girth of a limb.
 const STAY: f64 = 0.05;
 
 /// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
@@ -22,24 +22,24 @@ impl Solver for Limbwise {
         let correspondences = problem.correspondences;
         for (limb, pose) in poses.iter_mut().enumerate() {
             // Moments about the limb's own position keep the sums well conditioned.
-            let centre = pose.translation;
-            let mut moments = surface_moments(&correspondences.limbs[limb], centre);
+            let center = pose.translation;
+            let mut moments = surface_moments(&correspondences.limbs[limb], center);
             for pair in correspondences.sites.iter().filter(|pair| pair.limb == limb) {
-                moments.add(pair.weight, pair.x - centre, pair.p - centre);
+                moments.add(pair.weight, pair.x - center, pair.p - center);
             }
             for band in &correspondences.bands {
                 // The same band twice, once for each limb it joins: the partner's end is the datum (K07 4.3).
                 if band.child == limb {
-                    moments.add(band.child_weight, band.on_child - centre, band.on_parent - centre);
+                    moments.add(band.child_weight, band.on_child - center, band.on_parent - center);
                 }
                 if band.parent == limb {
-                    moments.add(band.parent_weight, band.on_parent - centre, band.on_child - centre);
+                    moments.add(band.parent_weight, band.on_parent - center, band.on_child - center);
                 }
             }
             if let Some(motion) = moments.absolute_orientation(STAY) {
                 let rotation = (motion.rotation * pose.rotation).normalize();
-                // x - centre = 0 at the limb's own position, so its image is the motion's translation.
-                *pose = Pose::from_parts(centre + motion.translation, rotation);
+                // x - center = 0 at the limb's own position, so its image is the motion's translation.
+                *pose = Pose::from_parts(center + motion.translation, rotation);
             }
         }
     }
@@ -65,11 +65,11 @@ impl Solver for Limbwise {
     }
 }
 
-/// Moments of the surface matches of one limb about `centre`, four lanes wide so that they vectorise.
-fn surface_moments(matches: &LimbMatches, centre: Vec3) -> Moments {
+/// Moments of the surface matches of one limb about `center`, four lanes wide so that they vectorize.
+fn surface_moments(matches: &LimbMatches, center: Vec3) -> Moments {
     /// Sums side by side: one SIMD register of double precision, in AVX2.
     const WIDE: usize = 4;
-    let c = centre.to_array().map(|value| value as f32);
+    let c = center.to_array().map(|value| value as f32);
     let (x, p) = (&matches.surface.points, &matches.measured);
     let count = matches.weight.len();
     // w, w x, w p, w p x^T

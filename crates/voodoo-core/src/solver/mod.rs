@@ -24,7 +24,7 @@ use crate::config::{Config, SolverKind};
 use crate::math::Pose;
 use crate::observation::frame::Ground;
 
-/// Largest turn of a joint or limb in one step, radians: linearised rows hold no farther.
+/// Largest turn of a joint or limb in one step, radians: linearized rows hold no farther.
 const LARGEST_TURN: f64 = 0.5;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;

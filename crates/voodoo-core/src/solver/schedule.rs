@@ -13,9 +13,9 @@ pub(crate) fn narrowed(start: f64, end: f64, step: usize) -> f64 {
 /// Which points may be matched in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gate {
-    /// Enlargement of the limb boxes, metres.
+    /// Enlargement of the limb boxes, meters.
     pub box_margin: f64,
-    /// Greatest distance of a point from its limb's surface, metres.
+    /// Greatest distance of a point from its limb's surface, meters.
     pub distance: f64,
 }
 

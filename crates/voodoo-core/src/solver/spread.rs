@@ -44,14 +44,14 @@ impl ChainSolver {
     ) -> bool {
         self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
-        known.iter_mut().zip(&self.h).for_each(|(known, told)| *known += told);
+        known.iter_mut().zip(&self.h).for_each(|(known, added)| *known += added);
         self.h.copy_from_slice(known);
         factor(&mut self.h, self.chain.freedoms)
     }
 }
 
 impl Spread {
-    /// Covariance of the pose of a limb about the `origin` of its frame: a turn in world axes (radians), then a shift (metres).
+    /// Covariance of the pose of a limb about the `origin` of its frame: a turn in world axes (radians), then a shift (meters).
     pub(crate) fn of_limb(&mut self, solver: &ChainSolver, limb: usize, origin: Vec3) -> Matrix6<f64> {
         self.list(solver, limb);
         for unknown in &self.moving {

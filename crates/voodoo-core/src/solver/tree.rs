@@ -27,7 +27,7 @@ pub(crate) struct TreeSolver {
 
 impl TreeSolver {
     /// One damped step from the normal equations at `poses`, `stride` times as far; `band_sigma` is a band's standard deviation,
-    /// metres.
+    /// meters.
     pub(crate) fn step(
         &mut self,
         body: &Body,
@@ -125,9 +125,9 @@ impl TreeSolver {
 }
 
 /// Ends of the bands that hold a joint together, joint frame: a hinge's two, so that it turns about its axis only, else one
-/// at the centre. Strong bands at the four ends of an ellipse would let it turn no more; how far it may is the limits' say.
+/// at the center. Strong bands at the four ends of an ellipse would let it turn no more; how far it may is the limits' say.
 fn bands(joint: &Joint) -> impl Iterator<Item = Vec3> + use<> {
     let count = if joint.kind() == JointKind::Hinge { 2 } else { 1 };
-    let centre = joint.kind() == JointKind::Elliptic;
-    joint.band_points().take(count).map(move |end| if centre { Vec3::ZERO } else { end })
+    let center = joint.kind() == JointKind::Elliptic;
+    joint.band_points().take(count).map(move |end| if center { Vec3::ZERO } else { end })
 }

@@ -17,7 +17,7 @@ use crate::terms::{Limits, Prior, Sites, Surface, Term};
 /// Information of the heaviest site in surface points of weight one. Only the proportions of weights matter in this solver,
 /// and the limbs' own points have their say afterwards.
 const DRIVING_INFORMATION: f64 = 2.0;
-/// Scale of the kernel, metres: sites that drive come from far.
+/// Scale of the kernel, meters: sites that drive come from far.
 const SCALE: f64 = 0.5;
 
 /// Damped Gauss-Newton steps on the sites, and the points where they are matched before.
@@ -53,7 +53,7 @@ impl WarmStart {
         self.following.contains(&true)
     }
 
-    /// Whether sites farther than `from` metres from where they were seen lead their limbs alone in this frame.
+    /// Whether sites farther than `from` meters from where they were seen lead their limbs alone in this frame.
     pub(crate) fn drives_far(&mut self, problem: &Problem, from: f64) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;

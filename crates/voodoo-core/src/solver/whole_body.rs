@@ -12,7 +12,7 @@ use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term};
 
-/// Standard deviation of an axis that lies in another limb or below the floor, metres.
+/// Standard deviation of an axis that lies in another limb or below the floor, meters.
 const OVERLAP_SIGMA: f64 = 0.03;
 /// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
@@ -35,9 +35,9 @@ const LEAST_MOTION: f64 = 0.1;
 const POSTURE: f64 = 1.0;
 /// Information that holds a length's relative change back in one frame, and that draws it to the length set.
 pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
-/// Least scale of the kernel of sites, metres: they were gated before, and a limb that is lost comes from far.
+/// Least scale of the kernel of sites, meters: they were gated before, and a limb that is lost comes from far.
 pub(crate) const SITE_SCALE: f64 = 0.15;
-/// Sites farther than this from their measurement drive the chain before the points are assigned, metres; rounds of it.
+/// Sites farther than this from their measurement drive the chain before the points are assigned, meters; rounds of it.
 const DRIVEN_FROM: f64 = 0.25;
 const WARM_START_ROUNDS: usize = 4;
 
@@ -55,16 +55,16 @@ pub(crate) struct WholeBody {
     rests: Vec<f64>,
     /// Weight of the sites on each limb and beyond it.
     sites: Vec<f64>,
-    /// Weight of the edges of colours on each limb.
+    /// Weight of the edges of colors on each limb.
     edges: Vec<f64>,
     /// A sphere around each limb.
     spheres: Vec<(Vec3, f64)>,
-    calm: Calm,
+    stillness: Stillness,
 }
 
 /// How calm the root and the joints are, as the step has said in which a frame began to hold them, and the last step.
 #[derive(Debug, Default)]
-struct Calm {
+struct Stillness {
     joints: Vec<f64>,
     step: usize,
     holds: Vec<f64>,
@@ -124,20 +124,20 @@ impl WholeBody {
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
         let root = [config.root_turn_sigma, config.root_shift_sigma]
             .map(|sigma| sigma * problem.time_scale * config.motion_scale);
-        let edge_information = 1.0 / (config.outline_sigma * config.outline_sigma);
+        let edge_information = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
         let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
         let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
         let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
         let regions = Regions { pairs: &correspondences.regions };
         let gain = still_prior_gain(problem, information);
         let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
-        let holds = self.calm.holds(problem, &free, poses, gain);
+        let holds = self.stillness.prior_gains(problem, &free, poses, gain);
         let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
         self.spheres.clear();
         self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
-        let posture = Posture { share: POSTURE * config.motion_scale };
+        let posture = Posture { fraction: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The objective: one more term is a file and a line here.
         let terms: [Option<&dyn Term>; 9] = [
@@ -187,33 +187,37 @@ impl WholeBody {
             let motion = if contours_alone { motion.max(LEAST_MOTION) } else { motion };
             // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
-            let shown = (measured / FREE_WEIGHT).min(1.0);
+            let measured_fraction = (measured / FREE_WEIGHT).min(1.0);
             let end = part.match_caps[1] && !contours_alone;
             let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
-            self.rests.push(if rests { ((1.0 - shown) * TO_REST * problem.time_scale).min(1.0) } else { 0.0 });
-            let shown = shown.max(HIDDEN_MOTION);
-            self.joint_sigmas.push(motion * shown * problem.time_scale * problem.config.motion_scale);
+            self.rests.push(if rests {
+                ((1.0 - measured_fraction) * TO_REST * problem.time_scale).min(1.0)
+            } else {
+                0.0
+            });
+            let measured_fraction = measured_fraction.max(HIDDEN_MOTION);
+            self.joint_sigmas.push(motion * measured_fraction * problem.time_scale * problem.config.motion_scale);
         }
     }
 }
 
-impl Calm {
+impl Stillness {
     /// How much tighter the root and each joint are held in this step, at most by `gain`.
-    fn holds(&mut self, problem: &Problem, prior: &Prior, poses: &[Pose], gain: f64) -> &[f64] {
+    fn prior_gains(&mut self, problem: &Problem, prior: &Prior, poses: &[Pose], gain: f64) -> &[f64] {
         let Self { joints, step, holds } = self;
         // A frame, and every hypothesis in it, begins with an earlier step than the last one before.
         let anew = problem.step <= *step || joints.len() != poses.len();
         *step = problem.step;
         if anew || problem.step == STILL_FROM {
-            prior.calm(problem.body, poses, joints);
+            prior.stillness(problem.body, poses, joints);
         }
         holds.clear();
-        holds.extend(joints.iter().map(|calm| gain * calm));
+        holds.extend(joints.iter().map(|stillness| gain * stillness));
         holds
     }
 }
 
-/// Whether edges of colours are matched and no points.
+/// Whether edges of colors are matched and no points.
 fn contours_alone(problem: &Problem) -> bool {
     let Problem { correspondences, .. } = problem;
     !correspondences.regions.is_empty() && correspondences.limbs.iter().all(|matches| matches.candidate.is_empty())

@@ -13,7 +13,7 @@ pub(crate) struct Contour<'a> {
     pub pairs: &'a [ContourPair],
     /// Information of an edge, 1/m^2.
     pub information: f64,
-    /// Scale of the kernel, metres.
+    /// Scale of the kernel, meters.
     pub scale: f64,
 }
 

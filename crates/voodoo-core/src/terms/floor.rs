@@ -12,7 +12,7 @@ use crate::terms::normal_equations::{NormalEquations, line};
 pub(crate) struct Floor {
     /// The floor, in the frame of the poses.
     pub plane: Ground,
-    /// Standard deviation of the depth below it, metres.
+    /// Standard deviation of the depth below it, meters.
     pub sigma: f64,
 }
 

@@ -9,14 +9,14 @@ use crate::terms::normal_equations::NormalEquations;
 
 /// Where on a limb's axis overlap is felt, as shares of the length: both ends, and two places between.
 const FELT: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
-/// Error of `approximate_distance` that is allowed for before the exact distance is asked, metres.
+/// Error of `approximate_distance` that is allowed for before the exact distance is asked, meters.
 const APPROXIMATE: f64 = 0.01;
 
 /// One-sided: `r = max(0, -distance)` for every felt point against every limb that is neither joined to its
 /// own nor hangs on the same parent. Those overlap at their joints in any pose.
 #[derive(Debug)]
 pub(crate) struct Penetration<'a> {
-    /// Standard deviation of the overlap, metres.
+    /// Standard deviation of the overlap, meters.
     pub sigma: f64,
     /// [`TaperedEllipticCylinder::sphere`] of every limb: most are far from each other.
     pub spheres: &'a [(Vec3, f64)],
@@ -27,7 +27,7 @@ impl Term for Penetration<'_> {
         let limbs = body.limbs();
         for first in 1..limbs.len() {
             for second in 0..first {
-                if meet(self.spheres[first], self.spheres[second]) && body.apart(first, second) {
+                if overlap(self.spheres[first], self.spheres[second]) && body.are_apart(first, second) {
                     self.add_points(body, poses, [first, second], normal);
                     self.add_points(body, poses, [second, first], normal);
                 }
@@ -43,10 +43,10 @@ impl Penetration<'_> {
         let weight = 1.0 / (self.sigma * self.sigma);
         let start = poses[other].inverse_transform_point(poses[limb].translation);
         let along = poses[other].rotation.inverse() * (poses[limb].rotation * Vec3::Z);
-        for share in FELT {
-            let z = share * shape.length();
+        for fraction in FELT {
+            let z = fraction * shape.length();
             let local = start + along * z;
-            if far(surface, local) || surface.approximate_distance(local) > APPROXIMATE {
+            if is_outside_box(surface, local) || surface.approximate_distance(local) > APPROXIMATE {
                 continue;
             }
             let found = surface.closest_point(local);
@@ -65,7 +65,7 @@ impl Penetration<'_> {
 }
 
 /// Whether a point, limb frame, lies outside the box around the shape.
-fn far(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
+fn is_outside_box(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
     q.x.abs() > shape.a0().max(shape.a1())
         || q.y.abs() > shape.b0().max(shape.b1())
         || q.z < 0.0
@@ -73,6 +73,6 @@ fn far(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
 }
 
 /// Whether two spheres meet.
-fn meet((from, reach): (Vec3, f64), (to, other_reach): (Vec3, f64)) -> bool {
+fn overlap((from, reach): (Vec3, f64), (to, other_reach): (Vec3, f64)) -> bool {
     (to - from).length_squared() < (reach + other_reach).powi(2)
 }

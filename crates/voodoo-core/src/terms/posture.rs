@@ -1,6 +1,6 @@
 //! A usual posture: joints that turn little are drawn to where they are at rest.
 //!
-//! Edges of colours err alike, and what two cameras see from opposite sides says hardly anything of a turn along their line of
+//! Edges of colors err alike, and what two cameras see from opposite sides says hardly anything of a turn along their line of
 //! sight: a pelvis turns, a spine twists a little farther with every frame, and nothing turns it back.
 
 use super::Term;
@@ -17,7 +17,7 @@ const SWINGS: f64 = 1.7;
 #[derive(Debug)]
 pub(crate) struct Posture {
     /// Standard deviation of each component of a joint's turn, as a share of half of what it may turn in all.
-    pub share: f64,
+    pub fraction: f64,
 }
 
 impl Term for Posture {
@@ -31,7 +31,7 @@ impl Term for Posture {
                 if !(range > 0.0 && range < SWINGS) {
                     continue;
                 }
-                let sigma = 0.5 * range * self.share;
+                let sigma = 0.5 * range * self.fraction;
                 let weight = 1.0 / (sigma * sigma);
                 // At rest the turn is none, or as little as the limits let it be.
                 let off = v[axis] - 0.0_f64.clamp(*low, *high);
@@ -50,7 +50,7 @@ mod tests {
     fn cost(body: &Body, poses: &[Pose]) -> f64 {
         let mut normal = NormalEquations::default();
         normal.clear(poses.len());
-        Posture { share: 0.25 }.add(body, poses, &mut normal);
+        Posture { fraction: 0.25 }.add(body, poses, &mut normal);
         normal.cost
     }
 

@@ -1,7 +1,7 @@
 //! Prediction and smoothness (R07 eq. 16-18, 26): the root's twist and every joint's turn are drawn to the predicted ones.
 //!
 //! R07's penalty is quadratic: what is strong enough for a body at rest makes a fast one late. Here every joint is held tighter the
-//! less it wants to deviate from what is expected ([`Prior::calm`]): a small deviation is taken for noise. That is decided once
+//! less it wants to deviate from what is expected ([`Prior::stillness`]): a small deviation is taken for noise. That is decided once
 //! a frame, by where the measurements alone have moved the joint; judged anew in every step, what is held deviates less and is
 //! held tighter still, until it sticks where it happened to be in the frame before.
 
@@ -14,14 +14,14 @@ use crate::terms::normal_equations::NormalEquations;
 /// Deviation, in standard deviations of expected motion, at which a joint is held by a quarter: what is smaller counts as noise.
 const WELL: f64 = 0.6;
 /// Share of it that holds the root: what all limbs agree on is less likely noise.
-const ROOT_SHARE: f64 = 0.2;
+const ROOT_FRACTION: f64 = 0.2;
 
 /// Deviation from a predicted pose.
 #[derive(Debug)]
 pub(crate) struct Prior<'a> {
     /// Predicted poses, working frame.
     pub predicted: &'a [Pose],
-    /// Standard deviations of the root: radians, metres.
+    /// Standard deviations of the root: radians, meters.
     pub root: [f64; 2],
     /// Standard deviation of each joint's turn, radians.
     pub joints: &'a [f64],
@@ -32,16 +32,16 @@ pub(crate) struct Prior<'a> {
 }
 
 impl Prior<'_> {
-    /// How calm the root (first) and each joint are, into `calm`: 1 where they are as expected, 0 where they move.
-    pub(crate) fn calm(&self, body: &Body, poses: &[Pose], calm: &mut Vec<f64>) {
-        let share = |deviation: f64| geman_mcclure(deviation, WELL).1;
-        calm.clear();
-        calm.extend(body.limbs().iter().enumerate().map(|(index, limb)| match &limb.parent {
+    /// How calm the root (first) and each joint are, into `stillness`: 1 where they are as expected, 0 where they move.
+    pub(crate) fn stillness(&self, body: &Body, poses: &[Pose], stillness: &mut Vec<f64>) {
+        let fraction = |deviation: f64| geman_mcclure(deviation, WELL).1;
+        stillness.clear();
+        stillness.extend(body.limbs().iter().enumerate().map(|(index, limb)| match &limb.parent {
             None => {
                 let (r, d) = self.root_deviation(poses);
-                share((r.length() / self.root[0]).hypot(d.length() / self.root[1]))
+                fraction((r.length() / self.root[0]).hypot(d.length() / self.root[1]))
             }
-            Some((parent, joint)) => share(self.turn(poses, *parent, index, joint).length() / self.joints[index]),
+            Some((parent, joint)) => fraction(self.turn(poses, *parent, index, joint).length() / self.joints[index]),
         }));
     }
 
@@ -55,8 +55,8 @@ impl Prior<'_> {
     fn turn(&self, poses: &[Pose], parent: usize, limb: usize, joint: &Joint) -> Vec3 {
         let relative = |poses: &[Pose]| poses[parent].rotation.inverse() * poses[limb].rotation;
         let expected = match self.rests.get(limb) {
-            Some(share) if *share > 0.0 => {
-                relative(self.predicted).slerp(joint.parent_from_limb_at_rest().rotation, *share)
+            Some(fraction) if *fraction > 0.0 => {
+                relative(self.predicted).slerp(joint.parent_from_limb_at_rest().rotation, *fraction)
             }
             _ => relative(self.predicted),
         };
@@ -70,7 +70,7 @@ impl Term for Prior<'_> {
         let (r, d) = self.root_deviation(poses);
         let hold = |index: usize| self.holds.get(index).copied().unwrap_or(0.0);
         let (turn, shift) =
-            (information(self.root[0], ROOT_SHARE * hold(0)), information(self.root[1], ROOT_SHARE * hold(0)));
+            (information(self.root[0], ROOT_FRACTION * hold(0)), information(self.root[1], ROOT_FRACTION * hold(0)));
         normal.cost += turn * r.length_squared() + shift * d.length_squared();
         let block = &mut normal.limbs[0];
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Edges of colour regions (R07 section 3): each a distance along one direction, as certain as its colours are.
+//! Edges of color regions (R07 section 3): each a distance along one direction, as certain as its colors are.
 
 use super::Term;
 use crate::association::correspondence::RegionPair;

@@ -6,14 +6,14 @@ use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
-/// All site pairs; `scale` is the kernel's, metres.
+/// All site pairs; `scale` is the kernel's, meters.
 #[derive(Debug)]
 pub(crate) struct Sites<'a> {
     /// The pairs.
     pub correspondences: &'a Correspondences,
     /// Information of a pair of weight one, 1/m^2.
     pub information: f64,
-    /// Scale of the kernel, metres.
+    /// Scale of the kernel, meters.
     pub scale: f64,
     /// Whether sites with a bias count: one that may always be off can move a limb, but not tell how long it is.
     pub biased: bool,

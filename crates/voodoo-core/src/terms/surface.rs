@@ -15,7 +15,7 @@ pub(crate) struct Surface<'a> {
     pub information: f64,
     /// Share of the information across the normal: it stops sliding.
     pub tangential_weight: f64,
-    /// Scale of the kernel, metres.
+    /// Scale of the kernel, meters.
     pub scale: f64,
 }
 
@@ -38,17 +38,17 @@ impl Term for Surface<'_> {
     }
 }
 
-type Lanes = [f32; LANES];
+type SurfaceLanes = [f32; LANES];
 
 /// Sums over the points of a limb, each split into lanes. Points lie near the working frame's origin and are single
 /// precision themselves: so are their sums.
 struct Sums {
-    cost: Lanes,
+    cost: SurfaceLanes,
     /// Lower triangle of the point-to-plane information, row by row.
-    plane: [Lanes; 21],
-    gradient: [Lanes; 6],
+    plane: [SurfaceLanes; 21],
+    gradient: [SurfaceLanes; 6],
     /// The isotropic part: w, w x, w x x^T (upper triangle).
-    iso: [Lanes; 10],
+    iso: [SurfaceLanes; 10],
 }
 
 impl Surface<'_> {
@@ -73,7 +73,7 @@ impl Surface<'_> {
         ];
         let count = matches.weight.len() / LANES;
         let [x, y, z, nx, ny, nz, distance, weight] = columns.map(|column| &column.as_chunks::<LANES>().0[..count]);
-        // Spelt out: an array's `map` within the loop is not inlined.
+        // Spelled out: an array's `map` within the loop is not inlined.
         for i in 0..count {
             self.sum_block([x[i], y[i], z[i], nx[i], ny[i], nz[i], distance[i], weight[i]], &mut sums);
         }
@@ -91,7 +91,7 @@ impl Surface<'_> {
     }
 
     #[inline(always)]
-    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: [Lanes; 8], sums: &mut Sums) {
+    fn sum_block(&self, [x, y, z, nx, ny, nz, distance, weight]: [SurfaceLanes; 8], sums: &mut Sums) {
         let (information, tangential) = (self.information as f32, self.tangential_weight as f32);
         let inverse_square = (1.0 / (self.scale * self.scale)) as f32;
         let (mut pull, mut plane, mut iso) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -131,7 +131,7 @@ impl Surface<'_> {
 }
 
 #[inline(always)]
-fn product(left: &Lanes, right: &Lanes) -> Lanes {
+fn product(left: &SurfaceLanes, right: &SurfaceLanes) -> SurfaceLanes {
     let mut found = [0.0; LANES];
     for l in 0..LANES {
         found[l] = left[l] * right[l];
@@ -140,7 +140,7 @@ fn product(left: &Lanes, right: &Lanes) -> Lanes {
 }
 
 #[inline(always)]
-fn add_product(sum: &mut Lanes, left: &Lanes, right: &Lanes) {
+fn add_product(sum: &mut SurfaceLanes, left: &SurfaceLanes, right: &SurfaceLanes) {
     for l in 0..LANES {
         sum[l] += left[l] * right[l];
     }
@@ -149,7 +149,7 @@ fn add_product(sum: &mut Lanes, left: &Lanes, right: &Lanes) {
 impl Sums {
     /// Adds what row `I` of the information and of the gradient gets of a block of points.
     #[inline(always)]
-    fn add_row<const I: usize>(&mut self, row: &[Lanes; 6], plane: &Lanes, pull: &Lanes) {
+    fn add_row<const I: usize>(&mut self, row: &[SurfaceLanes; 6], plane: &SurfaceLanes, pull: &SurfaceLanes) {
         add_product(&mut self.gradient[I], pull, &row[I]);
         let scaled = product(plane, &row[I]);
         let first = I * (I + 1) / 2;
@@ -162,7 +162,7 @@ impl Sums {
 
     /// Adds the sums to a limb's normal equations; returns the cost.
     fn add_to(&self, block: &mut LimbBlock) -> f64 {
-        let total = |lanes: &Lanes| lanes.iter().map(|value| f64::from(*value)).sum::<f64>();
+        let total = |lanes: &SurfaceLanes| lanes.iter().map(|value| f64::from(*value)).sum::<f64>();
         let mut entry = 0;
         for i in 0..6 {
             block.g[i] += total(&self.gradient[i]);

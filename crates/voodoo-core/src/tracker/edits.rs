@@ -51,7 +51,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// Keeps what a colour camera sees of the scene without anybody: pictures with their heights and widths; none: forgets it.
+    /// Keeps what a color camera sees of the scene without anybody: pictures with their heights and widths; none: forgets it.
     pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
         self.fit.regions_mut().set_background(camera, pictures)
     }
@@ -68,9 +68,9 @@ impl Tracker {
         }
         for (index, limb) in model.body.limbs().iter().enumerate() {
             if let Some((parent, joint)) = &limb.parent {
-                let centre = motion.poses[*parent] * joint.parent_from_joint.translation;
+                let center = motion.poses[*parent] * joint.parent_from_joint.translation;
                 let pose = &mut motion.poses[index];
-                pose.translation = centre - pose.rotation * joint.limb_from_joint.translation;
+                pose.translation = center - pose.rotation * joint.limb_from_joint.translation;
             }
         }
         fit.clear();

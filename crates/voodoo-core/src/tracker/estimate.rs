@@ -71,11 +71,11 @@ pub struct SourceReport {
     pub inliers: usize,
     /// Sum of the weights of the matched ones.
     pub weight: f64,
-    /// Root of the weighted mean of their squared distances, metres; NaN without any.
+    /// Root of the weighted mean of their squared distances, meters; NaN without any.
     pub residual: f64,
 }
 
-/// Pose and quality of one frame. World frame, metres, seconds.
+/// Pose and quality of one frame. World frame, meters, seconds.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Estimate {
@@ -97,7 +97,7 @@ pub struct Estimate {
     pub limb_points: Vec<usize>,
     /// Root of the mean squared distance of every limb; NaN without points.
     pub limb_residual: Vec<f64>,
-    /// Distance between the two centres of the joint of every limb to its parent; 0 for the root.
+    /// Distance between the two centers of the joint of every limb to its parent; 0 for the root.
     pub joint_gaps: Vec<f64>,
     /// What each source gave.
     pub sources: Vec<SourceReport>,

@@ -5,7 +5,7 @@ use super::estimate::Estimate;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 
-/// A site that is faster, metres a second, has jumped: it is expected to rest.
+/// A site that is faster, meters a second, has jumped: it is expected to rest.
 const FASTEST_SITE: f64 = 8.0;
 
 /// What is kept of the estimate before the last one.
@@ -49,14 +49,14 @@ impl Tracker {
         })
     }
 
-    /// Where every site is expected at a time, world, metres: the last estimate moved on by the share of its motion that is expected to
+    /// Where every site is expected at a time, world, meters: the last estimate moved on by the share of its motion that is expected to
     /// go on ([`crate::Config::prediction`]).
     ///
     /// # Errors
-    /// [`TrackError::NotInitialised`] without a pose.
+    /// [`TrackError::NotInitialized`] without a pose.
     pub fn expected_sites(&self, stamp: f64) -> Result<Vec<Vec3>, TrackError> {
         if !self.is_started() {
-            return Err(TrackError::NotInitialised);
+            return Err(TrackError::NotInitialized);
         }
         let sites = &self.estimate.sites;
         let Some(LimbMotion { interval, .. }) = self.limb_motion() else { return Ok(sites.clone()) };
@@ -79,7 +79,7 @@ mod tests {
     fn moved(shift: Vec3) -> Tracker {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let mut tracker = Tracker::new(body.clone(), Config { prediction: 0.5, ..Config::default() }).unwrap();
-        assert!(matches!(tracker.expected_sites(0.0), Err(TrackError::NotInitialised)));
+        assert!(matches!(tracker.expected_sites(0.0), Err(TrackError::NotInitialized)));
         tracker.reset_pose(&body.rest_pose(Pose::IDENTITY)).unwrap();
         tracker.before.keep(&tracker.estimate);
         tracker.reset_pose(&body.rest_pose(Pose::from_translation(shift))).unwrap();
@@ -88,13 +88,13 @@ mod tests {
     }
 
     #[test]
-    fn sites_go_on_by_a_share_of_their_motion_and_rest_after_a_jump() {
+    fn sites_go_on_by_a_fraction_of_their_motion_and_rest_after_a_jump() {
         let step = Vec3::new(0.1, -0.02, 0.0);
         let tracker = moved(step);
         let now = tracker.estimate.sites.clone();
-        for (elapsed, share) in [(0.0, 0.0), (0.1, 0.5), (-0.02, -0.1)] {
+        for (elapsed, fraction) in [(0.0, 0.0), (0.1, 0.5), (-0.02, -0.1)] {
             let expected = tracker.expected_sites(0.1 + elapsed).unwrap();
-            assert!(expected.iter().zip(&now).all(|(site, now)| site.distance(*now + share * step) < 1e-12));
+            assert!(expected.iter().zip(&now).all(|(site, now)| site.distance(*now + fraction * step) < 1e-12));
         }
         let jumped = moved(Vec3::new(2.0, 0.0, 0.0));
         assert_eq!(jumped.expected_sites(0.2).unwrap(), jumped.estimate.sites);

@@ -17,10 +17,10 @@ use crate::math::{Pose, Vec3, is_rigid, shifted};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Expectation, Observer};
-use crate::observation::share::Share;
-use crate::relocalize::{Relocalizer, Seen, Sighting};
+use crate::observation::ownership::OwnershipMask;
+use crate::relocalize::{DetectionVerdict, FrameOutcome, Relocalizer};
 use crate::sizes::{Reliance, Sizes, Start};
-use crate::uncertainty::Found;
+use crate::uncertainty::FittedPose;
 use assess::Assessor;
 use estimate::{Estimate, Status};
 use expected::Before;
@@ -73,7 +73,7 @@ impl Tracker {
 
     /// Whether it looks for the body while it has no pose: it has a detector that knows the body.
     pub fn can_search(&self) -> bool {
-        self.relocalizer.finds()
+        self.relocalizer.can_detect()
     }
 
     /// Why the detector could not look in the last step, if it could not. The step went on without detections.
@@ -140,12 +140,12 @@ impl Tracker {
         if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
             return;
         }
-        relocalizer.look(&model.body, frame, motion.poses[0].translation, false, false, false);
-        if relocalizer.weigh(&model.body, &motion.poses, false, false, false) == Some(Seen::Elsewhere) {
-            observer.face(frame);
-            let seen = observer.seen(frame, motion.origin);
-            let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-            let better = relocalizer.try_detected(setting.of(model), fit, &motion.poses, false).is_some();
+        relocalizer.detect(&model.body, frame, motion.poses[0].translation, false, false, false);
+        if relocalizer.compare(&model.body, &motion.poses, false, false, false) == Some(DetectionVerdict::Elsewhere) {
+            observer.find_segmented(frame);
+            let observation = observer.observation(frame, motion.origin);
+            let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
+            let better = relocalizer.try_detected(setting.with_model(model), fit, &motion.poses, false).is_some();
             if better {
                 self.restart_at_detection();
                 return;
@@ -157,11 +157,11 @@ impl Tracker {
 
     /// Starts anew where a detector sees the body, in the sizes it was set in or clearly has; whether it could.
     fn restart_at_detection(&mut self) -> bool {
-        let set = self.sizes.as_set().unwrap_or(&self.model.body);
-        let Some((body, poses)) = self.relocalizer.posed(&self.model, set) else { return false };
-        let (known, itself) = (self.sizes.known(), self.relocalizer.found_itself());
+        let set = self.sizes.initial_body().unwrap_or(&self.model.body);
+        let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
+        let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.is_auto_initialized());
         self.restart(body, poses, !known);
-        self.relocalizer.take_note_of_start(itself);
+        self.relocalizer.record_start(auto_initialized);
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
             self.update_sizes();
@@ -178,10 +178,10 @@ impl Tracker {
 
     /// Looks for a person, and follows the one that is found.
     fn search(&mut self, frame: &Frame) {
-        if let Some((body, poses)) = self.relocalizer.first(frame, &self.model) {
+        if let Some((body, poses)) = self.relocalizer.first_person(frame, &self.model) {
             self.restart(body, poses, true);
-            self.assessor.doubt_pose();
-            self.relocalizer.take_note_of_start(true);
+            self.assessor.distrust_pose();
+            self.relocalizer.record_start(true);
             self.sizes.restart(&self.model, Start::Detected, &self.config);
             self.update_sizes();
             self.follow(frame, None);
@@ -193,17 +193,23 @@ impl Tracker {
     }
 
     /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
-    pub(crate) fn begin(&mut self, frame: &Frame, share: Share, detected: Detected, known: bool) -> bool {
-        // Colours tell persons apart; they are none's alone.
+    pub(crate) fn start_at_detection(
+        &mut self,
+        frame: &Frame,
+        ownership: OwnershipMask,
+        detected: Detected,
+        known: bool,
+    ) -> bool {
+        // Colors tell persons apart; they are none's alone.
         let frame = &Frame { colors: &[], ..*frame };
-        let Some((body, poses)) = self.relocalizer.placed(&self.model, detected, known) else { return false };
+        let Some((body, poses)) = self.relocalizer.place_body(&self.model, detected, known) else { return false };
         self.restart(body, poses, !known);
         self.before.keep(&self.estimate);
-        self.assessor.doubt_pose();
+        self.assessor.distrust_pose();
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
         }
-        self.follow(frame, Some(share));
+        self.follow(frame, Some(ownership));
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
@@ -214,72 +220,74 @@ impl Tracker {
         self.estimate = Estimate { stamp, ..Estimate::default() };
     }
 
-    /// The pose at the next instant (K06 IV-B), by all of a frame or by its `share` of it.
-    fn follow(&mut self, frame: &Frame, share: Option<Share>) {
+    /// The pose at the next instant (K06 IV-B), by all of a frame or by its `ownership` of it.
+    fn follow(&mut self, frame: &Frame, ownership: Option<OwnershipMask>) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
         // Where the body is expected, and what the frame shows there (1).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
-        let searched = relocalizer.searched().filter(|_| config.relocalization);
+        let searched = relocalizer.frames_searched().filter(|_| config.relocalization);
         let Motion { poses, previous, predicted, origin, .. } = motion;
-        let own = relocalizer.own();
+        let own = relocalizer.own_pixels();
         let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched, own };
-        match share {
+        match ownership {
             None => observer.observe(frame, expected, config),
-            Some(share) => observer.observe_share(frame, expected, share, config),
+            Some(ownership) => observer.observe_owned(frame, expected, ownership, config),
         }
-        let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale };
+        let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
         let mut steps = 0;
-        fit.begin_regions(setting.of(model), poses);
+        fit.begin_regions(setting.with_model(model), poses);
         if config.hypotheses && schedule.whole_body && known {
-            steps += hypotheses.follow_second(setting.of(model), fit);
+            steps += hypotheses.follow_branch(setting.with_model(model), fit);
         }
         if sizes.wait_for_pose() {
-            steps += fit.run(setting.of(model), predicted, poses);
+            steps += fit.run(setting.with_model(model), predicted, poses);
         }
-        sizes.initialise(setting, model, poses, fit);
-        steps += fit.run(setting.of(model), predicted, poses);
+        sizes.initialize(setting, model, poses, fit);
+        steps += fit.run(setting.with_model(model), predicted, poses);
         // Other configurations of arms and legs.
         if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
-            let (root, doubtful) = (poses[0].translation + *origin, assessor.doubts() || sizes.unsure());
-            match share {
-                None => relocalizer.look(&model.body, frame, root, doubtful, assessor.is_unsure(), lost),
-                Some(share) => relocalizer.look_at_share(&model.body, frame, share, root, lost),
+            let (root, limb_suspect) =
+                (poses[0].translation + *origin, assessor.has_suspect_limb() || sizes.is_uncertain());
+            match ownership {
+                None => relocalizer.detect(&model.body, frame, root, limb_suspect, assessor.is_uncertain(), lost),
+                Some(ownership) => relocalizer.detect_owned(&model.body, frame, ownership, root, lost),
             }
         }
         if config.hypotheses && schedule.whole_body && known {
-            let detected = relocalizer.shown(&model.body).unwrap_or_default();
-            steps += hypotheses.improve(setting.of(model), fit, poses, predicted, relocalizer.detected(), &detected);
+            let detected = relocalizer.detected_pose(&model.body).unwrap_or_default();
+            steps +=
+                hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected(), &detected);
         }
         // Sizes that follow what this frame shows.
         let lost = assessor.status() == Status::Lost;
-        let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.relied_on(limb) };
+        let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.is_reliable(limb) };
         sizes.refine(setting, model, poses, predicted, fit, reliance);
         // What all that is worth.
-        assessor.assess(setting.of(model), fit.matched(poses), relocalizer.detected());
-        fit.learn_regions(setting.of(model));
+        assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
+        fit.learn_regions(setting.with_model(model));
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
-        if relocalizes && self.relocalize(frame, known, share.is_some()) {
-            return self.follow(frame, share);
+        if relocalizes && self.relocalize(frame, known, ownership.is_some()) {
+            return self.follow(frame, ownership);
         }
         self.remember();
         self.report(frame.stamp, steps, Some(time_scale));
         let lost = self.estimate.status == Status::Lost;
-        if self.relocalizer.nobody(frame.stamp, lost) {
+        if self.relocalizer.person_gone(frame.stamp, lost) {
             self.stop(frame.stamp);
         }
     }
 
     /// The pose at the next instant by its share of a frame, which was checked.
-    pub(crate) fn step_among(&mut self, frame: &Frame, share: Share) -> &Estimate {
+    pub(crate) fn step_owned(&mut self, frame: &Frame, ownership: OwnershipMask) -> &Estimate {
         self.relocalizer.clear_error();
         if self.is_started() {
             self.before.keep(&self.estimate);
-            self.follow(&Frame { colors: &[], ..*frame }, Some(share));
+            self.follow(&Frame { colors: &[], ..*frame }, Some(ownership));
         }
         &self.estimate
     }
@@ -287,7 +295,7 @@ impl Tracker {
     /// Refuses what cannot be used, before anything changes.
     fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         if !self.is_started() && !self.can_search() {
-            return Err(TrackError::NotInitialised);
+            return Err(TrackError::NotInitialized);
         }
         frame.check(&self.model.body, self.motion.stamp)?;
         self.fit.regions().check(frame)
@@ -299,34 +307,34 @@ impl Tracker {
         let lost = self.assessor.status() == Status::Lost;
         if !among {
             let joints = self.motion.world_from_limb().map(|limb| limb.translation);
-            let views = self.observer.seen(frame, self.motion.origin).views;
-            self.relocalizer.look_out(views, joints, self.assessor.status() == Status::Tracking, lost);
+            let views = self.observer.observation(frame, self.motion.origin).views;
+            self.relocalizer.observe_occlusion(views, joints, self.assessor.status() == Status::Tracking, lost);
         }
         if known && self.relocalizer.detected().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            let young = self.relocalizer.young(frame.stamp);
-            match self.relocalizer.weigh(&self.model.body, &world_from_limb, lost, young, among) {
-                Some(Seen::Elsewhere) if self.move_to_detection(frame) => {
-                    // What was learnt of sizes and scene was learnt in the wrong place.
-                    return !among && young && self.restart_at_detection();
+            let new_track = self.relocalizer.is_new(frame.stamp);
+            match self.relocalizer.compare(&self.model.body, &world_from_limb, lost, new_track, among) {
+                Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame) => {
+                    // What was learned of sizes and scene was learned in the wrong place.
+                    return !among && new_track && self.restart_at_detection();
                 }
-                Some(Seen::There) if !among => self.update_sizes(),
+                Some(DetectionVerdict::Consistent) if !among => self.update_sizes(),
                 _ => {}
             }
         }
         if !among {
-            self.relocalizer.observe(self.sighting(frame), &self.motion.poses);
-            self.look_everywhere(frame);
+            self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
+            self.search_everywhere(frame);
         }
         false
     }
 
     /// Moves a lost body that no detector can see to where it is found.
-    fn look_everywhere(&mut self, frame: &Frame) {
+    fn search_everywhere(&mut self, frame: &Frame) {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        let seen = observer.seen(frame, motion.origin);
-        let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
-        if let Some(place) = relocalizer.search(setting.of(model), fit, &motion.poses) {
+        let observation = observer.observation(frame, motion.origin);
+        let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
+        if let Some(place) = relocalizer.search(setting.with_model(model), fit, &motion.poses) {
             motion.predicted.clone_from_slice(place);
             self.move_to_predicted(frame);
         }
@@ -335,15 +343,15 @@ impl Tracker {
     /// Moves the body to where a detector sees it; whether it is there now.
     fn move_to_detection(&mut self, frame: &Frame) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
-        let learnt = observer.release(frame, relocalizer.own());
-        let seen = observer.seen(frame, motion.origin);
-        let setting = Setting { config, seen, previous: &[], time_scale: 1.0 };
+        let learned = observer.release(frame, relocalizer.own_pixels());
+        let observation = observer.observation(frame, motion.origin);
+        let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         let lost = assessor.status() == Status::Lost;
-        let place = relocalizer.try_detected(setting.of(model), fit, &motion.poses, lost);
+        let place = relocalizer.try_detected(setting.with_model(model), fit, &motion.poses, lost);
         let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
         let moved = better && self.move_to_predicted(frame);
         if !moved {
-            self.observer.restore(frame, self.relocalizer.own(), &learnt);
+            self.observer.restore(frame, self.relocalizer.own_pixels(), &learned);
         }
         moved
     }
@@ -352,7 +360,7 @@ impl Tracker {
     fn move_to_predicted(&mut self, frame: &Frame) -> bool {
         let Motion { poses, predicted, .. } = &mut self.motion;
         std::mem::swap(poses, predicted);
-        self.settle(frame);
+        self.reassess(frame);
         if self.assessor.status() != Status::Lost {
             // Nothing is known of how it moves.
             self.motion.forget();
@@ -360,24 +368,24 @@ impl Tracker {
         }
         let Motion { poses, predicted, .. } = &mut self.motion;
         std::mem::swap(poses, predicted);
-        self.settle(frame);
+        self.reassess(frame);
         false
     }
 
     /// Matches and assesses this frame for other poses.
-    fn settle(&mut self, frame: &Frame) {
+    fn reassess(&mut self, frame: &Frame) {
         let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
         observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), config);
-        let setting = Setting { config, seen: observer.seen(frame, *origin), previous, time_scale: 1.0 };
-        fit.match_all(setting.of(model), poses, config.max_steps);
+        let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale: 1.0 };
+        fit.match_all(setting.with_model(model), poses, config.max_steps);
         assessor.moved();
-        assessor.assess(setting.of(model), fit.matched(poses), None);
+        assessor.assess(setting.with_model(model), fit.matched(poses), None);
     }
 
     /// What this frame said of the body.
-    fn sighting(&self, frame: &Frame) -> Sighting {
+    fn frame_outcome(&self, frame: &Frame) -> FrameOutcome {
         let status = self.assessor.status();
-        Sighting {
+        FrameOutcome {
             stamp: frame.stamp,
             lost: status == Status::Lost,
             tracked: status == Status::Tracking,
@@ -388,7 +396,7 @@ impl Tracker {
     /// Remembers where arms and legs end.
     fn remember(&mut self) {
         let Self { model, motion, hypotheses, assessor, .. } = self;
-        hypotheses.remember(model, motion, assessor.status() == Status::Lost, |limb| assessor.relied_on(limb));
+        hypotheses.remember(model, motion, assessor.status() == Status::Lost, |limb| assessor.is_reliable(limb));
     }
 
     /// Fills the estimate in: of a frame `time_scale` after the last one, or of a pose that was set.
@@ -402,13 +410,13 @@ impl Tracker {
             return;
         };
         let (body, poses, correspondences) = (&model.body, &motion.poses, fit.correspondences());
-        let (pairs, sizes_found) = (sizes.followed(), sizes.found());
-        let found = Found { body, poses, correspondences, pairs, sizes_found, time_scale, config };
+        let (pairs, sizes_found) = (sizes.refined_pairs(), sizes.found_with_pose());
+        let found = FittedPose { body, poses, correspondences, pairs, sizes_found, time_scale, config };
         let origin = motion.origin;
-        let differs = |limb: usize| hypotheses.differs(body, limb, &shifted(&poses[limb], -origin));
-        assessor.follow_edges(model, found, differs);
+        let branch_distance = |limb: usize| hypotheses.branch_distance(body, limb, &shifted(&poses[limb], -origin));
+        assessor.follow_edges(model, found, branch_distance);
         assessor.report_status(model, estimate);
-        assessor.report_spread(found, hypotheses.rivals(), |limb| sizes.girth_sigma(body, limb), estimate);
+        assessor.report_spread(found, hypotheses.alternatives(), |limb| sizes.girth_sigma(body, limb), estimate);
     }
 }
 

@@ -7,14 +7,14 @@ use crate::config::Config;
 use crate::error::TrackError;
 use crate::math::{Points, Pose, Vec3};
 use crate::observation::frame::{Frame, PointSlice};
-use crate::regions::{Posed, RegionLine, Regions};
+use crate::regions::{ColorRegions, Posed, RegionLine};
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 
-/// So much of a line of sight is looked at, metres: more than a trunk's width, and half a forearm's.
-const LOOKED_THROUGH: f64 = 0.75;
+/// So much of a line of sight is looked at, meters: more than a trunk's width, and half a forearm's.
+const SEARCHED_DEPTH: f64 = 0.75;
 /// At so many places.
 const PLACES: usize = 30;
-/// Distances in single precision are off by less: metres, and share of a distance.
+/// Distances in single precision are off by less: meters, and share of a distance.
 const ROUNDING: f64 = 1e-3;
 
 /// Whether all between two places in a limb's frame is surely outside of it, for all of it lies to one side.
@@ -26,18 +26,18 @@ fn passes_by(shape: &TaperedEllipticCylinder, [from, to]: [Vec3; 2]) -> bool {
 }
 
 impl Tracker {
-    /// The lines along which the last step looked for edges of colours in a camera's picture.
+    /// The lines along which the last step looked for edges of colors in a camera's picture.
     pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         self.fit.regions().lines(camera)
     }
 
     /// How likely each pixel of a frame's pictures shows the body at some poses (world; none: those of now), picture after picture,
-    /// row by row, 0 to 1, by the colours that were learnt. Cameras that are new learn them there.
+    /// row by row, 0 to 1, by the colors that were learned. Cameras that are new learn them there.
     pub fn segment(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<Vec<Vec<f32>>, TrackError> {
         self.at_poses(frame, poses, |regions, posed| regions.segment(frame, posed))
     }
 
-    /// Learns the body's colours in a frame's pictures at some poses (world; none: those of now).
+    /// Learns the body's colors in a frame's pictures at some poses (world; none: those of now).
     pub fn learn_colors(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<(), TrackError> {
         self.at_poses(frame, poses, |regions, posed| regions.learn_at(frame, posed))
     }
@@ -46,10 +46,10 @@ impl Tracker {
         &mut self,
         frame: &Frame,
         poses: Option<&[Pose]>,
-        work: impl FnOnce(&mut Regions, Posed) -> R,
+        work: impl FnOnce(&mut ColorRegions, Posed) -> R,
     ) -> Result<R, TrackError> {
         if poses.is_none() && !self.is_started() {
-            return Err(TrackError::NotInitialised);
+            return Err(TrackError::NotInitialized);
         }
         frame.check(&self.model.body, None)?;
         self.fit.regions().check(frame)?;
@@ -74,7 +74,7 @@ impl Tracker {
     }
 
     /// The poses expected at a time to come, world frame; none without a pose.
-    pub(crate) fn expect(&self, stamp: f64, expected: &mut Vec<Pose>) {
+    pub(crate) fn predict(&self, stamp: f64, expected: &mut Vec<Pose>) {
         expected.clear();
         if self.is_started() {
             self.motion.expect(&self.model.body, stamp, self.config.prediction, expected);
@@ -86,7 +86,7 @@ impl Tracker {
         !self.motion.poses.is_empty()
     }
 
-    /// Signed distances of world points to the surface of every limb, metres, negative inside: limb by limb, a point each.
+    /// Signed distances of world points to the surface of every limb, meters, negative inside: limb by limb, a point each.
     pub fn limb_distances(&self, points: PointSlice) -> Result<Vec<Vec<f32>>, TrackError> {
         let queries = self.queries(points)?;
         let mut surface = SurfaceBatch::default();
@@ -99,7 +99,7 @@ impl Tracker {
             .collect())
     }
 
-    /// Signed distances of world points to the surface of the posed body, metres, negative inside.
+    /// Signed distances of world points to the surface of the posed body, meters, negative inside.
     pub fn distance(&self, points: PointSlice) -> Result<Vec<f32>, TrackError> {
         let queries = self.queries(points)?;
         let mut least = vec![f32::INFINITY; points.len()];
@@ -126,17 +126,17 @@ impl Tracker {
         Ok(least)
     }
 
-    /// Length of body between each of some places, inside the body as it is posed, and a camera's focal point, world, metres: what the
+    /// Length of body between each of some places, inside the body as it is posed, and a camera's focal point, world, meters: what the
     /// body hides a network guesses, with no less confidence.
     pub fn body_before(&self, sites: &[Vec3], camera: Vec3) -> Result<Vec<f64>, TrackError> {
         if !self.is_started() {
-            return Err(TrackError::NotInitialised);
+            return Err(TrackError::NotInitialized);
         }
         let poses: Vec<Pose> = self.motion.world_from_limb().map(|pose| pose.inverse()).collect();
         let limbs = || self.model.body.limbs().iter().zip(&poses);
         let hidden = |site: &Vec3| {
             let towards = camera - *site;
-            let reach = towards.length().min(LOOKED_THROUGH);
+            let reach = towards.length().min(SEARCHED_DEPTH);
             let direction = towards / towards.length().max(1e-9);
             let mut inside = [false; PLACES];
             let far = |step: usize| (step as f64 + 0.5) / PLACES as f64 * reach;
@@ -158,7 +158,7 @@ impl Tracker {
     /// World points in the working frame of the posed body.
     fn queries(&self, points: PointSlice) -> Result<Points, TrackError> {
         if !self.is_started() {
-            return Err(TrackError::NotInitialised);
+            return Err(TrackError::NotInitialized);
         }
         let mut queries = Points::default();
         for index in 0..points.len() {
@@ -166,7 +166,7 @@ impl Tracker {
             if !point.is_finite() {
                 return Err(TrackError::measurement(
                     "points",
-                    "finite metres",
+                    "finite meters",
                     format!("{:?} in row {index}", point.to_array()),
                 ));
             }

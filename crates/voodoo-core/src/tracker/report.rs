@@ -94,7 +94,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, moved, standing, with_context, without_background};
 
-    /// What is reported of the standing body, seen `off` metres behind where it is thought to be.
+    /// What is reported of the standing body, seen `off` meters behind where it is thought to be.
     fn filled(off: f64) -> (Estimate, usize) {
         let (model, poses) = standing();
         let config = without_background();
@@ -107,9 +107,9 @@ mod tests {
             let mut estimate = Estimate::default();
             // Nothing of an earlier frame is left.
             for _ in 0..2 {
-                estimate.fill(&model.body, &motion, fit.correspondences(), context.seen.candidates);
+                estimate.fill(&model.body, &motion, fit.correspondences(), context.observation.candidates);
             }
-            (estimate, context.seen.candidates.len())
+            (estimate, context.observation.candidates.len())
         })
     }
 

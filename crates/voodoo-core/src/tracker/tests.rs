@@ -11,13 +11,13 @@ fn tracking() -> (Tracker, Vec<u16>) {
     let mut tracker = Tracker::new(model.body, Config::default()).unwrap();
     tracker.reset_pose(&poses).unwrap();
     for frame in 0..3 {
-        show(&mut tracker, &pixels, frame);
+        feed(&mut tracker, &pixels, frame);
     }
     (tracker, pixels)
 }
 
 /// Shows a frame; the status.
-fn show(tracker: &mut Tracker, pixels: &[u16], frame: usize) -> Status {
+fn feed(tracker: &mut Tracker, pixels: &[u16], frame: usize) -> Status {
     with_frame(pixels, frame as f64 / 30.0, |frame| tracker.step(frame).unwrap().status)
 }
 
@@ -27,7 +27,7 @@ fn a_refused_frame_leaves_every_part_as_it_was() {
     let before = format!("{tracker:?}");
     assert!(with_frame(&pixels, 0.0, |frame| tracker.step(frame).is_err()), "time ran backwards");
     assert_eq!(format!("{tracker:?}"), before);
-    show(&mut tracker, &pixels, 3);
+    feed(&mut tracker, &pixels, 3);
     assert_ne!(format!("{tracker:?}"), before);
 }
 
@@ -62,7 +62,7 @@ fn edits_keep_the_track() {
         assert!(then.translation.distance(now.translation) < 0.01);
         assert!(after.joint_gaps.iter().all(|gap| *gap < 1e-9), "edit {number}: {:?}", after.joint_gaps);
         let pixels = before_wall(tracker.body(), &after.world_from_limb);
-        let status = show(&mut tracker, &pixels, 3);
+        let status = feed(&mut tracker, &pixels, 3);
         assert_eq!(status, Status::Tracking, "edit {number}");
         let off = farthest(&tracker.estimate().world_from_limb, &after.world_from_limb);
         assert!(off < 0.02, "edit {number}: {off} m");
@@ -77,17 +77,17 @@ fn a_lost_body_is_found_beside_its_place_and_no_board_of_its_size_is() {
     let aside = moved(&poses, 0.7 * Vec3::X);
     let person = before_wall(&model.body, &aside);
     for frame in 3..8 {
-        assert_eq!(show(&mut tracker, &nothing, frame), Status::Lost);
+        assert_eq!(feed(&mut tracker, &nothing, frame), Status::Lost);
     }
     for (frame, width) in [0.15, 0.2, 0.25].into_iter().flat_map(|width| [width; 3]).enumerate() {
         let mut board = nothing.clone();
         put_board(&mut board, Vec3::new(-0.7, 0.1, 2.6), [width, 0.85]);
-        assert_eq!(show(&mut tracker, &board, 8 + frame), Status::Lost, "{width} m wide");
+        assert_eq!(feed(&mut tracker, &board, 8 + frame), Status::Lost, "{width} m wide");
         let moved = poses[0].translation.distance(tracker.estimate().world_from_limb[0].translation);
         assert!(moved < 0.1, "{width} m wide: moved by {moved} m");
     }
     for frame in 20..30 {
-        show(&mut tracker, &person, frame);
+        feed(&mut tracker, &person, frame);
     }
     let off = farthest(&tracker.estimate().world_from_limb, &aside);
     assert!(tracker.estimate().status == Status::Tracking && off < 0.05, "{off} m");

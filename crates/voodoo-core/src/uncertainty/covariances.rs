@@ -5,7 +5,7 @@ use nalgebra::Matrix6;
 use crate::body::Body;
 use crate::math::{Mat3, Vec3};
 
-/// Covariances of a frame's pose. World frame, metres, radians; NaN before the first frame.
+/// Covariances of a frame's pose. World frame, meters, radians; NaN before the first frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Covariances {
     /// Of the position of every site.
@@ -14,7 +14,7 @@ pub struct Covariances {
     pub limbs: Vec<[[f64; 6]; 6]>,
     /// Of the turn of the joint to the parent, about world axes, a limb each; of the root: of its own.
     pub turns: Vec<Mat3>,
-    /// Standard deviation of every limb's length and of its mean radius, metres; NaN where they are not refined.
+    /// Standard deviation of every limb's length and of its mean radius, meters; NaN where they are not refined.
     pub lengths: Vec<f64>,
     /// See `lengths`.
     pub girths: Vec<f64>,
@@ -92,9 +92,9 @@ mod tests {
         let lever = Vec3::new(0.1, -0.3, 0.2);
         let limb = Matrix6::from_fn(|i, j| ((i * 5 + j * 3) % 7) as f64 - 3.0);
         let limb = limb * limb.transpose() * 1e-4;
-        let mut told = Covariances::default();
-        told.push_limb(&limb, 0.02, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
-        told.push_site(0, lever);
+        let mut covariances = Covariances::default();
+        covariances.push_limb(&limb, 0.02, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
+        covariances.push_site(0, lever);
         // Differences of where the site goes when the limb turns or shifts a little.
         let h = 1e-6;
         let column = |index: usize| match index {
@@ -109,18 +109,19 @@ mod tests {
                         expected += column(a)[i] * limb[(a, b)] * column(b)[j];
                     }
                 }
-                assert!((told.sites[0].col(j)[i] - expected).abs() < 1e-7, "{i}, {j}");
+                assert!((covariances.sites[0].col(j)[i] - expected).abs() < 1e-7, "{i}, {j}");
             }
         }
         // Position first, as in a message.
-        assert!((told.limbs[0][0][4] - limb[(3, 1)]).abs() < 1e-15);
+        assert!((covariances.limbs[0][0][4] - limb[(3, 1)]).abs() < 1e-15);
     }
 
     #[test]
     fn two_places_as_likely_as_each_other_have_the_covariance_of_both() {
-        let mut told = Covariances { sites: vec![Mat3::from_diagonal(Vec3::splat(1e-4))], ..Covariances::default() };
+        let mut covariances =
+            Covariances { sites: vec![Mat3::from_diagonal(Vec3::splat(1e-4))], ..Covariances::default() };
         let aside = Vec3::new(0.2, 0.0, -0.4);
-        told.widen(0, aside);
+        covariances.widen(0, aside);
         // Of two points a mean of squares about their middle.
         let points = [Vec3::ZERO, aside];
         let middle = 0.5 * aside;
@@ -128,7 +129,7 @@ mod tests {
             for j in 0..3 {
                 let spread: f64 = points.iter().map(|point| (point - middle)[i] * (point - middle)[j] / 2.0).sum();
                 let own = if i == j { 1e-4 } else { 0.0 };
-                assert!((told.sites[0].col(j)[i] - own - spread).abs() < 1e-15);
+                assert!((covariances.sites[0].col(j)[i] - own - spread).abs() < 1e-15);
             }
         }
     }

@@ -8,10 +8,10 @@ use crate::body::Limb;
 use crate::math::Pose;
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::DepthViews;
-use crate::visibility::surface::{Sight, surface_rows};
+use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
-/// A point this far from the model's surface is not explained by it, metres; and a camera sees past the surface where the background
+/// A point this far from the model's surface is not explained by it, meters; and a camera sees past the surface where the background
 /// lies so much behind it, or twice as much behind it what may be the body.
 pub(crate) const EXPLAINED: f64 = 0.04;
 /// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
@@ -69,19 +69,19 @@ pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb:
             let section = row.facing.section;
             let (a, b) = (section.a, section.b);
             // A limb seen aslant covers so much less of the image, as the points seen on it do.
-            let aslant = row.facing.across.length() / (camera_from_limb * section.centre()).length();
+            let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
             let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
                 / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
             for place in row.places(&view, across) {
                 let sight = place.sight();
-                if sight == Sight::Unknown {
+                if sight == PatchVisibility::Unknown {
                     continue;
                 }
                 for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
                     match sight {
-                        Sight::FreeSpace => counts.free_space += patches,
-                        Sight::Occluded => counts.occluded += patches,
-                        Sight::Consistent | Sight::Unknown => {}
+                        PatchVisibility::FreeSpace => counts.free_space += patches,
+                        PatchVisibility::Occluded => counts.occluded += patches,
+                        PatchVisibility::Consistent | PatchVisibility::Unknown => {}
                     }
                     counts.front_facing += patches;
                 }
@@ -118,22 +118,22 @@ mod tests {
     const HEIGHT: usize = 120;
     const INTRINSICS: [f64; 4] = [140.0, 140.0, 79.5, 59.5];
 
-    /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimetres.
+    /// What a camera at the origin sees of a body, and `behind` where it sees none of it, millimeters.
     fn shoot(body: &Body, poses: &[Pose], behind: u16) -> Vec<u16> {
         let world_from_sensor = Pose::IDENTITY;
         let view = Viewpoint { camera: pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
-        let millimetres = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
-        image.depth().iter().map(millimetres).collect()
+        let millimeters = |depth: &f32| if *depth > 0.0 { (depth * 1000.0).round() as u16 } else { behind };
+        image.depth().iter().map(millimeters).collect()
     }
 
     /// What is seen of every limb together.
-    fn seen(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
+    fn visible(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
         let images = [DepthImage {
             pixels: DepthPixels::U16(pixels),
             camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
-            metres_per_unit: 0.001,
+            meters_per_unit: 0.001,
             world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,
@@ -153,11 +153,11 @@ mod tests {
     }
 
     #[test]
-    fn a_body_where_it_is_seen_costs_little_and_elsewhere_much() {
+    fn a_body_where_it_is_visible_costs_little_and_elsewhere_much() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = standing(&body);
         let pixels = shoot(&body, &poses, 4000);
-        let right = seen(&pixels, &body, &poses);
+        let right = visible(&pixels, &body, &poses);
         assert!(
             right.image.front_facing > 500.0 && right.image.free_space < 0.05 * right.image.front_facing,
             "{right:?}"
@@ -167,7 +167,7 @@ mod tests {
         for shift in [0.1, 0.2, 0.4] {
             let aside: Vec<Pose> =
                 poses.iter().map(|pose| Pose::from_parts(pose.translation + shift * Vec3::X, pose.rotation)).collect();
-            let cost = seen(&pixels, &body, &aside).cost();
+            let cost = visible(&pixels, &body, &aside).cost();
             assert!(cost > last + 50.0, "{cost} at {shift} m after {last}");
             last = cost;
         }
@@ -177,7 +177,7 @@ mod tests {
     fn a_body_behind_a_wall_is_hidden_and_before_it_contradicted() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = standing(&body);
-        let wall = |millimetres: u16| seen(&vec![millimetres; WIDTH * HEIGHT], &body, &poses);
+        let wall = |millimeters: u16| visible(&vec![millimeters; WIDTH * HEIGHT], &body, &poses);
         let (before, behind, nothing) = (wall(1500), wall(4000), wall(0));
         assert!(before.image.front_facing > 0.0 && before.image.occluded == before.image.front_facing, "{before:?}");
         assert!(before.image.free_space == 0.0 && behind.image.occluded == 0.0);
@@ -198,14 +198,14 @@ mod tests {
     }
 
     #[test]
-    fn a_limb_seen_aslant_shows_as_much_less_as_its_image_is_shorter() {
+    fn a_limb_visible_aslant_shows_as_much_less_as_its_image_is_shorter() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let limb = &body.limbs()[body.limb_index("l_calf").unwrap()];
         let pixels = vec![4000_u16; 160 * 120];
         let images = [DepthImage {
             pixels: DepthPixels::U16(&pixels),
             camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
-            metres_per_unit: 0.001,
+            meters_per_unit: 0.001,
             world_from_sensor: Pose::IDENTITY,
             weight: 1.0,
             source: 0,

@@ -12,7 +12,7 @@ use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::evidence::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
-use crate::visibility::surface::{Sight, surface_rows};
+use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 
 /// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
@@ -33,7 +33,7 @@ pub(crate) struct LimbSupport {
 
 impl LimbSupport {
     /// What speaks for the limb less what speaks against it.
-    pub(crate) fn net(&self) -> [f64; 2] {
+    pub(crate) fn net_support(&self) -> [f64; 2] {
         [self.own[0] - self.free_space[0], self.own[1] - self.free_space[1]]
     }
 }
@@ -56,20 +56,20 @@ pub(crate) fn measure_support(
             .extend(limbs.map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.working_from_camera))));
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
-                let seen = support_seen_by(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
+                let in_view = support_in_view(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
                 let support = &mut supports[limb];
                 for part in 0..2 {
-                    support.own[part] = support.own[part].max(seen.own[part]);
-                    support.free_space[part] = support.free_space[part].max(seen.free_space[part]);
+                    support.own[part] = support.own[part].max(in_view.own[part]);
+                    support.free_space[part] = support.free_space[part].max(in_view.free_space[part]);
                 }
-                support.known |= seen.known;
+                support.known |= in_view.known;
             }
         }
     }
 }
 
 /// What one camera says of a limb of a chain.
-fn support_seen_by(
+fn support_in_view(
     view: &DepthView,
     shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
@@ -85,10 +85,10 @@ fn support_seen_by(
         // The weights of all places add up to one, in the whole and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
         let outer = if t > 0.5 { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
-        let count = |shares: &mut [f64; 2]| *shares = [shares[0] + lever, shares[1] + outer];
+        let count = |fractions: &mut [f64; 2]| *fractions = [fractions[0] + lever, fractions[1] + outer];
         for place in row.places(view, ACROSS_LIMB) {
             let (sight, point) = (place.sight(), place.point);
-            if sight == Sight::Unknown {
+            if sight == PatchVisibility::Unknown {
                 continue;
             }
             support.known = true;
@@ -97,11 +97,11 @@ fn support_seen_by(
             if others().any(|(_, other)| depth(other) < point.z - OVERLAP) {
                 continue;
             }
-            if sight == Sight::FreeSpace {
+            if sight == PatchVisibility::FreeSpace {
                 count(&mut support.free_space);
-            } else if let Some(z) = place.seen_within(EXPLAINED) {
-                let mut strangers = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
-                if !strangers.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
+            } else if let Some(z) = place.depth_within(EXPLAINED) {
+                let mut unrelated = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
+                if !unrelated.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
                     count(&mut support.own);
                 }
             }

@@ -13,7 +13,7 @@ pub(crate) mod surface;
 const SECTIONS: usize = 5;
 /// The outermost of those across, in shares of the radius from the middle: nearer to the rim, a pixel shows what lies beside it.
 pub(crate) const LIMB_RIM: f64 = 0.6;
-/// Where they are along a limb, in shares of its length: evenly, and not at the ends, which belong to the neighbours as well.
+/// Where they are along a limb, in shares of its length: evenly, and not at the ends, which belong to the neighbors as well.
 pub(crate) const ALONG_LIMB: [f64; SECTIONS] = middles();
 /// Where they are across a limb, in shares of its radius from the middle: evenly.
 pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly();
@@ -22,7 +22,7 @@ pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly();
 pub(crate) const LITTLE: f64 = 0.3;
 /// Fewer patches flicker: shares are of so many at least. As many points make a limb measured where there is no depth image.
 pub(crate) const FEW: f64 = 5.0;
-/// Surfaces of limbs lie in each other by so much at their joints, and touch elsewhere, metres: no less stands before another one,
+/// Surfaces of limbs lie in each other by so much at their joints, and touch elsewhere, meters: no less stands before another one,
 /// or where there is no room for it.
 pub(crate) const OVERLAP: f64 = 0.01;
 

@@ -3,7 +3,7 @@
 //! Every pixel's ray meets the limbs whose silhouette can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
 //! `(X / a)² + (Y / b)² = 1` with X, Y, a and b linear in u. With the aspect `a / b` held fixed that is a quadratic; two
 //! rounds of it, the aspect taken where the last one ended, and two Newton steps on the true equation give the root to a
-//! micrometre. Rays near a silhouette's border, along the axis of a limb, and limbs whose aspect changes much go through
+//! micrometer. Rays near a silhouette's border, along the axis of a limb, and limbs whose aspect changes much go through
 //! [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
 
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ use crate::shape::TaperedEllipticCylinder;
 pub const NO_LIMB: u16 = u16::MAX;
 /// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
 const ROWS_TOGETHER: usize = LANES;
-/// The precision of predicted depths, of one metre. Bounds in the image are widened by as much, in units of `x / z`, against rounding,
+/// The precision of predicted depths, of one meter. Bounds in the image are widened by as much, in units of `x / z`, against rounding,
 /// and a limb that comes nearer to the camera plane has none: every ray is tried.
 const PRECISION: f64 = f32::EPSILON as f64;
 /// Greatest `|ln(a0 b1 / (a1 b0))|` for which the aspect may be held fixed (method section 2).
@@ -67,7 +67,7 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    /// Depth along the optical axis, metres, row by row; 0 where no limb is seen.
+    /// Depth along the optical axis, meters, row by row; 0 where no limb is seen.
     pub fn depth(&self) -> &[f32] {
         &self.depth
     }
@@ -141,7 +141,7 @@ impl Rendering {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimbRaycaster {
     shape: TaperedEllipticCylinder,
-    /// The camera's centre and axes in the limb frame.
+    /// The camera's center and axes in the limb frame.
     origin: Vec3,
     axes: [Vec3; 3],
     /// `x / z` and `y / z` of the corners of a frustum that holds the limb; none when some lie beside or behind the camera.
@@ -191,7 +191,7 @@ impl LimbRaycaster {
         }
     }
 
-    /// Depth at which the ray through `(x / z, y / z)` meets the limb, metres; NaN where it does not.
+    /// Depth at which the ray through `(x / z, y / z)` meets the limb, meters; NaN where it does not.
     #[inline(always)]
     pub(crate) fn depth_at(&self, x: f64, y: f64) -> f64 {
         // Most rays pass far from most limbs.
@@ -201,11 +201,11 @@ impl LimbRaycaster {
 
     #[inline(never)]
     fn depth_within(&self, x: f64, y: f64) -> f64 {
-        let (depth, unsure) = if self.plain { self.meet_plain(x, y) } else { (f64::NAN, true) };
-        if unsure { self.meet_exactly(x, y) } else { depth }
+        let (depth, inexact) = if self.plain { self.intersect_plain(x, y) } else { (f64::NAN, true) };
+        if inexact { self.intersect_exactly(x, y) } else { depth }
     }
 
-    fn meet_exactly(&self, x: f64, y: f64) -> f64 {
+    fn intersect_exactly(&self, x: f64, y: f64) -> f64 {
         let direction = self.axes[0] * x + self.axes[1] * y + self.axes[2];
         let hit = self.shape.cast_ray(self.origin, direction, f64::INFINITY);
         hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
@@ -263,10 +263,10 @@ impl LimbRaycaster {
                 if !near {
                     continue;
                 }
-                let found = self.meet(&x, &y);
+                let found = self.intersect(&x, &y);
                 let count = LANES.min(end - start);
-                let seen = depth[start..start + count].iter_mut().zip(&mut limb[start..start + count]);
-                for ((depth, limb), found) in seen.zip(found) {
+                let pixels_here = depth[start..start + count].iter_mut().zip(&mut limb[start..start + count]);
+                for ((depth, limb), found) in pixels_here.zip(found) {
                     // NaN: not met.
                     if found > 0.0 && (*limb == NO_LIMB || (found as f32) < *depth) {
                         (*depth, *limb) = (found as f32, index);
@@ -278,17 +278,17 @@ impl LimbRaycaster {
 
     /// Depths at which rays meet the limb, NaN where they do not.
     #[inline(always)]
-    fn meet(&self, x: &[f64; LANES], y: &[f64; LANES]) -> [f64; LANES] {
-        let exact = |lane: usize| self.meet_exactly(x[lane], y[lane]);
+    fn intersect(&self, x: &[f64; LANES], y: &[f64; LANES]) -> [f64; LANES] {
+        let exact = |lane: usize| self.intersect_exactly(x[lane], y[lane]);
         if !self.plain {
             return std::array::from_fn(exact);
         }
-        let (mut found, mut unsure) = ([f64::NAN; LANES], [false; LANES]);
+        let (mut found, mut inexact) = ([f64::NAN; LANES], [false; LANES]);
         for lane in 0..LANES {
-            (found[lane], unsure[lane]) = self.meet_plain(x[lane], y[lane]);
+            (found[lane], inexact[lane]) = self.intersect_plain(x[lane], y[lane]);
         }
         for lane in 0..LANES {
-            if unsure[lane] {
+            if inexact[lane] {
                 found[lane] = exact(lane);
             }
         }
@@ -298,7 +298,7 @@ impl LimbRaycaster {
     /// Depth at which a ray meets a limb of nearly fixed aspect from outside, NaN where it does not; and whether that is
     /// unsure. No branches: it runs on several rays at once.
     #[inline(always)]
-    fn meet_plain(&self, x: f64, y: f64) -> (f64, bool) {
+    fn intersect_plain(&self, x: f64, y: f64) -> (f64, bool) {
         let select = |condition: bool, yes: f64, no: f64| if condition { yes } else { no };
         let o = self.origin;
         let d = self.axes[0] * x + self.axes[1] * y + self.axes[2];
@@ -347,7 +347,7 @@ impl LimbRaycaster {
         }
         let on_side = (root >= enter) & (root <= leave) & (root > 0.0);
         let depth = select(on_side, root, f64::NAN);
-        let unsure = !through_cap & (grazing | (on_side & !(step.abs() < PRECISION * root)) | (d.z.abs() < 1e-9));
-        (select(through_cap, enter, depth), unsure)
+        let inexact = !through_cap & (grazing | (on_side & !(step.abs() < PRECISION * root)) | (d.z.abs() < 1e-9));
+        (select(through_cap, enter, depth), inexact)
     }
 }

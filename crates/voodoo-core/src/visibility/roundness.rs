@@ -1,6 +1,6 @@
 //! Whether what a body was put on is round where its limbs are: a cupboard of a person's size is not.
 //!
-//! Points explained to a few centimetres and limbs seen where they are say little against a flat thing as large as a person. But
+//! Points explained to a few centimeters and limbs seen where they are say little against a flat thing as large as a person. But
 //! from the middle of a limb towards its rims the surface of a body falls away from the camera, that of a door does not.
 
 use crate::body::Body;
@@ -23,12 +23,12 @@ pub(crate) fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Optio
             let camera_from_limb = camera_from_working * *pose;
             for row in surface_rows(&limb.shape, &camera_from_limb) {
                 let depths = row.places(&view, [0.0, ACROSS_LIMB[0], ACROSS_LIMB[4]]).map(|place| {
-                    let z = place.seen_within(2.0 * EXPLAINED)?;
+                    let z = place.depth_within(2.0 * EXPLAINED)?;
                     Some([place.point.z, z])
                 });
                 if let [Some(middle), Some(left), Some(right)] = depths {
-                    let [expected, seen] = [0, 1].map(|kind| 0.5 * (left[kind] + right[kind]) - middle[kind]);
-                    product += expected * seen;
+                    let [expected, measured] = [0, 1].map(|kind| 0.5 * (left[kind] + right[kind]) - middle[kind]);
+                    product += expected * measured;
                     square += expected * expected;
                 }
             }

@@ -8,7 +8,7 @@ use crate::visibility::evidence::EXPLAINED;
 
 /// What a camera says about a place on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sight {
+pub(crate) enum PatchVisibility {
     /// Outside the image, or no return.
     Unknown,
     /// Behind what is seen.
@@ -22,7 +22,7 @@ pub(crate) enum Sight {
 /// A place on a limb's surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePlace {
-    /// Camera frame, metres.
+    /// Camera frame, meters.
     pub point: Vec3,
     /// What is seen in its pixel.
     pub pixel: Pixel,
@@ -31,25 +31,25 @@ pub(crate) struct SurfacePlace {
 impl SurfacePlace {
     /// What the camera says about it.
     #[inline]
-    pub(crate) fn sight(&self) -> Sight {
+    pub(crate) fn sight(&self) -> PatchVisibility {
         let surface = self.point.z;
         let (z, past) = match self.pixel {
-            Pixel::Unknown => return Sight::Unknown,
+            Pixel::Unknown => return PatchVisibility::Unknown,
             Pixel::Background(z) => (z, EXPLAINED),
             Pixel::Foreground(z) | Pixel::Other(z) => (z, 2.0 * EXPLAINED),
         };
         if z > surface + past {
-            Sight::FreeSpace
+            PatchVisibility::FreeSpace
         } else if z > surface - 2.0 * EXPLAINED {
-            Sight::Consistent
+            PatchVisibility::Consistent
         } else {
-            Sight::Occluded
+            PatchVisibility::Occluded
         }
     }
 
-    /// Depth of what may be the body, if it is seen less than `tolerance` before or behind the place, metres.
+    /// Depth of what may be the body, if it is seen less than `tolerance` before or behind the place, meters.
     #[inline]
-    pub(crate) fn seen_within(&self, tolerance: f64) -> Option<f64> {
+    pub(crate) fn depth_within(&self, tolerance: f64) -> Option<f64> {
         match self.pixel {
             Pixel::Foreground(z) if (z - self.point.z).abs() < tolerance => Some(z),
             _ => None,
@@ -68,7 +68,7 @@ pub(crate) struct SurfaceRow<'a> {
 }
 
 impl SurfaceRow<'_> {
-    /// Places across it, camera frame, metres; in shares of the radius from the middle, see [`FacingSection::point`].
+    /// Places across it, camera frame, meters; in shares of the radius from the middle, see [`FacingSection::point`].
     #[inline]
     pub(crate) fn points<const N: usize>(&self, across: [f64; N]) -> [Vec3; N] {
         across.map(|s| *self.camera_from_limb * self.facing.point(s))
@@ -98,24 +98,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_surface_is_seen_past_consistent_or_hidden_by_what_its_pixel_shows() {
+    fn a_surface_is_visible_past_consistent_or_hidden_by_what_its_pixel_shows() {
         let point = Vec3::new(0.0, 0.0, 2.0);
         let sight = |pixel| SurfacePlace { point, pixel }.sight();
         for (pixel, expected) in [
-            (Pixel::Unknown, Sight::Unknown),
-            (Pixel::Background(f64::INFINITY), Sight::FreeSpace),
-            (Pixel::Background(2.05), Sight::FreeSpace),
-            (Pixel::Background(2.03), Sight::Consistent),
-            (Pixel::Foreground(2.09), Sight::FreeSpace),
-            (Pixel::Other(2.05), Sight::Consistent),
-            (Pixel::Foreground(1.95), Sight::Consistent),
-            (Pixel::Other(1.9), Sight::Occluded),
-            (Pixel::Background(1.9), Sight::Occluded),
+            (Pixel::Unknown, PatchVisibility::Unknown),
+            (Pixel::Background(f64::INFINITY), PatchVisibility::FreeSpace),
+            (Pixel::Background(2.05), PatchVisibility::FreeSpace),
+            (Pixel::Background(2.03), PatchVisibility::Consistent),
+            (Pixel::Foreground(2.09), PatchVisibility::FreeSpace),
+            (Pixel::Other(2.05), PatchVisibility::Consistent),
+            (Pixel::Foreground(1.95), PatchVisibility::Consistent),
+            (Pixel::Other(1.9), PatchVisibility::Occluded),
+            (Pixel::Background(1.9), PatchVisibility::Occluded),
         ] {
             assert_eq!(sight(pixel), expected, "{pixel:?}");
         }
-        let seen = |pixel| SurfacePlace { point, pixel }.seen_within(0.04);
-        assert_eq!(seen(Pixel::Foreground(2.03)), Some(2.03));
-        assert!(seen(Pixel::Foreground(2.05)).is_none() && seen(Pixel::Other(2.0)).is_none());
+        let observed = |pixel| SurfacePlace { point, pixel }.depth_within(0.04);
+        assert_eq!(observed(Pixel::Foreground(2.03)), Some(2.03));
+        assert!(observed(Pixel::Foreground(2.05)).is_none() && observed(Pixel::Other(2.0)).is_none());
     }
 }

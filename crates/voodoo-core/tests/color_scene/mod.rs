@@ -1,4 +1,4 @@
-//! Pictures of a posed body from four calibrated cameras around it, the same on every run: each pair of limbs has a colour of its
+//! Pictures of a posed body from four calibrated cameras around it, the same on every run: each pair of limbs has a color of its
 //! own, the room is patterned, and pixels are noisy.
 #![allow(dead_code, missing_docs, clippy::unwrap_used, reason = "shared by tests, none of which uses all of it")]
 
@@ -41,7 +41,7 @@ fn rendered(body: Option<(&Body, &[Pose])>, camera: usize) -> Rendering {
     rendering
 }
 
-/// Depths that a camera would see, metres: the body before a wall.
+/// Depths that a camera would see, meters: the body before a wall.
 pub(crate) fn depth_of(body: &Body, poses: &[Pose], camera: usize) -> Vec<f32> {
     rendered(Some((body, poses)), camera).depth().iter().map(|z| if *z > 0.0 && *z < 5.0 { *z } else { 5.0 }).collect()
 }
@@ -50,7 +50,7 @@ pub(crate) fn depth_picture(depth: &[f32], camera: usize) -> DepthImage<'_> {
     DepthImage {
         pixels: DepthPixels::F32(depth),
         camera: &CAMERA,
-        metres_per_unit: 1.0,
+        meters_per_unit: 1.0,
         world_from_sensor: world_from_camera(camera),
         weight: 1.0,
         source: CAMERAS as u16,

@@ -32,10 +32,10 @@ fn turned(body: &Body, arm: &TwoBone, turn: Quat) -> Vec<Pose> {
 
 /// The two arms: chains that hang on the upper part of the body.
 fn arms(body: &Body) -> Vec<TwoBone> {
-    TwoBone::of(body).into_iter().filter(|chain| body.limbs()[chain.upper].name.ends_with("arm")).collect()
+    TwoBone::from_body(body).into_iter().filter(|chain| body.limbs()[chain.upper].name.ends_with("arm")).collect()
 }
 
-/// Depth of the body from one place, millimetres, nothing behind it.
+/// Depth of the body from one place, millimeters, nothing behind it.
 fn shoot(body: &Body, poses: &[Pose], world_from_sensor: Pose) -> Vec<u16> {
     let view = Viewpoint { camera: scene::pinhole(WIDTH, HEIGHT, INTRINSICS), world_from_sensor };
     let mut image = Rendering::default();
@@ -46,9 +46,9 @@ fn shoot(body: &Body, poses: &[Pose], world_from_sensor: Pose) -> Vec<u16> {
 /// The front camera, and one that looks at the person's back from as far.
 fn cameras() -> [Pose; 2] {
     let front = scene::DepthCamera::world_from_sensor();
-    let centre = Vec3::new(2.4, 0.0, 0.0);
+    let center = Vec3::new(2.4, 0.0, 0.0);
     let about = Quat::from_axis_angle(Vec3::Z, PI);
-    let back = Pose::from_parts(centre + about * (front.translation - centre), about * front.rotation);
+    let back = Pose::from_parts(center + about * (front.translation - center), about * front.rotation);
     [front, back]
 }
 
@@ -59,7 +59,7 @@ fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(DepthViews) -> T) 
         .map(|(pixels, world_from_sensor)| DepthImage {
             pixels: DepthPixels::U16(pixels),
             camera: scene::pinhole(WIDTH, HEIGHT, INTRINSICS),
-            metres_per_unit: 0.001,
+            meters_per_unit: 0.001,
             world_from_sensor: *world_from_sensor,
             weight: 1.0,
             source: 0,
@@ -73,7 +73,9 @@ fn with_views<T>(shots: &[(Vec<u16>, Pose)], ask: impl FnOnce(DepthViews) -> T) 
 
 fn proofs(body: &Body, poses: &[Pose], shots: &[(Vec<u16>, Pose)]) -> Vec<LimbSupport> {
     let mut found = Vec::new();
-    with_views(shots, |views| measure_support(views, body, poses, &TwoBone::of(body), &mut Vec::new(), &mut found));
+    with_views(shots, |views| {
+        measure_support(views, body, poses, &TwoBone::from_body(body), &mut Vec::new(), &mut found)
+    });
     found
 }
 
@@ -82,7 +84,7 @@ fn an_arm_turned_away_any_way_proves_less_than_half() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let [front, _] = cameras();
     for arm in arms(&body) {
-        // Half way up, off the trunk; then any way about the shoulder by what moves the elbow by twelve centimetres.
+        // Half way up, off the trunk; then any way about the shoulder by what moves the elbow by twelve centimeters.
         let outwards = Vec3::Y * arm.root(&body, &scene::standing(&body)).y.signum();
         let raised = Quat::from_axis_angle(Vec3::NEG_Z.cross(outwards), 0.9);
         let true_poses = turned(&body, &arm, raised);
@@ -99,7 +101,7 @@ fn an_arm_turned_away_any_way_proves_less_than_half() {
             assert!((moved - 0.12).abs() < 0.01, "the elbow moved by {moved} m");
             let found = proofs(&body, &wrong, &shots);
             for limb in [arm.upper, arm.lower] {
-                let (good, bad) = (right[limb].net(), found[limb].net());
+                let (good, bad) = (right[limb].net_support(), found[limb].net_support());
                 assert!(good[0] > 0.8 && good[1] > 0.8, "{good:?}");
                 assert!(bad[0] < 0.5 * good[0], "turned about {axis:?}: {bad:?} of {good:?}");
             }
@@ -120,9 +122,9 @@ fn what_one_camera_cannot_prove_another_can() {
         poses
     });
     let shots = |poses: &[Pose]| [front, back].map(|camera| (shoot(&body, poses, camera), camera));
-    let seen = |poses: &[Pose]| proofs(&body, poses, &shots(poses)[..1])[arm.lower];
-    let poses = poses.min_by(|a, b| seen(a).own[1].total_cmp(&seen(b).own[1])).unwrap();
-    let (alone, both) = (seen(&poses), proofs(&body, &poses, &shots(&poses))[arm.lower]);
+    let proof = |poses: &[Pose]| proofs(&body, poses, &shots(poses)[..1])[arm.lower];
+    let poses = poses.min_by(|a, b| proof(a).own[1].total_cmp(&proof(b).own[1])).unwrap();
+    let (alone, both) = (proof(&poses), proofs(&body, &poses, &shots(&poses))[arm.lower]);
     assert!(alone.known && alone.own[1] < 0.05, "{alone:?}");
     assert!(both.own[1] > 0.5 && both.free_space[1] < 0.05, "{both:?}");
     // No image, no word.

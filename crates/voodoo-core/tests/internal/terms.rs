@@ -76,7 +76,7 @@ proptest! {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let predicted = random_pose(&body, &other);
         let [sigmas, holds, rests] = [0.02, hold, 0.01].map(|value| vec![value; predicted.len()]);
-        // Rotation errors beyond a small one make the linearised geodesic (R07 eq. 25) an approximation: stay near.
+        // Rotation errors beyond a small one make the linearized geodesic (R07 eq. 25) an approximation: stay near.
         let near: Vec<Pose> = predicted.iter().zip(random_pose(&body, &angles)).map(|(pose, push)| {
             *pose * Pose::new(0.02 * push.translation, 0.01 * push.translation)
         }).collect();
@@ -88,7 +88,7 @@ proptest! {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
         check(&body, &poses, &|poses, normal| Limits { sigma: 0.1 }.add(&body, poses, normal))?;
-        check(&body, &poses, &|poses, normal| Posture { share: 0.25 }.add(&body, poses, normal))?;
+        check(&body, &poses, &|poses, normal| Posture { fraction: 0.25 }.add(&body, poses, normal))?;
     }
 
     #[test]
@@ -111,7 +111,7 @@ proptest! {
     }
 
     #[test]
-    fn outline(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 18)) {
+    fn contour(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 18)) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
         // A point of each limb and the edge it is drawn to, fixed in the world.
@@ -131,7 +131,7 @@ proptest! {
     fn regions(angles in angles(), offsets in proptest::collection::vec(-0.1..0.1_f64, 18)) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = random_pose(&body, &angles);
-        // A point of each limb's contour, and where the edge of its colours is seen along a direction fixed in the world.
+        // A point of each limb's contour, and where the edge of its colors is seen along a direction fixed in the world.
         let feet: Vec<Vec3> = offsets.iter().map(|offset| Vec3::new(0.06, *offset, 0.1)).collect();
         let normal = Vec3::new(0.48, -0.6, 0.64);
         let edges: Vec<f64> = poses.iter().zip(&feet).zip(&offsets).map(|((pose, foot), off)| normal.dot(*pose * *foot) + off).collect();

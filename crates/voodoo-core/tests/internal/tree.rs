@@ -73,7 +73,7 @@ fn a_matrix_that_is_not_positive_definite_is_refused() {
     assert!(!tree.solve());
 }
 
-/// Pulling one hand 10 cm away takes the arm along, and the joints stay closed within millimetres.
+/// Pulling one hand 10 cm away takes the arm along, and the joints stay closed within millimeters.
 #[test]
 fn bands_carry_a_pull_through_the_body() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();

@@ -60,7 +60,7 @@ pub(crate) fn bent(body: &Body, world_from_root: Pose, bend: f64, noise: &mut No
     poses
 }
 
-/// `count` points on the sides of the limbs, by area, none inside another limb, each coordinate off by `sigma` metres.
+/// `count` points on the sides of the limbs, by area, none inside another limb, each coordinate off by `sigma` meters.
 pub(crate) fn surface_points(
     body: &Body,
     poses: &[Pose],
@@ -132,26 +132,26 @@ impl DepthCamera {
         pinhole(self.width, self.height, [self.focal, self.focal, center[0], center[1]])
     }
 
-    /// Millimetres along the optical axis to the body before a wall at 3.6 m, with noise of `sigma` metres; returns the
+    /// Millimeters along the optical axis to the body before a wall at 3.6 m, with noise of `sigma` meters; returns the
     /// number of pixels on the body, too.
     pub(crate) fn shoot(&self, body: &Body, poses: &[Pose], sigma: f64, noise: &mut Noise) -> (Vec<u16>, usize) {
         let view = Viewpoint { camera: self.camera(), world_from_sensor: Self::world_from_sensor() };
         let mut image = Rendering::default();
         image.render(body, poses, &view, None).unwrap();
-        let seen = image.limb().iter().filter(|limb| **limb != NO_LIMB).count();
+        let visible = image.limb().iter().filter(|limb| **limb != NO_LIMB).count();
         let measured = |depth: &f32| {
             let depth = if *depth > 0.0 { f64::from(*depth) } else { 3.6 };
             ((depth + sigma * noise.normal()) * 1000.0).round() as u16
         };
         let pixels = image.depth().iter().map(measured).collect();
-        (pixels, seen)
+        (pixels, visible)
     }
 
     pub(crate) fn image<'a>(&self, pixels: &'a [u16]) -> DepthImage<'a> {
         DepthImage {
             pixels: DepthPixels::U16(pixels),
             camera: self.camera(),
-            metres_per_unit: 0.001,
+            meters_per_unit: 0.001,
             world_from_sensor: Self::world_from_sensor(),
             weight: 1.0,
             source: 0,
@@ -203,13 +203,13 @@ pub(crate) fn swaying(body: &Body, frames: usize) -> Vec<(Vec<u16>, Vec<[f64; 3]
     let mut noise = Noise(11);
     let camera = DepthCamera { width: 160, height: 124, focal: 145.0 };
     let standing = standing(body);
-    let centre = standing[0].translation;
+    let center = standing[0].translation;
     (0..frames)
         .map(|frame| {
             let turn = Quat::from_axis_angle(Vec3::Z, 0.04 * frame as f64);
             let shift = Vec3::new(0.0, 0.012 * frame as f64, 0.0);
             let move_limb = |pose: &Pose| {
-                Pose::from_parts(centre + turn * (pose.translation - centre) + shift, turn * pose.rotation)
+                Pose::from_parts(center + turn * (pose.translation - center) + shift, turn * pose.rotation)
             };
             let poses: Vec<Pose> = standing.iter().map(move_limb).collect();
             let (pixels, _) = camera.shoot(body, &poses, 0.01, &mut noise);

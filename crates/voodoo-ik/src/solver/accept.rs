@@ -1,13 +1,13 @@
 //! What of a step is taken: no level may become worse than those above it must make it.
 
-use super::{Problem, SETTLED, Solver};
+use super::{IkProblem, IkSolver, SETTLED};
 use voodoo_core::math::dot;
 
-impl Solver {
+impl IkSolver {
     /// Takes the whole step, or as much of it as leaves no level worse than those above it must make it.
     pub(super) fn advance(
         &mut self,
-        problem: &Problem,
+        problem: &IkProblem,
         count: usize,
         image: bool,
         slack: bool,
@@ -35,13 +35,13 @@ impl Solver {
             self.gain *= 0.5;
         }
         // Without what is below; then a quarter of its own part; then nothing but the levels above.
-        for (stage, share) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
-            if (stage == last && share == 1.0) || (stage == 0 && share == 0.0) {
+        for (stage, fraction) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
+            if (stage == last && fraction == 1.0) || (stage == 0 && fraction == 0.0) {
                 continue;
             }
-            self.propose(problem, angles, stage, share);
+            self.propose(problem, angles, stage, fraction);
             self.evaluate(problem);
-            if (share == 0.0 && slack)
+            if (fraction == 0.0 && slack)
                 || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
             {
                 return self.take_trial(angles);
@@ -51,12 +51,12 @@ impl Solver {
         if self.levels.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
     }
 
-    fn propose(&mut self, problem: &Problem, angles: &[f64], stage: usize, share: f64) {
+    fn propose(&mut self, problem: &IkProblem, angles: &[f64], stage: usize, fraction: f64) {
         let n = angles.len();
         let limits = problem.model.limits();
         for i in 0..n {
             let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
-            let step = above + share * (self.stages[stage * n + i] - above);
+            let step = above + fraction * (self.stages[stage * n + i] - above);
             // The clamp only takes off rounding: stages end at the limits.
             self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
         }

@@ -10,12 +10,12 @@ use std::ops::Range;
 use super::goal::{Goal, level_cost, level_ranges};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
-use super::model::{Kinematics, Model};
+use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::Pose;
 
 pub use rest::Rest;
 
-/// Residual that a lower level may leave in a higher one, metres.
+/// Residual that a lower level may leave in a higher one, meters.
 const SETTLED: f64 = 1e-10;
 /// Turn that leaves a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
@@ -30,12 +30,12 @@ const STALLED_STEPS: usize = 3;
 /// How to solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Options {
+pub struct SolverOptions {
     /// Most steps; J10 uses 15.
     pub steps: usize,
-    /// A single level with a residual below this is solved; metres.
+    /// A single level with a residual below this is solved; meters.
     pub tolerance: f64,
-    /// A step that turns nothing by more is the last one; radians (root: metres).
+    /// A step that turns nothing by more is the last one; radians (root: meters).
     pub still: f64,
     /// Share of the image step `h / |grad h|^2` to take, 0 to 1: alpha of J10 eq. 4 over that step.
     pub gain: f64,
@@ -46,7 +46,7 @@ pub struct Options {
     pub largest_turn: f64,
 }
 
-impl Default for Options {
+impl Default for SolverOptions {
     fn default() -> Self {
         Self { steps: 15, tolerance: 1e-6, still: 1e-6, gain: 1.0, caution: 0.3, largest_turn: 0.5 }
     }
@@ -61,7 +61,7 @@ pub struct Report {
     /// Postures tried, refused ones included.
     pub tried: usize,
     /// How many of them were compared with the images.
-    pub looked: usize,
+    pub compared: usize,
     /// Whether the angles or the image criterion came to rest (or the only level was reached).
     pub converged: bool,
     /// Image criterion at the end, pixels; 0 without images.
@@ -70,13 +70,13 @@ pub struct Report {
 
 /// Working memory, and the posture at rest; nothing is allocated after the first call with a problem of the same size.
 #[derive(Clone, Debug, Default)]
-pub struct Solver {
+pub struct IkSolver {
     /// The posture so far, and the one that is tried.
-    here: Posture,
-    trial: Posture,
+    here: EvaluatedPosture,
+    trial: EvaluatedPosture,
     trial_angles: Vec<f64>,
     levels: Levels,
-    linear: Linear,
+    linear: LinearSystem,
     /// The step after each level, and after the image: `stages x freedoms`.
     stages: Vec<f64>,
     /// Share of the image step.
@@ -84,7 +84,7 @@ pub struct Solver {
     phase_start: Vec<f64>,
     /// From before a nudge.
     saved: Saved,
-    looks: Looks,
+    trials: ImageTrials,
     /// What angles are drawn to below all else; empty: nothing.
     rest: Vec<Rest>,
     /// Gradients of the criterion where the images refused a step to rest.
@@ -93,7 +93,7 @@ pub struct Solver {
 
 /// A posture, and what it costs: each level, and the images with their gradient.
 #[derive(Clone, Debug, Default)]
-struct Posture {
+struct EvaluatedPosture {
     at: Kinematics,
     cost: Vec<f64>,
     gradient: Vec<f64>,
@@ -114,13 +114,13 @@ struct Levels {
 
 /// The linear system of one level, and its solution.
 #[derive(Clone, Debug, Default)]
-struct Linear {
+struct LinearSystem {
     taken: Taken,
     damped: Damped,
     jacobian: Vec<f64>,
     projected: Vec<f64>,
     residual: Vec<f64>,
-    wanted: Vec<f64>,
+    target: Vec<f64>,
     part: Vec<f64>,
 }
 
@@ -133,50 +133,50 @@ struct Saved {
 
 /// Postures that were tried, how many of them were compared with the images, and whether it is the images' turn.
 #[derive(Clone, Debug, Default)]
-struct Looks {
+struct ImageTrials {
     tried: usize,
-    looked: usize,
-    looking: bool,
+    compared: usize,
+    comparing: bool,
 }
 
-struct Problem<'a> {
-    model: &'a Model,
+struct IkProblem<'a> {
+    model: &'a ChainModel,
     base: &'a Pose,
     goals: &'a [Goal],
     criterion: Option<&'a Criterion<'a>>,
-    options: &'a Options,
+    options: &'a SolverOptions,
 }
 
-impl Solver {
+impl IkSolver {
     /// Moves `angles` towards the goals (sorted by level) and, in what they leave free, the bones into the silhouettes.
     ///
     /// Angles stay within the model's limits, whatever the goals; a start outside is moved onto them. Goals that cannot be
     /// reached, or contradict each other within a level, end at the least sum of weighted squares.
     pub fn solve(
         &mut self,
-        model: &Model,
+        model: &ChainModel,
         world_from_base: &Pose,
         goals: &[Goal],
         criterion: Option<&Criterion>,
-        options: &Options,
+        options: &SolverOptions,
         angles: &mut [f64],
     ) -> Report {
         let criterion = criterion.filter(|criterion| !criterion.views.is_empty() && !criterion.segments.is_empty());
-        let problem = Problem { model, base: world_from_base, goals, criterion, options };
+        let problem = IkProblem { model, base: world_from_base, goals, criterion, options };
         self.start(&problem, angles);
         let count = self.levels.ranges.len();
         let mut report = Report { converged: true, ..Report::default() };
         // One level after the other joins, the image last: what a level reaches does not depend on those below it.
         for phase in 0..count + usize::from(criterion.is_some()) {
             // The images are looked at when it is their turn: what the levels above do does not depend on them.
-            self.looks.looking = phase == count;
-            if self.looks.looking {
+            self.trials.comparing = phase == count;
+            if self.trials.comparing {
                 self.evaluate_here(&problem, angles);
             }
             self.phase_start.clear();
             self.phase_start.extend_from_slice(angles);
             self.phase(&problem, phase, true, angles, &mut report);
-            if phase > 0 && !self.settle(&problem, phase.min(count), angles) {
+            if phase > 0 && !self.correct_upper_levels(&problem, phase.min(count), angles) {
                 // Finite steps along curved null spaces led to another valley: again, with no rise allowed at all.
                 angles.copy_from_slice(&self.phase_start);
                 self.evaluate_here(&problem, angles);
@@ -187,16 +187,16 @@ impl Solver {
             }
         }
         if !self.rest.is_empty() {
-            self.draw(&problem, angles, &mut report);
+            self.pull_to_rest(&problem, angles, &mut report);
         }
         report.h = self.here.h;
-        (report.tried, report.looked) = (self.looks.tried, self.looks.looked);
+        (report.tried, report.compared) = (self.trials.tried, self.trials.compared);
         report
     }
 
     /// Steps with the first `phase + 1` levels, or all and the image. `slack`: levels above may rise by the second order of a
     /// step, to be made good by the next.
-    fn phase(&mut self, problem: &Problem, phase: usize, slack: bool, angles: &mut [f64], report: &mut Report) {
+    fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64], report: &mut Report) {
         let (count, options) = (self.levels.ranges.len(), problem.options);
         let image = phase == count;
         let active = if image { count } else { phase + 1 };
@@ -235,9 +235,9 @@ impl Solver {
 
     /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
     /// are as good as before the phase.
-    fn settle(&mut self, problem: &Problem, levels: usize, angles: &mut [f64]) -> bool {
-        let looking = self.looks.looking;
-        self.looks.looking = false;
+    fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, angles: &mut [f64]) -> bool {
+        let comparing = self.trials.comparing;
+        self.trials.comparing = false;
         let mut moved = false;
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
@@ -251,8 +251,8 @@ impl Solver {
                 }
             }
         }
-        self.looks.looking = looking;
-        if looking && moved {
+        self.trials.comparing = comparing;
+        if comparing && moved {
             self.evaluate_here(problem, angles);
         }
         self.here.cost.iter().zip(&self.levels.best).all(|(cost, best)| cost.sqrt() <= best + SETTLED)
@@ -263,12 +263,12 @@ impl Solver {
         &self.here.at
     }
 
-    fn start(&mut self, problem: &Problem, angles: &mut [f64]) {
+    fn start(&mut self, problem: &IkProblem, angles: &mut [f64]) {
         let n = problem.model.freedoms();
         for (angle, [low, high]) in angles.iter_mut().zip(problem.model.limits()) {
             *angle = angle.clamp(*low, *high);
         }
-        problem.model.normalise(angles);
+        problem.model.normalize(angles);
         level_ranges(problem.goals, &mut self.levels.ranges);
         let count = self.levels.ranges.len();
         self.levels.trust.clear();
@@ -283,27 +283,27 @@ impl Solver {
         self.stages.clear();
         self.stages.resize((count + 1) * n, 0.0);
         self.levels.best.clear();
-        (self.looks.tried, self.looks.looked, self.looks.looking) = (0, 0, false);
+        (self.trials.tried, self.trials.compared, self.trials.comparing) = (0, 0, false);
         self.gain = problem.options.gain;
         self.evaluate_here(problem, angles);
     }
 
-    fn evaluate_here(&mut self, problem: &Problem, angles: &[f64]) {
+    fn evaluate_here(&mut self, problem: &IkProblem, angles: &[f64]) {
         self.trial_angles.copy_from_slice(angles);
         self.evaluate(problem);
         self.accept();
     }
 
     /// Costs and kinematics at the trial angles, and the criterion if it is the images' turn.
-    fn evaluate(&mut self, problem: &Problem) {
-        self.looks.tried += 1;
+    fn evaluate(&mut self, problem: &IkProblem) {
+        self.trials.tried += 1;
         problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
         self.trial.cost.clear();
         let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
         self.trial.cost.extend(costs);
         self.trial.h = match problem.criterion {
-            Some(criterion) if self.looks.looking => {
-                self.looks.looked += 1;
+            Some(criterion) if self.trials.comparing => {
+                self.trials.compared += 1;
                 criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
             }
             _ => 0.0,
@@ -314,7 +314,7 @@ impl Solver {
         std::mem::swap(&mut self.here, &mut self.trial);
     }
 
-    fn nudge(&mut self, problem: &Problem, angles: &mut [f64]) {
+    fn nudge(&mut self, problem: &IkProblem, angles: &mut [f64]) {
         self.saved.angles.clear();
         self.saved.angles.extend_from_slice(angles);
         self.saved.cost.clear();

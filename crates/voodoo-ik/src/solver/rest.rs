@@ -2,12 +2,12 @@
 
 use super::super::goal::level_rows;
 use super::super::linear::largest;
-use super::{Problem, Report, Solver};
+use super::{IkProblem, IkSolver, Report};
 
 /// What the image criterion may rise by, pixels: rounding.
 const LEVEL: f64 = 1e-9;
 /// Shares of a step that are tried, one after the other.
-const SHARES: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
+const FRACTIONS: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
 
 /// An unknown and where it is drawn to, below all goals and the images.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Rest {
     pub angle: f64,
 }
 
-impl Solver {
+impl IkSolver {
     /// A solver that draws angles to `rest`: least squares of what they are off, in what goals and images leave free.
     pub fn with_rest(rest: Vec<Rest>) -> Self {
         Self { rest, ..Self::default() }
@@ -28,7 +28,7 @@ impl Solver {
     /// Few solves have one: it stays out of the way of the others.
     #[cold]
     #[inline(never)]
-    pub(super) fn draw(&mut self, problem: &Problem, angles: &mut [f64], report: &mut Report) {
+    pub(super) fn pull_to_rest(&mut self, problem: &IkProblem, angles: &mut [f64], report: &mut Report) {
         // What lower levels improved in higher ones on their way counts, too.
         self.levels.best.clear();
         self.levels.best.extend(self.here.cost.iter().map(|cost| cost.sqrt()));
@@ -36,7 +36,7 @@ impl Solver {
         let mut rest = false;
         for _ in 0..problem.options.steps {
             report.steps += 1;
-            if self.draw_once(problem, most, angles) < problem.options.still {
+            if self.pull_once(problem, most, angles) < problem.options.still {
                 rest = true;
                 break;
             }
@@ -45,11 +45,11 @@ impl Solver {
     }
 
     /// One step, `h` at most `most`; the largest change of an unknown, zero if there is none to be taken.
-    fn draw_once(&mut self, problem: &Problem, most: f64, angles: &mut [f64]) -> f64 {
+    fn pull_once(&mut self, problem: &IkProblem, most: f64, angles: &mut [f64]) -> f64 {
         let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
         self.phase_start.clear();
         self.phase_start.extend_from_slice(angles);
-        let off = self.off(angles);
+        let off = self.rest_error(angles);
         self.objections.clear();
         self.objections.reserve((n + 1) * n);
         for refused in 0..=n {
@@ -57,18 +57,18 @@ impl Solver {
             if largest(&self.stages[count * n..]) < problem.options.still {
                 return 0.0;
             }
-            for share in SHARES {
+            for fraction in FRACTIONS {
                 for (i, [low, high]) in limits.iter().enumerate() {
-                    angles[i] = (self.phase_start[i] + share * self.stages[count * n + i]).clamp(*low, *high);
+                    angles[i] = (self.phase_start[i] + fraction * self.stages[count * n + i]).clamp(*low, *high);
                 }
-                problem.model.normalise(angles);
-                self.looks.looking = false;
+                problem.model.normalize(angles);
+                self.trials.comparing = false;
                 self.evaluate_here(problem, angles);
-                let kept = self.settle(problem, count, angles);
+                let kept = self.correct_upper_levels(problem, count, angles);
                 self.objections.truncate(refused * n);
-                if kept && self.off(angles) < off {
+                if kept && self.rest_error(angles) < off {
                     if problem.criterion.is_some() {
-                        self.looks.looking = true;
+                        self.trials.comparing = true;
                         self.evaluate_here(problem, angles);
                     }
                     if self.here.h <= most {
@@ -79,11 +79,11 @@ impl Solver {
                 }
                 angles.copy_from_slice(&self.phase_start);
                 // A border of the images is met nearer than this by going along it.
-                if share < 1.0 && self.objections.len() > refused * n {
+                if fraction < 1.0 && self.objections.len() > refused * n {
                     break;
                 }
             }
-            self.looks.looking = problem.criterion.is_some();
+            self.trials.comparing = problem.criterion.is_some();
             self.evaluate_here(problem, angles);
             // Along the border of where the images are content, if it is they who object to the least step.
             if self.objections.len() == refused * n {
@@ -95,7 +95,7 @@ impl Solver {
 
     /// The step to rest in the null space of all goals and of what the images objected to, within the limits. Its stage is
     /// the one after those of the goals.
-    fn rest_part(&mut self, problem: &Problem, angles: &[f64]) {
+    fn rest_part(&mut self, problem: &IkProblem, angles: &[f64]) {
         let (n, count) = (angles.len(), self.levels.ranges.len());
         self.linear.taken.clear(n);
         for level in &self.levels.ranges {
@@ -122,7 +122,7 @@ impl Solver {
     }
 
     /// Sum of the squares of what the angles are off their rest.
-    fn off(&self, angles: &[f64]) -> f64 {
+    fn rest_error(&self, angles: &[f64]) -> f64 {
         let drawn = self.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
         drawn.map(|off| off * off).sum()
     }

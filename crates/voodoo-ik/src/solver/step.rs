@@ -2,17 +2,17 @@
 
 use super::super::goal::level_rows;
 use super::super::linear::largest;
-use super::{Problem, Solver};
+use super::{IkProblem, IkSolver};
 use voodoo_core::math::dot;
 
 /// Least damping, m^2: small beside `J J^T` of anything a person can see, so that the last steps are Newton's.
 const LEAST_DAMPING: f64 = 1e-10;
 
-impl Solver {
+impl IkSolver {
     /// One step of the first `count` levels, and of the image; the largest change of an unknown.
     pub(super) fn step(
         &mut self,
-        problem: &Problem,
+        problem: &IkProblem,
         count: usize,
         image: bool,
         slack: bool,
@@ -30,13 +30,13 @@ impl Solver {
             self.image_part(problem, count, angles);
         }
         let moved = self.advance(problem, count, image, slack, angles);
-        problem.model.normalise(angles);
+        problem.model.normalize(angles);
         moved
     }
 
     /// The part of one level: `(J P)^+ (-e - J d)` after the step `d` of the levels above (Baerlocher and Boulic 2004), cut at
     /// the limits and solved again without the unknowns that stand there.
-    fn level_part(&mut self, problem: &Problem, level: usize, angles: &[f64]) {
+    fn level_part(&mut self, problem: &IkProblem, level: usize, angles: &[f64]) {
         let n = angles.len();
         let goals = &problem.goals[self.levels.ranges[level].clone()];
         level_rows(problem.model, goals, &self.here.at, &mut self.linear.jacobian, &mut self.linear.residual);
@@ -44,19 +44,19 @@ impl Solver {
         let damping = self.levels.trust[level] * self.here.cost[level] + LEAST_DAMPING;
         for attempt in 0..=n {
             let stage = &self.stages[level * n..(level + 1) * n];
-            self.linear.wanted.clear();
+            self.linear.target.clear();
             let rows = self.linear.jacobian.chunks_exact(n).zip(&self.linear.residual);
-            self.linear.wanted.extend(rows.map(|(row, e)| -e - dot(row, stage)));
+            self.linear.target.extend(rows.map(|(row, e)| -e - dot(row, stage)));
             if attempt == 0 {
-                self.levels.before[level] = dot(&self.linear.wanted, &self.linear.wanted).sqrt();
+                self.levels.before[level] = dot(&self.linear.target, &self.linear.target).sqrt();
             }
             if self.linear.taken.is_empty() {
-                self.linear.damped.solve(&self.linear.jacobian, &self.linear.wanted, damping, &mut self.linear.part);
+                self.linear.damped.solve(&self.linear.jacobian, &self.linear.target, damping, &mut self.linear.part);
             } else {
                 self.linear.projected.clear();
                 self.linear.projected.extend_from_slice(&self.linear.jacobian);
                 self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
-                self.linear.damped.solve(&self.linear.projected, &self.linear.wanted, damping, &mut self.linear.part);
+                self.linear.damped.solve(&self.linear.projected, &self.linear.target, damping, &mut self.linear.part);
             }
             if !self.add_part(problem, level, angles) {
                 break;
@@ -67,7 +67,7 @@ impl Solver {
     /// The image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`, since the
     /// least `h` is zero. Where the images hardly see the free motion (along the line of sight) the gradient is small and
     /// says little, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
-    fn image_part(&mut self, problem: &Problem, count: usize, angles: &[f64]) {
+    fn image_part(&mut self, problem: &IkProblem, count: usize, angles: &[f64]) {
         let n = angles.len();
         self.inherit(count, n);
         let blind = problem.options.caution * problem.criterion.map_or(0.0, |criterion| criterion.reach(&self.here.at));
@@ -96,13 +96,13 @@ impl Solver {
     }
 
     /// Adds the part to a stage as far as the limits allow; true when one was hit, whose unknown then is taken.
-    pub(super) fn add_part(&mut self, problem: &Problem, stage: usize, angles: &[f64]) -> bool {
+    pub(super) fn add_part(&mut self, problem: &IkProblem, stage: usize, angles: &[f64]) -> bool {
         let n = angles.len();
         let most = largest(&self.linear.part);
         if !most.is_finite() {
             return false;
         }
-        let mut share = (problem.options.largest_turn / most.max(problem.options.largest_turn)).min(1.0);
+        let mut fraction = (problem.options.largest_turn / most.max(problem.options.largest_turn)).min(1.0);
         let step = &mut self.stages[stage * n..(stage + 1) * n];
         let mut hit = None;
         for (i, [low, high]) in problem.model.limits().iter().enumerate() {
@@ -114,12 +114,12 @@ impl Solver {
             } else {
                 continue;
             };
-            if share * by.abs() > room.abs() {
-                share = (room / by).max(0.0);
+            if fraction * by.abs() > room.abs() {
+                fraction = (room / by).max(0.0);
                 hit = Some(i);
             }
         }
-        step.iter_mut().zip(&self.linear.part).for_each(|(step, part)| *step += share * part);
+        step.iter_mut().zip(&self.linear.part).for_each(|(step, part)| *step += fraction * part);
         hit.is_some_and(|unknown| self.linear.taken.pin(unknown))
     }
 }

@@ -1,4 +1,4 @@
-//! One-to-one assignment of unlabelled candidates to sites.
+//! One-to-one assignment of unlabeled candidates to sites.
 
 use voodoo_core::math::{CostTable, linear_sum_assignment};
 

@@ -7,7 +7,7 @@
 use crate::skin::assignment::assign;
 use voodoo_core::math::{CostTable, Vec3};
 
-/// A region is at most this far from where its motion would have it, from one picture to the next, metres.
+/// A region is at most this far from where its motion would have it, from one picture to the next, meters.
 const BLOB_JUMP: f64 = 0.12;
 /// The same for a region that was seen once: nothing is known about its motion.
 const UNKNOWN_JUMP: f64 = 0.24;
@@ -15,13 +15,13 @@ const UNKNOWN_JUMP: f64 = 0.24;
 const AS_EXPECTED: f64 = 0.5;
 /// A region that was not seen for so long has lost its name, seconds.
 const FORGET: f64 = 0.25;
-/// No hand moves faster, metres a second.
+/// No hand moves faster, meters a second.
 const FASTEST: f64 = 8.0;
-/// A region that is not seen gets away from its expected place this fast, metres a second.
+/// A region that is not seen gets away from its expected place this fast, meters a second.
 const UNSEEN_SPEED: f64 = 2.0;
 /// Pictures come about this far apart, seconds: so long a region that was seen in the last one may have been away.
 const PERIOD: f64 = 1.0 / 30.0;
-/// Two candidates this near are one hand, metres.
+/// Two candidates this near are one hand, meters.
 pub(super) const ONE_HAND: f64 = 0.09;
 
 /// A candidate in space.
@@ -29,7 +29,7 @@ pub(super) const ONE_HAND: f64 = 0.09;
 pub struct Sight {
     /// Unit vector in the world from the camera's focal point.
     pub direction: Vec3,
-    /// On the surface, metres, or at a guessed distance.
+    /// On the surface, meters, or at a guessed distance.
     pub place: Vec3,
     /// Whether a depth camera saw it.
     pub deep: bool,
@@ -48,7 +48,7 @@ pub struct Blob {
     pub sight: Sight,
     /// When, seconds.
     pub stamp: f64,
-    /// Metres a second.
+    /// Meters a second.
     pub velocity: Vec3,
     /// Pictures in which it was seen.
     pub count: usize,
@@ -57,17 +57,17 @@ pub struct Blob {
     /// Of each site how far it was from there, squared shares of the gate; NaN: not known.
     pub far: Vec<f64>,
     /// Of each site how long it has spoken against being it, seconds.
-    pub doubt: Vec<f64>,
+    pub mismatch: Vec<f64>,
 }
 
 impl Blob {
     fn new(sight: Sight, stamp: f64, sites: usize) -> Self {
-        let (far, doubt) = (vec![f64::NAN; sites], vec![0.0; sites]);
-        Self { sight, stamp, velocity: Vec3::ZERO, count: 1, label: None, far, doubt }
+        let (far, mismatch) = (vec![f64::NAN; sites], vec![0.0; sites]);
+        Self { sight, stamp, velocity: Vec3::ZERO, count: 1, label: None, far, mismatch }
     }
 
     /// It was seen again.
-    fn see(&mut self, sight: Sight, stamp: f64) {
+    fn update(&mut self, sight: Sight, stamp: f64) {
         let elapsed = stamp - self.stamp;
         if elapsed > 0.0 {
             let mut velocity = (sight.place - self.sight.place) / elapsed;
@@ -83,10 +83,10 @@ impl Blob {
     }
 
     /// It is the same as a blob that was seen just now, which takes over its name and history.
-    fn merge(self, seen: &mut Self) {
-        if self.label.is_some() && seen.label.is_none() {
-            (seen.label, seen.far, seen.doubt) = (self.label, self.far, self.doubt);
-            seen.count = seen.count.max(self.count);
+    fn merge(self, newer: &mut Self) {
+        if self.label.is_some() && newer.label.is_none() {
+            (newer.label, newer.far, newer.mismatch) = (self.label, self.far, self.mismatch);
+            newer.count = newer.count.max(self.count);
         }
     }
 
@@ -96,7 +96,7 @@ impl Blob {
     }
 
     /// Distance of a sight from where the blob should be, in units of what is possible.
-    fn apart(&self, sight: &Sight, stamp: f64) -> f64 {
+    fn pose_difference(&self, sight: &Sight, stamp: f64) -> f64 {
         let expected = self.sight.place + self.velocity * (stamp - self.stamp);
         let mut offset = sight.place - expected;
         if !(self.sight.deep && sight.deep) {
@@ -124,7 +124,7 @@ impl Blobs {
 
     /// Takes up the sights of a picture, each of which is then the blob of its number; those that were not seen for long are dropped.
     pub fn follow(&mut self, sights: &[Sight], stamp: f64) {
-        let apart = |row: usize, column: usize| self.items[row].apart(&sights[column], stamp);
+        let apart = |row: usize, column: usize| self.items[row].pose_difference(&sights[column], stamp);
         let cost = CostTable::from_fn(self.items.len(), sights.len(), apart);
         let pairs = assign(&cost, 1.0, None);
         let near = |&(row, column): &(usize, usize)| cost.at(row, column) < AS_EXPECTED;
@@ -134,26 +134,26 @@ impl Blobs {
             .map(|(_, column)| sights[*column].region)
             .collect();
         let mut items: Vec<Option<Blob>> = self.items.drain(..).map(Some).collect();
-        let mut seen: Vec<Option<Blob>> = vec![None; sights.len()];
+        let mut updated: Vec<Option<Blob>> = vec![None; sights.len()];
         for pair in &pairs {
             let Some(mut blob) = items[pair.0].take() else { continue };
             // What reappears far from where it was going, as a part of a region that has a name, is that one's.
             if !near(pair) && kept.contains(&sights[pair.1].region) {
                 blob.label = None;
             }
-            blob.see(sights[pair.1], stamp);
-            seen[pair.1] = Some(blob);
+            blob.update(sights[pair.1], stamp);
+            updated[pair.1] = Some(blob);
         }
         let new =
             |(blob, sight): (Option<Blob>, &Sight)| blob.unwrap_or_else(|| Blob::new(*sight, stamp, self.missed.len()));
-        let mut found: Vec<Blob> = seen.into_iter().zip(sights).map(new).collect();
+        let mut found: Vec<Blob> = updated.into_iter().zip(sights).map(new).collect();
         for mut blob in items.into_iter().flatten() {
             if blob.stamp >= stamp || stamp - blob.stamp >= FORGET {
                 continue;
             }
             blob.velocity *= 0.5;
             let limit = blob.limit(stamp);
-            match sights.iter().position(|sight| blob.apart(sight, stamp) * limit <= ONE_HAND) {
+            match sights.iter().position(|sight| blob.pose_difference(sight, stamp) * limit <= ONE_HAND) {
                 Some(same) => blob.merge(&mut found[same]),
                 None => found.push(blob),
             }

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use crate::mask_regions::{Region, regions};
+use crate::mask_regions::{MaskRegion, regions};
 use crate::masks::{bounds, cut};
-use crate::registration::Labels;
-use crate::skin::outline::Cutout;
+use crate::registration::RegionLabels;
+use crate::skin::cutout::Cutout;
 
-/// Radius of a palm, metres.
+/// Radius of a palm, meters.
 pub const PALM: f64 = 0.045;
-/// Radius of a face, metres.
+/// Radius of a face, meters.
 pub const FACE: f64 = 0.085;
 /// A hand with stretched fingers in radii of its palm.
 const LONGEST_HAND: f64 = 4.6;
@@ -22,7 +22,7 @@ const MOST_FACES: f64 = 4.0;
 
 /// A place in the picture where a head or hand may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
+pub struct SkinCandidate {
     /// Column and row.
     pub pixel: [f64; 2],
     /// Number of the region it is of.
@@ -38,14 +38,14 @@ pub struct Candidate {
 /// Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger than four faces;
 /// one that is longer than a hand also offers its tips: the middles of what lies within a palm's reach of the outline's farthest
 /// points.
-pub fn candidates(skin: &[u8], width: usize, palm: f64) -> (Vec<Candidate>, Labels) {
+pub fn candidates(skin: &[u8], width: usize, palm: f64) -> (Vec<SkinCandidate>, RegionLabels) {
     let smallest = (SMALLEST * PI * palm.powi(2)).max(FEWEST_PIXELS);
     let largest = MOST_FACES * PI * (FACE / PALM * palm).powi(2);
     // Regions are numbered by two by two pixels: the part begins with whole ones.
     let [rows, columns] = bounds(skin, width).map(|span| span.start / 2 * 2..span.end);
     let part = cut(skin, width, &rows, &columns);
     let (regions, values) = regions(&part, columns.len());
-    let labels = Labels { first: [rows.start, columns.start], size: [rows.len(), columns.len()], values };
+    let labels = RegionLabels { first: [rows.start, columns.start], size: [rows.len(), columns.len()], values };
     let mut found = Vec::new();
     for (region, number) in regions.iter().zip(1..) {
         let area = region.area as f64;
@@ -54,15 +54,15 @@ pub fn candidates(skin: &[u8], width: usize, palm: f64) -> (Vec<Candidate>, Labe
         }
         let [sum_u, sum_v] = region.sums.map(|sum| sum as f64);
         let pixel = [columns.start as f64 + sum_u / area, rows.start as f64 + sum_v / area];
-        let middle = Candidate { pixel, region: number, area: region.area, hand: true };
+        let middle = SkinCandidate { pixel, region: number, area: region.area, hand: true };
         let sides = [region.rows, region.columns].map(|(low, high)| (high - low) as f64);
         let cutout = (sides[1].hypot(sides[0]) > LONGEST_HAND * palm).then(|| cut_out(region, number, &labels));
         match cutout.filter(|cutout| cutout.length() > LONGEST_HAND * palm) {
             None => found.push(middle),
             Some(cutout) => {
-                found.push(Candidate { hand: false, ..middle });
+                found.push(SkinCandidate { hand: false, ..middle });
                 let corner = [columns.start + region.columns.0, rows.start + region.rows.0].map(|place| place as f64);
-                let at = |tip: [f64; 2]| Candidate { pixel: [tip[0] + corner[0], tip[1] + corner[1]], ..middle };
+                let at = |tip: [f64; 2]| SkinCandidate { pixel: [tip[0] + corner[0], tip[1] + corner[1]], ..middle };
                 found.extend(cutout.tips(palm).into_iter().map(at));
             }
         }
@@ -70,7 +70,7 @@ pub fn candidates(skin: &[u8], width: usize, palm: f64) -> (Vec<Candidate>, Labe
     (found, labels)
 }
 
-fn cut_out(region: &Region, number: i32, labels: &Labels) -> Cutout {
+fn cut_out(region: &MaskRegion, number: i32, labels: &RegionLabels) -> Cutout {
     let (((top, bottom), (left, right)), width) = ((region.rows, region.columns), labels.size[1]);
     let rows = (top..bottom).flat_map(|row| &labels.values[row * width + left..row * width + right]);
     let mask = rows.map(|label| u8::from(*label == number)).collect();

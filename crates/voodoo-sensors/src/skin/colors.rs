@@ -1,4 +1,4 @@
-//! The colour of one person's skin in the light of the moment: a histogram that is learnt and forgets.
+//! The color of one person's skin in the light of the moment: a histogram that is learned and forgets.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ const SETTLED_PICTURES: u32 = 5;
 const FORGETTING_AT_FIRST: f32 = 0.5;
 /// Skin has to be this many times as likely as the rest.
 const RATIO: f32 = 2.0;
-/// And to be learnt, so many times: colours near to those that were skin.
+/// And to be learned, so many times: colors near to those that were skin.
 const NEAR_RATIO: f32 = 1.0;
 /// Standard deviation of the smoothing along luma, bins.
 const LUMA_SPREAD: f64 = 0.7;
@@ -22,17 +22,17 @@ const LUMA_SPREAD: f64 = 0.7;
 const CHROMA_SPREAD: f64 = 0.8;
 /// Bins to either side that smoothing reaches.
 const SMOOTHED_BINS: usize = 2;
-/// Two places that share less of their colours than this do not both show skin.
+/// Two places that share less of their colors than this do not both show skin.
 const IN_COMMON: f64 = 0.1;
 /// Middle of the chroma (Cr, Cb) of human skin of any tone under white light, of 256.
 const PRIOR_MIDDLE: [f32; 2] = [150.0, 110.0];
 /// And its spread.
 const PRIOR_SPREAD: f32 = 8.0;
-/// A place with fewer pixels of about skin's colour shows none.
+/// A place with fewer pixels of about skin's color shows none.
 const FEWEST_IN_PLACE: usize = 8;
 /// All places together show at least so many.
 const FEWEST: usize = 20;
-/// Share of the rest that is spread over all colours: one seen nowhere yet is not skin.
+/// Share of the rest that is spread over all colors: one seen nowhere yet is not skin.
 const UNSEEN: f32 = 0.05;
 /// Bins that share a value of Cr.
 const PLANE: usize = CHROMA_BINS * LUMA_BINS;
@@ -56,19 +56,19 @@ pub struct SkinColors {
 /// Where in a picture of `[height, width]` skin is and where not.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lesson<'a> {
-    /// Of each pixel's colour, see [`crate::chroma::bins`].
+    /// Of each pixel's color, see [`crate::chroma::bins`].
     pub bins: &'a [u16],
     pub size: [usize; 2],
-    /// Where the head is and where each hand is; of it only what has about skin's colour is learnt.
+    /// Where the head is and where each hand is; of it only what has about skin's color is learned.
     pub inside: &'a [Disc],
     /// 1 where no head or hand is.
     pub outside: &'a [u8],
-    /// Where the body is, if known: half of the rest is learnt from its clothes.
+    /// Where the body is, if known: half of the rest is learned from its clothes.
     pub body: Option<&'a [bool]>,
 }
 
 impl Default for SkinColors {
-    /// The colours of all skins against evenly spread ones.
+    /// The colors of all skins against evenly spread ones.
     fn default() -> Self {
         let axis = |middle: f32| {
             let place = move |bin: usize| (bin as f32 + 0.5) * (256 / CHROMA_BINS) as f32;
@@ -113,59 +113,59 @@ impl SkinColors {
 
     /// Learns from the pixels where skin must be, and from those far from it; whether there was enough skin to learn from.
     ///
-    /// A colour is learnt as far as two places show it: a shirt behind one hand is not skin.
+    /// A color is learned as far as two places show it: a shirt behind one hand is not skin.
     pub(super) fn learn(&mut self, lesson: &Lesson) -> bool {
-        let mut shown = std::mem::take(&mut self.scratch);
-        let enough = self.learn_with(lesson, &mut shown);
-        self.scratch = shown;
+        let mut smoothed_most = std::mem::take(&mut self.scratch);
+        let enough = self.learn_with(lesson, &mut smoothed_most);
+        self.scratch = smoothed_most;
         enough
     }
 
-    fn learn_with(&mut self, lesson: &Lesson, [most, shown, shares, work]: &mut [Vec<f32>; 4]) -> bool {
+    fn learn_with(&mut self, lesson: &Lesson, [most, smoothed_most, frequencies, work]: &mut [Vec<f32>; 4]) -> bool {
         let masks: Vec<_> = lesson.inside.iter().map(|disc| self.skin_in(lesson, disc)).collect();
         let places: Vec<_> = masks.iter().filter(|found| found.len() >= FEWEST_IN_PLACE).collect();
         if places.len() < 2 || places.iter().map(|found| found.len()).sum::<usize>() < FEWEST {
             return false;
         }
-        for values in [&mut *most, &mut *shown, &mut *shares] {
+        for values in [&mut *most, &mut *smoothed_most, &mut *frequencies] {
             values.clear();
             values.resize(BINS, 0.0);
         }
         let (mut first, mut end) = (BINS, 0);
         for found in places {
             // So few pixels are counted without rounding.
-            found.iter().for_each(|bin| shares[usize::from(*bin)] += 1.0);
-            let planes = smooth(shares, work);
+            found.iter().for_each(|bin| frequencies[usize::from(*bin)] += 1.0);
+            let planes = smooth(frequencies, work);
             let count = found.len() as f32;
             (first, end) = (first.min(planes.start), end.max(planes.end));
-            for ((most, shown), share) in
-                most[planes.clone()].iter_mut().zip(&mut shown[planes.clone()]).zip(&mut shares[planes])
+            for ((most, smoothed_most), frequency) in
+                most[planes.clone()].iter_mut().zip(&mut smoothed_most[planes.clone()]).zip(&mut frequencies[planes])
             {
-                let smoothed = std::mem::take(share) / count;
-                *shown = shown.max(most.min(smoothed));
+                let smoothed = std::mem::take(frequency) / count;
+                *smoothed_most = smoothed_most.max(most.min(smoothed));
                 *most = most.max(smoothed);
             }
         }
-        let total = sum(&shown[first..end]);
+        let total = sum(&smoothed_most[first..end]);
         if total < IN_COMMON {
             return false;
         }
         let keep = if self.pictures >= SETTLED_PICTURES { FORGETTING } else { FORGETTING_AT_FIRST };
         let total = total as f32;
-        for (skin, shown) in self.skin.iter_mut().zip(&*shown) {
-            *skin = keep * *skin + (1.0 - keep) * (shown / total);
+        for (skin, smoothed_most) in self.skin.iter_mut().zip(&*smoothed_most) {
+            *skin = keep * *skin + (1.0 - keep) * (smoothed_most / total);
         }
-        self.count_rest(lesson, shares);
-        smooth(shares, work);
-        for (rest, share) in self.rest.iter_mut().zip(&*shares) {
-            *rest = keep * *rest + (1.0 - keep) * ((1.0 - UNSEEN) * share + UNSEEN / BINS as f32);
+        self.count_rest(lesson, frequencies);
+        smooth(frequencies, work);
+        for (rest, frequency) in self.rest.iter_mut().zip(&*frequencies) {
+            *rest = keep * *rest + (1.0 - keep) * ((1.0 - UNSEEN) * frequency + UNSEEN / BINS as f32);
         }
         self.pictures += 1;
         self.judge();
         true
     }
 
-    /// Bins of the pixels of a circle that have about skin's colour.
+    /// Bins of the pixels of a circle that have about skin's color.
     fn skin_in(&self, lesson: &Lesson, disc: &Disc) -> Vec<u16> {
         let [rows, columns] = disc.window(lesson.size);
         if rows.is_empty() || columns.is_empty() {
@@ -180,7 +180,7 @@ impl SkinColors {
     }
 
     /// Shares of bins where no skin is; half of them of the body's clothes, where it is known.
-    fn count_rest(&mut self, lesson: &Lesson, shares: &mut [f32]) {
+    fn count_rest(&mut self, lesson: &Lesson, frequencies: &mut [f32]) {
         let outside = lesson.outside.iter().map(|outside| *outside != 0);
         let pixels = lesson.bins.iter().copied().zip(outside);
         let mut all = lesson.outside.iter().map(|outside| u32::from(*outside)).sum::<u32>();
@@ -195,19 +195,20 @@ impl SkinColors {
         }
         all = all.max(1);
         self.counter.take(|bin, [other, inside]| {
-            let share = (other + inside) as f32 / all as f32;
-            shares[bin] = if clothes > 0 { 0.5 * share + 0.5 * (inside as f32 / clothes as f32) } else { share };
+            let frequency = (other + inside) as f32 / all as f32;
+            frequencies[bin] =
+                if clothes > 0 { 0.5 * frequency + 0.5 * (inside as f32 / clothes as f32) } else { frequency };
         });
     }
 }
 
-/// Smooths a histogram in place: the colours between those seen count too. Beyond its ends it goes on as in a mirror. What is not zero
+/// Smooths a histogram in place: the colors between those seen count too. Beyond its ends it goes on as in a mirror. What is not zero
 /// lies in the range that is returned.
 fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
     work.clear();
     work.resize(values.len(), 0.0);
     let luma = luma_kernel();
-    let [far, near, here] = kernel(CHROMA_SPREAD).map(|share| share as f32);
+    let [far, near, here] = kernel(CHROMA_SPREAD).map(|frequency| frequency as f32);
     let mirrored = |place: usize, shift: isize| {
         let place = place as isize + shift;
         let last = CHROMA_BINS as isize - 1;
@@ -219,7 +220,7 @@ fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
             place
         }) as usize
     };
-    // Most colours are seen nowhere: only planes with some, and those around, hold anything.
+    // Most colors are seen nowhere: only planes with some, and those around, hold anything.
     let holds: Vec<bool> = values.chunks_exact(PLANE).map(|plane| plane.iter().any(|value| *value != 0.0)).collect();
     let first = holds.iter().position(|holds| *holds).unwrap_or(CHROMA_BINS).saturating_sub(SMOOTHED_BINS);
     let end = holds.iter().rposition(|holds| *holds).map_or(first, |last| (last + 1 + SMOOTHED_BINS).min(CHROMA_BINS));
@@ -233,7 +234,7 @@ fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
                     let before = *column;
                     *column = [0.0; LUMA_BINS];
                     for (value, kernel) in before.iter().zip(&luma) {
-                        column.iter_mut().zip(kernel).for_each(|(sum, share)| *sum += value * share);
+                        column.iter_mut().zip(kernel).for_each(|(sum, frequency)| *sum += value * frequency);
                     }
                 }
                 let columns = plane.as_chunks::<LUMA_BINS>().0;
@@ -266,7 +267,7 @@ fn luma_kernel() -> [[f32; LUMA_BINS]; LUMA_BINS] {
     let [far, near, here] = kernel(LUMA_SPREAD);
     let mut to = [[0.0_f64; LUMA_BINS]; LUMA_BINS];
     for bin in 0..LUMA_BINS as isize {
-        for (shift, share) in [(-2, far), (-1, near), (0, here), (1, near), (2, far)] {
+        for (shift, frequency) in [(-2, far), (-1, near), (0, here), (1, near), (2, far)] {
             let (from, last) = (bin + shift, LUMA_BINS as isize - 1);
             let from = if from < 0 {
                 -1 - from
@@ -275,10 +276,10 @@ fn luma_kernel() -> [[f32; LUMA_BINS]; LUMA_BINS] {
             } else {
                 from
             };
-            to[from as usize][bin as usize] += share;
+            to[from as usize][bin as usize] += frequency;
         }
     }
-    to.map(|row| row.map(|share| share as f32))
+    to.map(|row| row.map(|frequency| frequency as f32))
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@ use crate::body_view::BodyView;
 use crate::chroma::find_bins;
 use crate::eye::Eye;
 use crate::mask_regions::SkinPicture;
-use crate::registration::Labels;
+use crate::registration::RegionLabels;
 use crate::skin::blobs::{Blobs, Sight};
-use crate::skin::candidates::{Candidate, PALM, candidates};
+use crate::skin::candidates::{PALM, SkinCandidate, candidates};
 use crate::skin::naming::{Choice, Rules};
 use crate::skin::picture::Picture;
-use crate::skin::rules::{Expected, LimbDistances, Seen, of_pieces};
+use crate::skin::rules::{Expected, LimbDistances, SightContext, of_pieces};
 use crate::skin::teacher::Teacher;
 use voodoo_core::PointSlice;
 use voodoo_core::TrackError;
@@ -24,13 +24,13 @@ use voodoo_core::math::Vec3;
 const LONGEST_JOINED: f64 = 3.0;
 /// A smaller share of a palm is a speck.
 const SPECK: f64 = 0.7;
-/// The middle of a head lies this far behind its face, metres.
+/// The middle of a head lies this far behind its face, meters.
 const FACE_BEHIND: f64 = 0.075;
 /// And that of a hand behind its skin.
 const HAND_BEHIND: f64 = 0.04;
 /// Depth is looked for within so many radii of a palm around a candidate.
-const LOOKED_AT: f64 = 1.5;
-/// Nearer to the camera no site is looked for, metres.
+const SURFACE_RADIUS: f64 = 1.5;
+/// Nearer to the camera no site is looked for, meters.
 const NEAREST_SITE: f64 = 0.1;
 
 /// How skin regions become rays.
@@ -38,15 +38,15 @@ const NEAREST_SITE: f64 = 0.1;
 pub struct SkinSettings {
     /// Names of the sites; those of a hand begin with the letter of its side, and so do its limbs.
     pub sites: Vec<String>,
-    /// A new region farther than this from the predicted site is not it, metres.
+    /// A new region farther than this from the predicted site is not it, meters.
     pub gate: f64,
-    /// The gate grows by this while its site is not seen, metres a second.
+    /// The gate grows by this while its site is not seen, meters a second.
     pub growth: f64,
-    /// Up to this, metres.
+    /// Up to this, meters.
     pub lost_gate: f64,
     /// And for a hand that a depth camera sees up to this.
     pub widest_gate: f64,
-    /// A region is taken far from where its site is expected only if it is this far outside the body, metres.
+    /// A region is taken far from where its site is expected only if it is this far outside the body, meters.
     pub unexplained: f64,
     /// A second candidate that is not this many times as far as the first makes both useless.
     pub ambiguity: f64,
@@ -78,9 +78,9 @@ pub struct SkinInput<'a> {
     pub eye: Eye<'a>,
     /// What a depth camera saw of the body in the picture.
     pub body: Option<&'a Arc<BodyView>>,
-    /// What was learnt.
+    /// What was learned.
     pub teacher: &'a Teacher,
-    /// Whether enough was learnt to tell skin.
+    /// Whether enough was learned to tell skin.
     pub settled: bool,
     /// The sites that are looked for.
     pub expected: &'a [Expected],
@@ -91,7 +91,7 @@ pub struct SkinInput<'a> {
 }
 
 impl SkinInput<'_> {
-    /// A site's depth along the optical axis, metres.
+    /// A site's depth along the optical axis, meters.
     fn depth(&self, site: &Expected) -> f64 {
         self.eye.in_sensor(site.place).z
     }
@@ -106,7 +106,7 @@ impl SkinInput<'_> {
     }
 
     /// Unit vectors in the world through the candidates' pixels.
-    fn directions(&self, candidates: &[Candidate]) -> Vec<Vec3> {
+    fn directions(&self, candidates: &[SkinCandidate]) -> Vec<Vec3> {
         candidates.iter().map(|item| self.eye.direction(self.eye.undistorted(item.pixel))).collect()
     }
 
@@ -136,13 +136,13 @@ impl SkinInput<'_> {
 pub struct FoundSite {
     /// Its number.
     pub site: usize,
-    /// A point of the ray that it is on, world, metres.
+    /// A point of the ray that it is on, world, meters.
     pub origin: Vec3,
     /// The ray's unit direction.
     pub direction: Vec3,
-    /// Where on it the site is, if a depth camera saw it, metres.
+    /// Where on it the site is, if a depth camera saw it, meters.
     pub place: Option<Vec3>,
-    /// Where it is expected along the optical axis, metres.
+    /// Where it is expected along the optical axis, meters.
     pub depth: f64,
 }
 
@@ -158,7 +158,7 @@ pub struct SkinCue {
     /// Pairs of a site's and a candidate's number.
     pub assigned: Vec<(usize, usize)>,
     /// Where in the last picture a head or a hand may be.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<SkinCandidate>,
     spare: Option<Arc<Picture>>,
 }
 
@@ -200,7 +200,7 @@ impl SkinCue {
             labels
         } else {
             self.candidates.clear();
-            Labels::default()
+            RegionLabels::default()
         };
         if self.candidates.is_empty() {
             return Ok(Vec::new());
@@ -216,7 +216,7 @@ impl SkinCue {
             .zip(&depths)
             .map(|(item, z)| (item.area as f64) < SPECK * PI * (PALM * input.eye.focal() / z).powi(2))
             .collect();
-        let seen = Seen {
+        let sight_context = SightContext {
             sights: &sights,
             blobs: &self.blobs.items[..count],
             specks: &specks,
@@ -229,7 +229,8 @@ impl SkinCue {
         };
         let theirs: Vec<bool> = (0..count).map(theirs).collect();
         let origin = input.eye.origin();
-        let mut choices: Vec<Choice> = expected.iter().map(|site| self.choice(site, &seen, &theirs, origin)).collect();
+        let mut choices: Vec<Choice> =
+            expected.iter().map(|site| self.choice(site, &sight_context, &theirs, origin)).collect();
         // Names are given below; what could be a piece of a hand is known before.
         let pieces: Vec<Vec<bool>> = choices.iter().map(|choice| pieces(choice, &sights)).collect();
         let rules =
@@ -254,8 +255,8 @@ impl SkinCue {
         if input.body.is_some() && body.is_none() {
             return Err(TrackError::measurement("body", "a view of the picture's size", format!("{:?}", input.size)));
         }
-        let Picture { bins, seen, skin, .. } = &mut picture;
-        let looked = SkinPicture {
+        let Picture { bins, colored, skin, .. } = &mut picture;
+        let skin_picture = SkinPicture {
             bins,
             width: input.size[1],
             table: &input.teacher.colors.table[..],
@@ -263,25 +264,30 @@ impl SkinCue {
             always: input.teacher.always(input.size),
             before: body.and_then(|body| body.before.as_deref()),
         };
-        looked.find(LONGEST_JOINED * radius, seen, skin)?;
+        skin_picture.find(LONGEST_JOINED * radius, colored, skin)?;
         (picture.size, picture.body) = (input.size, body.cloned());
         self.spare = Some(std::mem::replace(&mut self.picture, Arc::new(picture)));
         Ok(())
     }
 
     /// The candidates in space, and their depths along the optical axis: as the depth camera has them, else that of the nearest site.
-    fn sights(&self, input: &SkinInput, labels: &Labels, nearest: f64) -> Result<(Vec<Sight>, Vec<f64>), TrackError> {
+    fn sights(
+        &self,
+        input: &SkinInput,
+        labels: &RegionLabels,
+        nearest: f64,
+    ) -> Result<(Vec<Sight>, Vec<f64>), TrackError> {
         let directions = input.directions(&self.candidates);
         let measured = match &self.picture.body {
             Some(body) => {
                 let places: Vec<_> = self.candidates.iter().map(|item| (item.pixel, item.region)).collect();
-                let radius = LOOKED_AT * PALM * input.eye.focal() / nearest;
+                let radius = SURFACE_RADIUS * PALM * input.eye.focal() / nearest;
                 body.measured().nearest_surfaces(labels, &places, radius)?
             }
             None => vec![None; directions.len()],
         };
         let (origin, axis) = (input.eye.origin(), input.eye.axis());
-        let sight = |((direction, item), found): ((&Vec3, &Candidate), Option<(f64, bool)>)| {
+        let sight = |((direction, item), found): ((&Vec3, &SkinCandidate), Option<(f64, bool)>)| {
             let z = found.map_or(nearest, |(z, _)| z);
             let sight = Sight {
                 direction: *direction,
@@ -296,8 +302,8 @@ impl SkinCue {
         Ok(directions.iter().zip(&self.candidates).zip(measured).map(sight).unzip())
     }
 
-    fn choice(&self, site: &Expected, seen: &Seen, theirs: &[bool], origin: Vec3) -> Choice {
-        let inside: Vec<Vec3> = seen.sights.iter().map(|sight| inside(site, sight)).collect();
+    fn choice(&self, site: &Expected, sight_context: &SightContext, theirs: &[bool], origin: Vec3) -> Choice {
+        let inside: Vec<Vec3> = sight_context.sights.iter().map(|sight| inside(site, sight)).collect();
         let away = |(sight, inside): (&Sight, &Vec3)| {
             if sight.deep {
                 return inside.distance(site.place);
@@ -305,17 +311,17 @@ impl SkinCue {
             let offset = site.place - origin;
             (offset - offset.dot(sight.direction).max(0.0) * sight.direction).length()
         };
-        let distance: Vec<f64> = seen.sights.iter().zip(&inside).map(away).collect();
-        let mut allowed = seen.allowed(site, &inside);
+        let distance: Vec<f64> = sight_context.sights.iter().zip(&inside).map(away).collect();
+        let mut allowed = sight_context.allowed(site, &inside);
         for (index, allowed) in allowed.iter_mut().enumerate() {
             // A speck far from where the hand is expected is what is left of another region.
-            if theirs[index] || (distance[index] > self.settings.gate && seen.specks[index]) {
+            if theirs[index] || (distance[index] > self.settings.gate && sight_context.specks[index]) {
                 *allowed = 0;
             }
         }
         let deep = self.picture.body.is_some();
         let widest = if deep && !site.head { self.settings.widest_gate } else { self.settings.lost_gate };
-        let elsewhere = seen.elsewhere(site, self.settings.side(site.site));
+        let elsewhere = sight_context.elsewhere(site, self.settings.side(site.site));
         Choice { site: site.site, widest, distance, allowed, elsewhere }
     }
 }

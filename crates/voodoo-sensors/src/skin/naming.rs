@@ -20,9 +20,9 @@ const TAKEN: f64 = 0.5;
 const NONE: f64 = 0.8;
 /// A name is given up after this time, seconds, in which the body did not come nearer to it than so many gates, or in which it lay on
 /// another limb.
-const DOUBT: f64 = 0.25;
-/// See [`DOUBT`], shares of the gate.
-const DOUBTED_APART: f64 = 1.25;
+const MISMATCH_TIME: f64 = 0.25;
+/// See [`MISMATCH_TIME`], shares of the gate.
+const MISMATCH_DISTANCE: f64 = 1.25;
 /// Pictures farther apart than this count as this, seconds: doubt needs several.
 const LONGEST: f64 = 0.1;
 /// Pictures in which a region was seen before it may be named from afar.
@@ -33,9 +33,9 @@ const RIVAL: f64 = 0.5;
 /// How regions get names.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
-    /// A new region farther than this from where the site is expected is not it, metres.
+    /// A new region farther than this from where the site is expected is not it, meters.
     pub gate: f64,
-    /// Of the gate while its site is not seen, metres a second.
+    /// Of the gate while its site is not seen, meters a second.
     pub growth: f64,
     /// A new name needs its second-best candidate this many times as far as the first.
     pub ambiguity: f64,
@@ -46,9 +46,9 @@ pub(super) struct Rules {
 pub(super) struct Choice {
     /// Its number.
     pub site: usize,
-    /// How wide its gate gets, metres.
+    /// How wide its gate gets, meters.
     pub widest: f64,
-    /// From each blob, metres.
+    /// From each blob, meters.
     pub distance: Vec<f64>,
     /// Of each blob: 0 it cannot be the site, 1 only near where it is expected, 2 anywhere.
     pub allowed: Vec<u8>,
@@ -64,8 +64,8 @@ impl Blobs {
         self.stamp = stamp;
         for choice in choices.iter_mut() {
             for (column, blob) in self.items[..count].iter_mut().enumerate() {
-                blob.waver(choice, column, rules.gate, elapsed);
-                if blob.doubt[choice.site] > DOUBT {
+                blob.update_mismatch(choice, column, rules.gate, elapsed);
+                if blob.mismatch[choice.site] > MISMATCH_TIME {
                     choice.allowed[column] = 0;
                 }
             }
@@ -81,8 +81,8 @@ impl Blobs {
             *missed = if missed.is_nan() { stamp } else { *missed };
             let reach = rules.gate.max((rules.gate + rules.growth * (stamp - *missed)).min(choice.widest));
             for column in 0..count {
-                self.items[column].agree(choice.site, choice.distance[column], rules.gate);
-                if let Some(value) = price(&self.items[..count], choice, column, &owners, (rules, reach)) {
+                self.items[column].update_distance(choice.site, choice.distance[column], rules.gate);
+                if let Some(value) = naming_cost(&self.items[..count], choice, column, &owners, (rules, reach)) {
                     costs[row * count + column] = value.sqrt();
                 }
             }
@@ -105,24 +105,24 @@ impl Blobs {
 
 impl Blob {
     /// How long it has spoken against being a site: on another limb, or its name without the body going there.
-    fn waver(&mut self, choice: &Choice, column: usize, gate: f64, elapsed: f64) {
+    fn update_mismatch(&mut self, choice: &Choice, column: usize, gate: f64, elapsed: f64) {
         let named = self.label == Some(choice.site) && self.sight.deep;
-        let against = choice.elsewhere[column] || (named && choice.distance[column] > DOUBTED_APART * gate);
-        let doubt = &mut self.doubt[choice.site];
-        *doubt = (*doubt + if against { elapsed } else { -elapsed }).clamp(0.0, 2.0 * DOUBT);
+        let against = choice.elsewhere[column] || (named && choice.distance[column] > MISMATCH_DISTANCE * gate);
+        let mismatch = &mut self.mismatch[choice.site];
+        *mismatch = (*mismatch + if against { elapsed } else { -elapsed }).clamp(0.0, 2.0 * MISMATCH_TIME);
     }
 
     /// Takes a distance from a site into the average.
-    fn agree(&mut self, site: usize, distance: f64, gate: f64) {
+    fn update_distance(&mut self, site: usize, distance: f64, gate: f64) {
         let sample = (distance / gate).min(FARTHEST_GATES).powi(2);
-        let share = if self.count == 1 { 1.0 } else { 1.0 - (-1.0 / (RATE * AGREEMENT)).exp() };
+        let weight = if self.count == 1 { 1.0 } else { 1.0 - (-1.0 / (RATE * AGREEMENT)).exp() };
         let far = &mut self.far[site];
-        *far = (1.0 - share) * if far.is_nan() { sample } else { *far } + share * sample;
+        *far = (1.0 - weight) * if far.is_nan() { sample } else { *far } + weight * sample;
     }
 }
 
 /// What it costs that a blob is a site; none where it cannot be.
-fn price(
+fn naming_cost(
     blobs: &[Blob],
     choice: &Choice,
     column: usize,

@@ -7,25 +7,25 @@ use voodoo_core::math::Vec3;
 const BARE_LIMBS: [&str; 5] = ["head", "neck", "upperarm", "forearm", "hand"];
 /// Endings of the names of limbs that a hand is on.
 const OWN_LIMBS: [&str; 2] = ["forearm", "hand"];
-/// What is nearer to the bare limbs than this may be theirs, metres.
+/// What is nearer to the bare limbs than this may be theirs, meters.
 const BARE: f32 = 0.08;
-/// A hand before trunk or legs stands out from them by as much, metres; a stripe of a shirt does not.
+/// A hand before trunk or legs stands out from them by as much, meters; a stripe of a shirt does not.
 const STANDS_OUT: f32 = 0.02;
 /// A hand is no nearer to an elbow that is seen than this share of its forearm.
 const NEAREST_HAND: f64 = 0.6;
-/// And not this much farther, metres.
+/// And not this much farther, meters.
 const FARTHEST_HAND: f64 = 0.10;
-/// What is no farther than this from a limb may be its surface, metres.
+/// What is no farther than this from a limb may be its surface, meters.
 const ON_LIMB: f32 = 0.03;
-/// And is, if it is this much farther from another limb, metres.
+/// And is, if it is this much farther from another limb, meters.
 const OFF_LIMB: f32 = 0.06;
 /// A hand is no farther from its shoulder than this share of its arm...
-const ARM_SHARE: f64 = 1.2;
-/// ... and so much more, metres: room for a model that is not where the person is.
+const ARM_FRACTION: f64 = 1.2;
+/// ... and so much more, meters: room for a model that is not where the person is.
 const ARM_ROOM: f64 = 0.15;
-/// From the wrist to the fingertips, metres.
+/// From the wrist to the fingertips, meters.
 const HAND_LENGTH: f64 = 0.18;
-/// How far the middle of a hand with its fingers is beyond the middle of the palm, metres.
+/// How far the middle of a hand with its fingers is beyond the middle of the palm, meters.
 const FINGERS: f64 = 0.015;
 
 /// A site that skin is looked for at, where the body is expected.
@@ -35,7 +35,7 @@ pub struct Expected {
     pub site: usize,
     /// Whether it is the head's, not a hand's.
     pub head: bool,
-    /// Where it is expected, metres.
+    /// Where it is expected, meters.
     pub place: Vec3,
     /// Shoulder, elbow and hand of its side.
     pub arm: [Option<Vec3>; 3],
@@ -50,17 +50,17 @@ impl Expected {
         self.arm[1]
     }
 
-    /// How far a hand can be from its shoulder, metres.
+    /// How far a hand can be from its shoulder, meters.
     fn reach(&self) -> f64 {
         match self.arm {
             [Some(shoulder), Some(elbow), Some(hand)] => {
-                ARM_SHARE * (elbow.distance(shoulder) + hand.distance(elbow)) + ARM_ROOM
+                ARM_FRACTION * (elbow.distance(shoulder) + hand.distance(elbow)) + ARM_ROOM
             }
             _ => f64::INFINITY,
         }
     }
 
-    /// From the middle of a hand with its fingers to the hand's site, metres; zero for a head or without an elbow.
+    /// From the middle of a hand with its fingers to the hand's site, meters; zero for a head or without an elbow.
     pub(super) fn to_palm(self) -> Vec3 {
         match self.elbow() {
             Some(elbow) if !self.head => {
@@ -72,7 +72,7 @@ impl Expected {
     }
 }
 
-/// Distances of all sights from the surfaces of limbs, by the limbs' names, metres.
+/// Distances of all sights from the surfaces of limbs, by the limbs' names, meters.
 #[derive(Clone, Debug, Default)]
 pub struct LimbDistances {
     /// Names, such as `l_forearm`.
@@ -101,18 +101,18 @@ fn is_bare(limb: &str) -> bool {
 
 /// What is known of the sights of a picture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen<'a> {
+pub(super) struct SightContext<'a> {
     pub sights: &'a [Sight],
     /// Theirs.
     pub blobs: &'a [Blob],
     /// Which are too small for a hand.
     pub specks: &'a [bool],
     pub limbs: &'a LimbDistances,
-    /// What is farther from the body than this, metres, it does not explain.
+    /// What is farther from the body than this, meters, it does not explain.
     pub unexplained: f32,
 }
 
-impl Seen<'_> {
+impl SightContext<'_> {
     /// Of every sight: 0 it cannot be the site, 1 only near to where it is expected, 2 wherever it can reach. `inside` is where the
     /// site is if a sight is its surface.
     ///
@@ -197,7 +197,7 @@ fn within_arm(site: &Expected, sight: &Sight, inside: Vec3) -> bool {
 }
 
 /// Where the middle of a hand is whose region is at `place` and which may be in pieces: something lies across it, or is behind it and
-/// of its colour. It is then anywhere between two pieces that are no farther apart than a hand is long: of those places, the one
+/// of its color. It is then anywhere between two pieces that are no farther apart than a hand is long: of those places, the one
 /// nearest to where it is expected.
 pub(super) fn of_pieces(place: Vec3, pieces: impl Iterator<Item = Vec3>, expected: Vec3) -> Vec3 {
     let mut nearest = place;
@@ -205,8 +205,8 @@ pub(super) fn of_pieces(place: Vec3, pieces: impl Iterator<Item = Vec3>, expecte
         let across = piece - place;
         let span = across.length_squared();
         if 0.0 < span && span < HAND_LENGTH * HAND_LENGTH {
-            let share = ((expected - place).dot(across) / span).clamp(0.0, 1.0);
-            let between = place + share * across;
+            let fraction = ((expected - place).dot(across) / span).clamp(0.0, 1.0);
+            let between = place + fraction * across;
             if between.distance(expected) < nearest.distance(expected) {
                 nearest = between;
             }
@@ -249,7 +249,8 @@ mod tests {
         let sight = Sight { direction: Vec3::X, place: Vec3::X, deep: true, hand: true, region: 1, still: false };
         let names = ["thorax", "l_forearm", "head"].map(String::from).to_vec();
         let limbs = LimbDistances { names, away: vec![0.0, 0.5, 0.2, 0.01, 0.4, 0.0] };
-        let seen = Seen { sights: &[sight; 2], blobs: &[], specks: &[false; 2], limbs: &limbs, unexplained: 0.06 };
+        let sight_context =
+            SightContext { sights: &[sight; 2], blobs: &[], specks: &[false; 2], limbs: &limbs, unexplained: 0.06 };
         let site = Expected {
             site: 0,
             head: false,
@@ -258,11 +259,11 @@ mod tests {
             arm_lost: false,
             upper_arm_visible: false,
         };
-        assert_eq!(seen.elsewhere(&site, "l"), [true, false]);
-        assert_eq!(seen.elsewhere(&site, "r"), [false, false], "it has no forearm");
+        assert_eq!(sight_context.elsewhere(&site, "l"), [true, false]);
+        assert_eq!(sight_context.elsewhere(&site, "r"), [false, false], "it has no forearm");
         let lost = Expected { arm_lost: true, ..site };
-        assert_eq!(seen.elsewhere(&lost, "l"), [false, false], "a thorax shows no skin");
-        assert_eq!(seen.allowed(&site, &[Vec3::X; 2]), [1, 1]);
-        assert_eq!(Seen { unexplained: -0.1, ..seen }.allowed(&site, &[Vec3::X; 2]), [2, 2]);
+        assert_eq!(sight_context.elsewhere(&lost, "l"), [false, false], "a thorax shows no skin");
+        assert_eq!(sight_context.allowed(&site, &[Vec3::X; 2]), [1, 1]);
+        assert_eq!(SightContext { unexplained: -0.1, ..sight_context }.allowed(&site, &[Vec3::X; 2]), [2, 2]);
     }
 }

@@ -1,4 +1,4 @@
-//! What is learnt from pictures: the colours of skin, and what always has them where no head or hand is.
+//! What is learned from pictures: the colors of skin, and what always has them where no head or hand is.
 
 use crate::chroma::bins;
 use crate::masks::{PIXEL_BLOCK, is_empty};
@@ -7,52 +7,52 @@ use crate::skin::colors::{Lesson, SkinColors};
 use crate::skin::discs::Disc;
 use crate::skin::picture::Picture;
 
-/// No skin is learnt, and no background, within so many radii of a face or palm.
-const NOTHING_LEARNT: f64 = 2.5;
-/// Skin is learnt within this share of it.
+/// No skin is learned, and no background, within so many radii of a face or palm.
+const NOTHING_LEARNED: f64 = 2.5;
+/// Skin is learned within this share of it.
 const WITHIN: f64 = 0.8;
 /// Sites that far outside a picture are not looked at, pixels.
 const FAR_OUTSIDE: f64 = 1e4;
 
-/// Colours and background of one camera's pictures.
+/// Colors and background of one camera's pictures.
 #[derive(Clone, Debug, Default)]
 pub struct Teacher {
     /// Of skin.
     pub colors: SkinColors,
-    /// Pictures that colours were learnt from.
-    pub learnt: u32,
+    /// Pictures that colors were learned from.
+    pub learned: u32,
     pictures: u32,
     /// How much of the time each pixel shows skin where no skin is.
     always: Vec<f32>,
     /// Which blocks of pixels ever showed any.
-    shown: Vec<bool>,
+    visible: Vec<bool>,
     size: [usize; 2],
     away: Vec<u8>,
 }
 
 /// Where a head or hand is in a picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown {
+pub struct VisibleSite {
     /// Column and row.
     pub pixel: [f64; 2],
-    /// Along the optical axis, metres.
+    /// Along the optical axis, meters.
     pub depth: f64,
     /// Whether it is the head.
     pub head: bool,
-    /// Whether it was found there: its colours may be learnt.
+    /// Whether it was found there: its colors may be learned.
     pub found: bool,
 }
 
-/// How much is learnt from a picture.
+/// How much is learned from a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     /// Focal length, pixels.
     pub focal: f64,
-    /// What has skin's colour for so many pictures is half the background.
+    /// What has skin's color for so many pictures is half the background.
     pub half_life: f64,
-    /// Colours are learnt from every so manyth picture...
+    /// Colors are learned from every so manyth picture...
     pub every: u32,
-    /// ... once they were learnt from so many.
+    /// ... once they were learned from so many.
     pub settled: u32,
 }
 
@@ -63,11 +63,17 @@ impl Teacher {
     }
 
     /// Learns from the picture that skin was looked for in, or from another one of the camera, `image`.
-    pub fn learn(&mut self, picture: &Picture, image: Option<(&[[u8; 3]], [usize; 2])>, sites: &[Shown], pace: &Pace) {
+    pub fn learn(
+        &mut self,
+        picture: &Picture,
+        image: Option<(&[[u8; 3]], [usize; 2])>,
+        sites: &[VisibleSite],
+        pace: &Pace,
+    ) {
         let size = image.map_or(picture.size, |(_, size)| size);
         self.away.clear();
         self.away.resize(size[0] * size[1], 1);
-        let settled = self.learnt >= pace.settled;
+        let settled = self.learned >= pace.settled;
         let mut discs = Vec::new();
         for site in sites {
             let radius = (if site.head { FACE } else { PALM }) * pace.focal / site.depth;
@@ -75,11 +81,11 @@ impl Teacher {
             if !middle.iter().all(|place| -FAR_OUTSIDE < *place && *place < FAR_OUTSIDE) {
                 continue;
             }
-            let disc = |share: f64, least: f64| Disc {
+            let disc = |rate: f64, least: f64| Disc {
                 middle: middle.map(|place| place as i64),
-                radius: (share * radius).round_ties_even().max(least) as i64,
+                radius: (rate * radius).round_ties_even().max(least) as i64,
             };
-            disc(NOTHING_LEARNT, 2.0).fill(&mut self.away, size, 0);
+            disc(NOTHING_LEARNED, 2.0).fill(&mut self.away, size, 0);
             if site.found || !settled {
                 discs.push(disc(WITHIN, 1.0));
             }
@@ -88,7 +94,7 @@ impl Teacher {
         let body = picture.body.as_deref().filter(|body| body.size == size);
         if picture.size == size {
             let before = body.and_then(|body| body.before.as_deref());
-            self.learn_always(&picture.seen, before, size, 1.0 - 0.5_f64.powf(1.0 / pace.half_life));
+            self.learn_always(&picture.colored, before, size, 1.0 - 0.5_f64.powf(1.0 / pace.half_life));
         }
         // Light does not change from picture to picture; learning is the dearest part.
         if settled && !self.pictures.is_multiple_of(pace.every.max(1)) {
@@ -97,23 +103,23 @@ impl Teacher {
         let other = image.map(|(image, _)| bins(image));
         let (bins, outside) = (other.as_deref().unwrap_or(&picture.bins), &self.away[..]);
         let lesson = Lesson { bins, size, inside: &discs, outside, body: body.map(|body| &body.mask[..]) };
-        self.learnt += u32::from(self.colors.learn(&lesson));
+        self.learned += u32::from(self.colors.learn(&lesson));
     }
 
-    /// A running mean of "skin's colour, and no head or hand near".
-    fn learn_always(&mut self, seen: &[u8], before: Option<&[bool]>, size: [usize; 2], share: f64) {
-        if self.size != size || self.always.len() != seen.len() {
-            self.always = vec![0.0; seen.len()];
+    /// A running mean of "skin's color, and no head or hand near".
+    fn learn_always(&mut self, colored: &[u8], before: Option<&[bool]>, size: [usize; 2], rate: f64) {
+        if self.size != size || self.always.len() != colored.len() {
+            self.always = vec![0.0; colored.len()];
             self.size = size;
-            self.shown.clear();
+            self.visible.clear();
         }
-        let (new, old) = (share as f32, 1.0 - share as f32);
-        self.shown.resize(seen.len().div_ceil(PIXEL_BLOCK), false);
-        let blocks = self.always.chunks_mut(PIXEL_BLOCK).zip(seen.chunks(PIXEL_BLOCK)).zip(&mut self.shown);
-        for (block, ((always, seen), shown)) in blocks.enumerate() {
+        let (new, old) = (rate as f32, 1.0 - rate as f32);
+        self.visible.resize(colored.len().div_ceil(PIXEL_BLOCK), false);
+        let blocks = self.always.chunks_mut(PIXEL_BLOCK).zip(colored.chunks(PIXEL_BLOCK)).zip(&mut self.visible);
+        for (block, ((always, colored), visible)) in blocks.enumerate() {
             // What never showed skin has nothing to forget.
-            *shown |= !is_empty(seen);
-            if !*shown {
+            *visible |= !is_empty(colored);
+            if !*visible {
                 continue;
             }
             let here = block * PIXEL_BLOCK..block * PIXEL_BLOCK + always.len();
@@ -122,9 +128,9 @@ impl Teacher {
             if let Some(before) = before {
                 learns.iter_mut().zip(&before[here]).for_each(|(learns, before)| *learns &= u8::from(!*before));
             }
-            for ((always, seen), learns) in always.iter_mut().zip(seen).zip(&learns) {
-                let (share, kept) = if *learns != 0 { (new, old) } else { (0.0, 1.0) };
-                *always = *always * kept + f32::from(*seen) * share;
+            for ((always, colored), learns) in always.iter_mut().zip(colored).zip(&learns) {
+                let (rate, kept) = if *learns != 0 { (new, old) } else { (0.0, 1.0) };
+                *always = *always * kept + f32::from(*colored) * rate;
             }
         }
     }
@@ -136,19 +142,19 @@ mod tests {
 
     #[test]
     fn what_shows_skin_for_long_where_no_hand_is_is_the_scene() {
-        let picture = Picture { size: [40, 60], bins: vec![0; 2400], seen: vec![1; 2400], ..Picture::default() };
-        let hand = Shown { pixel: [30.0, 20.0], depth: 2.0, head: false, found: true };
+        let picture = Picture { size: [40, 60], bins: vec![0; 2400], colored: vec![1; 2400], ..Picture::default() };
+        let hand = VisibleSite { pixel: [30.0, 20.0], depth: 2.0, head: false, found: true };
         let pace = Pace { focal: 100.0, half_life: 10.0, every: 3, settled: 1 };
         let mut teacher = Teacher::default();
         assert!(teacher.always([40, 60]).is_none());
         for count in 1..=12 {
             teacher.learn(&picture, None, &[hand], &pace);
-            let Some(always) = teacher.always([40, 60]) else { panic!("nothing learnt") };
+            let Some(always) = teacher.always([40, 60]) else { panic!("nothing learned") };
             assert_eq!((always[20 * 60 + 30], always[0] >= 0.5), (0.0, count >= 10), "{count}");
         }
         assert!(teacher.always([60, 40]).is_none());
-        let far = Shown { pixel: [f64::NAN, 1e9], ..hand };
+        let far = VisibleSite { pixel: [f64::NAN, 1e9], ..hand };
         teacher.learn(&picture, None, &[far], &pace);
-        assert_eq!(teacher.learnt, 0, "one place is not enough");
+        assert_eq!(teacher.learned, 0, "one place is not enough");
     }
 }

@@ -62,7 +62,7 @@ class RosFeed:
         faults: counts what cannot be used.
         clock: of the host.
         root_frame: None: the best of STANDING that transforms lead to, else the frame of the first topic.
-        metres_per_unit: of 16-bit depth.
+        meters_per_unit: of 16-bit depth.
         tf_max_age: how old a changing transform may be [s].
         sensor_pose: root_from_sensor (4, 4) of the first topic instead of transforms, and the name of that root frame.
 
@@ -78,14 +78,14 @@ class RosFeed:
         clock: Clock,
         *,
         root_frame: str | None = None,
-        metres_per_unit: float = 0.001,
+        meters_per_unit: float = 0.001,
         tf_max_age: float = 0.5,
         sensor_pose: tuple[str, FloatArray] | None = None,
     ) -> None:
         """Nothing came yet."""
         self.unusable = 0
         self._topics, self._faults, self._clock = tuple(topics), faults, clock
-        self._scale, self._pose = metres_per_unit, sensor_pose
+        self._scale, self._pose = meters_per_unit, sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
         self._lock = threading.Lock()  # transforms come in one thread and are asked for in another
         self._newest = -math.inf
@@ -216,7 +216,7 @@ class RosFeed:
         if not reached and self.expects_transforms and now - self._since < ROOT_PATIENCE_S:
             return False
         self._root = next(iter(reached), frame)
-        self._faults.say(f"root frame {self._root!r}")
+        self._faults.log(f"root frame {self._root!r}")
         return True
 
     def _root_from_sensor(self, topic: str, frame: str, stamp: float) -> FloatArray:
@@ -260,7 +260,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     """What a message measures: "depth", "color", "points" or "scan".
 
     Raises:
-        Fault: an image of neither depth nor colour.
+        Fault: an image of neither depth nor color.
     """
     if kind == CLOUD:
         return "points"

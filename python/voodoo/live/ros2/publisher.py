@@ -34,7 +34,7 @@ class Ros2Output(Output):
         self._root = root_frame
         self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
-        self._shown: set[int] = set()
+        self._displayed: set[int] = set()
         self._bodies: dict[int, Body] = {}
         self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
         self._publish_on(TRACKED, IDS, 1)
@@ -45,15 +45,15 @@ class Ros2Output(Output):
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        seen = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
-        for number in sorted(seen):
+        observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
+        for number in sorted(observed):
             self._write_person(number, step.estimates[number], step.bodies[number])
-        for number in sorted(self._shown - seen):
+        for number in sorted(self._displayed - observed):
             # Their markers go, once.
             self._write_person(number, nobody(step.stamp), step.bodies.get(number, self._bodies[number]))
-        self._shown = seen
-        self._bodies = {number: step.bodies[number] for number in seen}
-        self._write(TRACKED, self._ids(step.stamp, [str(number) for number in sorted(seen)]))
+        self._displayed = observed
+        self._bodies = {number: step.bodies[number] for number in observed}
+        self._write(TRACKED, self._ids(step.stamp, [str(number) for number in sorted(observed)]))
 
     def _write_person(self, number: int, estimate: Estimate, body: Body) -> None:
         messages = instant(estimate, body, root_frame=self._root(), person=str(number), topic=_body(number))

@@ -15,10 +15,10 @@ from voodoo.live.faults import Faults
 from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage
 from voodoo.recordings.calibration import FolderCalibration, read_calibration
-from voodoo.recordings.folder import Clock as NameClock
+from voodoo.recordings.folder import FrameClock as NameClock
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 
-_LOOK_S = 0.005
+_POLL_S = 0.005
 _PATIENCE_S = 0.5
 """A picture that does not decode is looked at again for so long: somebody may be writing it."""
 _SUFFIXES = {"depth": (".png",), "rgb": (".png", ".jpg", ".jpeg")}
@@ -84,12 +84,12 @@ class GrowingSource(Source):
         while True:
             if not self._path.is_dir():
                 raise SourceGone(f"{self._path}: expected a folder, found none: it was moved or unmounted")
-            arrivals = self._look()
+            arrivals = self._list_arrivals()
             if arrivals or self._clock.now() >= until:
                 return arrivals
-            self._sleep(_LOOK_S)
+            self._sleep(_POLL_S)
 
-    def _look(self) -> list[Arrival]:
+    def _list_arrivals(self) -> list[Arrival]:
         now = self._clock.now()
         for kind in ("rgb", "depth"):
             new = sorted(name for name in self._listed(kind) if name not in self._names[kind])

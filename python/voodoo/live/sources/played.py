@@ -43,7 +43,7 @@ class PlayedSource(Source):
         self.name, self.recording = recording.name, recording
         self._rate, self._loop, self._sleep = rate, loop, sleep
         self._left_out = LeftOut() if left_out is None else left_out
-        self._told: dict[str, int] = {}
+        self._optional_fields: dict[str, int] = {}
         self._frames: Iterator[RecordedFrame] = iter(())
         self._next: RecordedFrame | None = None
         self._shift = 0.0
@@ -82,11 +82,11 @@ class PlayedSource(Source):
     def _advance(self, frame: RecordedFrame) -> None:
         self._next = next(self._frames, None)
         for reason, count in self._left_out.counts.items():
-            new = count - self._told.get(reason, 0)
+            new = count - self._optional_fields.get(reason, 0)
             if new:
                 kind = kind_of_reason(reason, "unreadable message")
                 self._faults.add(kind, self._left_out.first[reason], self._clock.now(), new)
-                self._told[reason] = count
+                self._optional_fields[reason] = count
         if self._next is None and self._loop:
             self._frames = iter(paired(self.recording))
             self._next = next(self._frames, None)

@@ -33,14 +33,14 @@ _LENSES = {
 
 
 class RealSenseSource(Source):
-    """Depth, and colour where there is a stream of it, of a RealSense camera.
+    """Depth, and color where there is a stream of it, of a RealSense camera.
 
     Args:
         serial: of the camera; None: the first one.
         calibration: a calibration.toml whose `root_frame` and `root_from_sensor` say where the depth camera is.
         size: (width, height) [px] that is asked for.
         rate: images per second that are asked for.
-        color: whether colour is used.
+        color: whether color is used.
         device: a device of `pyrealsense2`, instead of one that is looked for.
     """
 
@@ -57,7 +57,7 @@ class RealSenseSource(Source):
         """Nothing is opened yet."""
         self._rs = _library()
         self.name = "realsense" if serial is None else f"realsense:{serial}"
-        self._serial, self._size, self._rate, self._wants_color = serial, size, rate, color
+        self._serial, self._size, self._rate, self._with_color = serial, size, rate, color
         self._root, self._root_from_depth = "camera_depth_optical_frame", np.eye(4)
         self.placed = calibration is not None
         if calibration is not None:
@@ -92,7 +92,7 @@ class RealSenseSource(Source):
             raise VoodooError(f"{self.name}: expected a stream of 16-bit depth, found none")
         self._streams: dict[int, Callable[[Any], Arrival]] = {}
         self._add(chosen, depth, self._depth_profile, self._depth_stream(self._depth_profile))
-        if self._wants_color:
+        if self._with_color:
             for sensor in sensors:
                 profile = self._profile(sensor, rs.stream.color, (rs.format.bgr8, rs.format.rgb8))
                 if profile is not None:

@@ -17,19 +17,19 @@ from voodoo.measurements import FloatArray
 from voodoo.recordings.calibration import read_calibration
 
 _DISCOVERY_S = 3.0
-_LOOK_S = 0.05
+_POLL_S = 0.05
 _DEPTH, _TF_DEPTH = 30, 100
 """Messages that wait for a busy machine, which are counted then; what comes on top nobody counts."""
 
 
 class Ros2Source(Source):
-    """Depth or colour images (raw, compressed), clouds and scans of ROS 2 topics, with CameraInfo and transforms.
+    """Depth or color images (raw, compressed), clouds and scans of ROS 2 topics, with CameraInfo and transforms.
 
     Args:
         topics: what is measured; the first one makes the frames.
         root_frame: see RosFeed.
         calibration: a calibration.toml that says where the first topic's camera is, instead of transforms.
-        metres_per_unit: of 16-bit depth.
+        meters_per_unit: of 16-bit depth.
         tf_max_age: how old a changing transform may be [s].
 
     Raises:
@@ -42,7 +42,7 @@ class Ros2Source(Source):
         *,
         root_frame: str | None = None,
         calibration: Path | None = None,
-        metres_per_unit: float = 0.001,
+        meters_per_unit: float = 0.001,
         tf_max_age: float = 0.5,
     ) -> None:
         """Nothing is subscribed yet."""
@@ -52,7 +52,7 @@ class Ros2Source(Source):
         self.name = f"ros2:{self._topics[0]}"
         self._options: dict[str, Any] = {
             "root_frame": root_frame,
-            "metres_per_unit": metres_per_unit,
+            "meters_per_unit": meters_per_unit,
             "tf_max_age": tf_max_age,
         }
         if calibration is not None:
@@ -86,7 +86,7 @@ class Ros2Source(Source):
         while not self._discover():
             if time.monotonic() > until:
                 raise SourceGone(f"{self._topics[0]}: expected somebody who publishes it, found nobody yet")
-            self._node.wait(_LOOK_S)
+            self._node.wait(_POLL_S)
 
     def _discover(self) -> bool:
         """Subscribe to what is offered by now; whether all topics are."""
@@ -104,8 +104,8 @@ class Ros2Source(Source):
                 )
             if offer.kind in (IMAGE, COMPRESSED):
                 info = self._feed.info_topic(topic)
-                told = offers.get(info, Offer(CAMERA_INFO, reliable=False, latched=False))
-                self._subscribe(info, Offer(CAMERA_INFO, told.reliable, told.latched), _DEPTH)
+                offered = offers.get(info, Offer(CAMERA_INFO, reliable=False, latched=False))
+                self._subscribe(info, Offer(CAMERA_INFO, offered.reliable, offered.latched), _DEPTH)
             self._subscribe(topic, offer, _DEPTH)
         return self._topics[0] in self._subscriptions
 
@@ -128,17 +128,17 @@ class Ros2Source(Source):
         if lost:
             self._faults.add("lost on the way", f"{self._topics[0]}: messages did not arrive", self._clock.now(), lost)
         if not arrivals:
-            self._watch()
+            self._check_states()
         return arrivals
 
-    def _watch(self) -> None:
+    def _check_states(self) -> None:
         """Tell once that nobody publishes any more, and look for topics that come later."""
         self._discover()
         gone = self._subscriptions[self._topics[0]].publishers == 0
         if gone and not self._gone:
             self._faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", self._clock.now())
         elif self._gone and not gone:
-            self._faults.say(f"{self.name}: it is there again")
+            self._faults.log(f"{self.name}: it is there again")
         self._gone = gone
 
     def close(self) -> None:

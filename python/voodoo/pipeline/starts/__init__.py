@@ -1,6 +1,6 @@
 """First poses from whatever a recording offers: one file a source, best first."""
 
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder
+from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.pipeline.starts.cameras import CamerasStart
 from voodoo.pipeline.starts.chosen import Starts, automatic_starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
@@ -11,13 +11,13 @@ from voodoo.pipeline.starts.markers import MarkersStart
 __all__ = [
     "CamerasStart",
     "EarlierStart",
-    "Found",
+    "FoundStart",
     "GivenStart",
     "KeypointsDepthStart",
     "LegsStart",
     "MarkersStart",
-    "Seen",
     "StartFinder",
+    "StartFrame",
     "Starts",
     "automatic_starts",
 ]

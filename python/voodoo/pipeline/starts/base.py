@@ -39,7 +39,7 @@ _ON_A_LINE_M = 0.04
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class StartFrame:
     """What a finder may look at: one frame, before anybody is tracked.
 
     Args:
@@ -56,7 +56,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundStart:
     """A first pose.
 
     Args:
@@ -82,7 +82,7 @@ class StartFinder(ABC):
     given: ClassVar[bool] = False
 
     @abstractmethod
-    def look(self, seen: Seen) -> Found | None:
+    def find(self, frame: StartFrame) -> FoundStart | None:
         """The first pose, if this frame (with those before it) shows one."""
 
 
@@ -130,11 +130,11 @@ def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         return {}
     stature = float(np.mean(trunk)) / _OF_STATURE["l_shoulder", "l_hip"]
     kept = dict(joints)
-    for (near, far), share in _OF_STATURE.items():
+    for (near, far), fraction in _OF_STATURE.items():
         if near not in kept or far not in kept:
             continue
         length = float(np.linalg.norm(kept[near] - kept[far])) / stature
-        if _SHORTER * share <= length <= _LONGER * share:
+        if _SHORTER * fraction <= length <= _LONGER * fraction:
             continue
         if near in TRUNK and far in TRUNK:
             return {}
@@ -149,9 +149,9 @@ _OF_STATURE: dict[tuple[str, str], float] = {
     ("l_shoulder", "r_shoulder"): 0.224,
     ("l_hip", "r_hip"): 0.104,
     **{
-        (f"{s}_{a}", f"{s}_{b}"): share
+        (f"{s}_{a}", f"{s}_{b}"): fraction
         for s in "lr"
-        for a, b, share in (
+        for a, b, fraction in (
             ("shoulder", "hip", 0.294),
             ("shoulder", "elbow", 0.186),
             ("elbow", "wrist", 0.146),

@@ -9,18 +9,18 @@ from itertools import combinations
 import numpy as np
 
 from voodoo.measurements import KeypointImage
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose, without_impossible
+from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose, without_impossible
 from voodoo.sensors.keypoints.sites import site_pixels
 from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay
-from voodoo.sensors.triangulation import Place, place_of
+from voodoo.sensors.triangulation import TriangulatedSite, place_of
 
 _TOGETHER_S = 0.05
 """Pictures of one instant: a walking wrist goes 10 cm in that time."""
 _BASELINE_M = 0.1
 """Cameras nearer to each other see no depth with 4 px of error."""
 _SAME_PERSON_M = 0.15
-"""Median distance of a person's rays in one camera from the places that others found: half the way to a neighbour."""
+"""Median distance of a person's rays in one camera from the places that others found: half the way to a neighbor."""
 _LEAST_SITES = 6
 _WORST_SIGMA_M = 0.10
 _TYPICAL_RANGE_M = 3.0
@@ -28,7 +28,7 @@ _TYPICAL_RANGE_M = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Person:
+class _CameraPerson:
     """Somebody in one camera: a ray for each site."""
 
     camera: str
@@ -44,24 +44,24 @@ class CamerasStart(StartFinder):
         """Nothing seen yet."""
         self._latest: dict[str, KeypointImage] = {}
 
-    def look(self, seen: Seen) -> Found | None:
+    def find(self, frame: StartFrame) -> FoundStart | None:
         """See StartFinder."""
-        for item in seen.measurements:
+        for item in frame.measurements:
             if isinstance(item, KeypointImage):
                 self._latest[item.sensor] = item
-        images = [item for item in self._latest.values() if abs(seen.stamp - item.stamp) <= _TOGETHER_S]
-        best = _best(_views(images, seen), seen)
+        images = [item for item in self._latest.values() if abs(frame.stamp - item.stamp) <= _TOGETHER_S]
+        best = _best(_views(images, frame), frame)
         return None if best is None else _found(best)
 
 
-def everybody(seen: Seen, *, cameras: int) -> list[Found]:
+def everybody(frame: StartFrame, *, cameras: int) -> list[FoundStart]:
     """All persons of whom so many cameras show the keypoints in one frame, the one seen best first.
 
     Who is seen by fewer is left out: in the background of one or two pictures stand others, and what is wrong agrees by chance.
     """
-    views = _views([item for item in seen.measurements if isinstance(item, KeypointImage)], seen)
+    views = _views([item for item in frame.measurements if isinstance(item, KeypointImage)], frame)
     found = []
-    while (best := _best(views, seen)) is not None:
+    while (best := _best(views, frame)) is not None:
         if len(best.persons) >= cameras:
             found.append(_found(best))
         taken = {id(person) for person in best.persons}
@@ -73,8 +73,8 @@ def everybody(seen: Seen, *, cameras: int) -> list[Found]:
 class _Group:
     """One person in several cameras, and where their sites are."""
 
-    persons: Sequence[_Person]
-    places: dict[str, Place]
+    persons: Sequence[_CameraPerson]
+    places: dict[str, TriangulatedSite]
 
     @property
     def score(self) -> float:
@@ -82,42 +82,42 @@ class _Group:
         return sum(float(place.trust.sum()) for place in self.places.values())
 
 
-def _views(images: Sequence[KeypointImage], seen: Seen) -> list[list[_Person]]:
+def _views(images: Sequence[KeypointImage], frame: StartFrame) -> list[list[_CameraPerson]]:
     """Who is seen in each camera."""
-    return [[person for rows in item.people if (person := _person(item, rows, seen))] for item in images]
+    return [[person for rows in item.people if (person := _person(item, rows, frame))] for item in images]
 
 
-def _best(views: Sequence[Sequence[_Person]], seen: Seen) -> _Group | None:
+def _best(views: Sequence[Sequence[_CameraPerson]], frame: StartFrame) -> _Group | None:
     """The person on whom most rays agree."""
     best: _Group | None = None
     for one, other in combinations([view for view in views if view], 2):
         for pair in ((first, second) for first in one for second in other):
             group = _together(pair, views)
-            if group is not None and (best is None or group.score > best.score) and _stands(group.places, seen):
+            if group is not None and (best is None or group.score > best.score) and _stands(group.places, frame):
                 best = group
     return best
 
 
-def _found(group: _Group) -> Found:
+def _found(group: _Group) -> FoundStart:
     joints = _joints(group.places)
-    return Found(joints, {name: group.places[name].sigma for name in joints}, CamerasStart.name)
+    return FoundStart(joints, {name: group.places[name].sigma for name in joints}, CamerasStart.name)
 
 
-def _joints(places: dict[str, Place]) -> dict[str, FloatArray]:
+def _joints(places: dict[str, TriangulatedSite]) -> dict[str, FloatArray]:
     return without_impossible({name: place.position for name, place in places.items()})
 
 
-def _stands(places: dict[str, Place], seen: Seen) -> bool:
+def _stands(places: dict[str, TriangulatedSite], frame: StartFrame) -> bool:
     """Whether places are a person that the body can be fitted to."""
     joints = _joints(places)
-    return len(joints) >= _LEAST_SITES and fixes_pose(joints, seen.body)
+    return len(joints) >= _LEAST_SITES and fixes_pose(joints, frame.body)
 
 
-def _person(item: KeypointImage, rows: FloatArray, seen: Seen) -> _Person | None:
+def _person(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> _CameraPerson | None:
     """One person of one image; None with too few keypoints."""
-    chosen = seen.settings
+    chosen = frame.settings
     sites, _ = site_pixels(rows, layout=item.layout, min_confidence=chosen.min_confidence)
-    sites = [site for site in sites if site.site in seen.body.site_names]
+    sites = [site for site in sites if site.site in frame.body.site_names]
     if len(sites) < _LEAST_SITES:
         return None
     origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in sites])
@@ -127,10 +127,10 @@ def _person(item: KeypointImage, rows: FloatArray, seen: Seen) -> _Person | None
         if np.isfinite(direction).all():
             sigma = chosen.keypoint_noise.sigma(_TYPICAL_RANGE_M, focal, confidence=site.confidence, spread=site.spread)
             rays[site.site] = SiteRay(site.site, origin, direction, sigma, item.sensor)
-    return _Person(item.sensor, rays) if len(rays) >= _LEAST_SITES else None
+    return _CameraPerson(item.sensor, rays) if len(rays) >= _LEAST_SITES else None
 
 
-def _together(pair: Sequence[_Person], views: Sequence[Sequence[_Person]]) -> _Group | None:
+def _together(pair: Sequence[_CameraPerson], views: Sequence[Sequence[_CameraPerson]]) -> _Group | None:
     """A person seen in two cameras, with those in other cameras that are the same person."""
     persons = list(pair)
     places = _places(persons) if _gap(*pair) < 2.0 * _SAME_PERSON_M else {}
@@ -144,29 +144,29 @@ def _together(pair: Sequence[_Person], views: Sequence[Sequence[_Person]]) -> _G
     return _Group(persons, places if len(persons) == len(pair) else _places(persons))
 
 
-def _gap(one: _Person, other: _Person) -> float:
+def _gap(one: _CameraPerson, other: _CameraPerson) -> float:
     """Median distance [m] of the rays of the same sites in two cameras: people who are not the same are far apart."""
-    shared = [name for name in one.rays if name in other.rays]
-    if len(shared) < _LEAST_SITES:
+    common = [name for name in one.rays if name in other.rays]
+    if len(common) < _LEAST_SITES:
         return float("inf")
-    first, second = ([person.rays[name] for name in shared] for person in (one, other))
+    first, second = ([person.rays[name] for name in common] for person in (one, other))
     across = np.cross([ray.direction for ray in first], [ray.direction for ray in second])
     between = second[0].origin - first[0].origin
     return float(np.median(np.abs(across @ between) / np.maximum(np.linalg.norm(across, axis=1), 1e-9)))
 
 
-def _away(person: _Person, places: dict[str, Place]) -> float:
+def _away(person: _CameraPerson, places: dict[str, TriangulatedSite]) -> float:
     """Median distance [m] of a person's rays from places."""
-    shared = [name for name in person.rays if name in places]
-    if len(shared) < _LEAST_SITES:
+    common = [name for name in person.rays if name in places]
+    if len(common) < _LEAST_SITES:
         return float("inf")
-    rays = [person.rays[name] for name in shared]
+    rays = [person.rays[name] for name in common]
     directions = np.array([ray.direction for ray in rays])
-    positions = np.array([places[name].position for name in shared])
+    positions = np.array([places[name].position for name in common])
     return float(np.median(ray_distance(rays[0].origin, directions, positions)))
 
 
-def _places(group: Sequence[_Person]) -> dict[str, Place]:
+def _places(group: Sequence[_CameraPerson]) -> dict[str, TriangulatedSite]:
     """Where the rays of one person in several cameras meet."""
     origins = [next(iter(person.rays.values())).origin for person in group]
     if max(float(np.linalg.norm(a - b)) for a, b in combinations(origins, 2)) < _BASELINE_M:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from voodoo.export.track import Track
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose
+from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose
 
 _SAME_TIME_S = 0.02
 """Stamps that differ by less are one frame's, by no more than half a period of the result."""
@@ -32,11 +32,11 @@ class GivenStart(StartFinder):
         self._joints = {name: np.asarray(position, dtype=np.float64) for name, position in joints.items()}
         self._stamp = stamp
 
-    def look(self, seen: Seen) -> Found | None:
+    def find(self, frame: StartFrame) -> FoundStart | None:
         """See StartFinder."""
-        if seen.stamp < self._stamp - _ROUNDED_S:
+        if frame.stamp < self._stamp - _ROUNDED_S:
             return None
-        return Found(self._joints, dict.fromkeys(self._joints, _GIVEN_SIGMA_M), self.name)
+        return FoundStart(self._joints, dict.fromkeys(self._joints, _GIVEN_SIGMA_M), self.name)
 
 
 class EarlierStart(StartFinder):
@@ -55,15 +55,15 @@ class EarlierStart(StartFinder):
         self._near = min(_SAME_TIME_S, 0.5 * float(np.median(steps))) if len(steps) else _SAME_TIME_S
         self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))
 
-    def look(self, seen: Seen) -> Found | None:
+    def find(self, frame: StartFrame) -> FoundStart | None:
         """See StartFinder."""
         result = self._result
         if not len(result):
             return None
-        row = int(np.argmin(np.abs(result.stamps - seen.stamp)))
-        if abs(result.stamps[row] - seen.stamp) > self._near:
+        row = int(np.argmin(np.abs(result.stamps - frame.stamp)))
+        if abs(result.stamps[row] - frame.stamp) > self._near:
             return None
         pairs = zip(result.joint_names, result.joints[row], strict=True)
-        joints = {name: position for name, position in pairs if name in seen.body.site_names}
+        joints = {name: position for name, position in pairs if name in frame.body.site_names}
         sigma = dict.fromkeys(joints, _GIVEN_SIGMA_M)
-        return Found(joints, sigma, self.name) if fixes_pose(joints, seen.body) else None
+        return FoundStart(joints, sigma, self.name) if fixes_pose(joints, frame.body) else None

@@ -10,7 +10,14 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo.measurements import DepthImage, KeypointImage
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder, fixes_pose, in_proportion, without_impossible
+from voodoo.pipeline.starts.base import (
+    FoundStart,
+    StartFinder,
+    StartFrame,
+    fixes_pose,
+    in_proportion,
+    without_impossible,
+)
 from voodoo.sensors.depth import depth_points
 from voodoo.sensors.keypoints.sensor import POINT_SIGMA_M
 from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
@@ -32,13 +39,13 @@ class KeypointsDepthStart(StartFinder):
 
     name = "keypoints with depth"
 
-    def look(self, seen: Seen) -> Found | None:
+    def find(self, frame: StartFrame) -> FoundStart | None:
         """See StartFinder."""
-        depths = [item for item in seen.measurements if isinstance(item, DepthImage)]
-        images = [item for item in seen.measurements if isinstance(item, KeypointImage)]
+        depths = [item for item in frame.measurements if isinstance(item, DepthImage)]
+        images = [item for item in frame.measurements if isinstance(item, KeypointImage)]
         best: tuple[float, _Person] | None = None
         for item in images:
-            for person in _people(item, depths, seen):
+            for person in _people(item, depths, frame):
                 places = np.array([place for place, _ in person.values()])
                 away = float(np.median(in_sensor(item.root_from_sensor, places)[:, 2]))
                 if best is None or away < best[0]:
@@ -46,27 +53,27 @@ class KeypointsDepthStart(StartFinder):
         if best is None:
             return None
         joints = {name: place for name, (place, _) in best[1].items()}
-        return Found(joints, {name: sigma for name, (_, sigma) in best[1].items()}, self.name)
+        return FoundStart(joints, {name: sigma for name, (_, sigma) in best[1].items()}, self.name)
 
 
-def _people(item: KeypointImage, depths: Sequence[DepthImage], seen: Seen) -> Iterator[_Person]:
+def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame) -> Iterator[_Person]:
     """The people of an image that can be started from, with the depth image that is nearest in time."""
     near = [depth for depth in depths if abs(depth.stamp - item.stamp) <= _TOGETHER_S]
     if not near or not item.people:
         return
     depth = min(near, key=lambda each: (abs(each.stamp - item.stamp), each.camera != item.camera))
-    pixels, z = _seen_from(depth, item)
+    pixels, z = _points_in_view(depth, item)
     for rows in item.people:
-        sites, _ = site_pixels(rows, layout=item.layout, min_confidence=seen.settings.min_confidence)
-        sites = [site for site in sites if site.site in seen.body.site_names]
+        sites, _ = site_pixels(rows, layout=item.layout, min_confidence=frame.settings.min_confidence)
+        sites = [site for site in sites if site.site in frame.body.site_names]
         if len(sites) >= _LEAST_SITES:
-            person = _placed(sites, item, pixels, z, seen, coarse=item.camera.fx / depth.camera.fx)
+            person = _placed(sites, item, pixels, z, frame, coarse=item.camera.fx / depth.camera.fx)
             kept = in_proportion(without_impossible({name: place for name, (place, _) in person.items()}))
-            if len(kept) >= _LEAST_SITES and fixes_pose(kept, seen.body):
+            if len(kept) >= _LEAST_SITES and fixes_pose(kept, frame.body):
                 yield {name: person[name] for name in kept}
 
 
-def _seen_from(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, FloatArray]:
+def _points_in_view(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, FloatArray]:
     """Where the points of a depth image are in the keypoints' image, (N, 2), and their depths there (N,) [m]."""
     points, valid = depth_points(depth)
     local = in_sensor(item.root_from_sensor, points[valid])
@@ -75,7 +82,13 @@ def _seen_from(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, Floa
 
 
 def _placed(
-    sites: Sequence[SitePixel], item: KeypointImage, pixels: FloatArray, z: FloatArray, seen: Seen, *, coarse: float
+    sites: Sequence[SitePixel],
+    item: KeypointImage,
+    pixels: FloatArray,
+    z: FloatArray,
+    frame: StartFrame,
+    *,
+    coarse: float,
 ) -> _Person:
     """The sites that have a surface behind their keypoint."""
     origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in sites])
@@ -86,7 +99,7 @@ def _placed(
         if depth is None or not np.isfinite(direction).all():
             continue
         surface = depth / float(direction @ item.root_from_sensor[:3, 2])
-        noise = seen.settings.keypoint_noise
+        noise = frame.settings.keypoint_noise
         sigma = noise.sigma(depth, focal, confidence=site.confidence, spread=site.spread)
         place = origin + direction * (surface + behind_surface(site.site))
         placed[site.site] = np.asarray(place), math.hypot(sigma, POINT_SIGMA_M)

@@ -11,14 +11,14 @@ from voodoo.measurements import LaserScan
 from voodoo.model.body import Body
 from voodoo.model.legs import HALF_WIDTH, HIP, LEG
 from voodoo.model.projection import transform
-from voodoo.pipeline.starts.base import Found, Seen, StartFinder
+from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.sensors.free_space import FreeSpace
 from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.settings import Box, within_boxes
 
 SITES = ("l_hip", "r_hip", "l_ankle", "r_ankle")
 _GAP_M = 0.10
-"""Neighbouring returns farther apart than this are of two things."""
+"""Neighboring returns farther apart than this are of two things."""
 _WIDTH_M = (0.04, 0.28)
 """From a child's shin, of which half is seen, to wide trousers; the middle of a leg is half a shin behind its surface."""
 _SHIN_RADIUS_M = 0.05
@@ -56,16 +56,16 @@ class LegsStart(StartFinder):
         self._free: dict[str, FreeSpace] = {}
         self._last: tuple[float, list[FloatArray]] | None = None
 
-    def look(self, seen: Seen) -> Found | None:
+    def find(self, frame: StartFrame) -> FoundStart | None:
         """See StartFinder."""
-        if not serves(seen.body):
+        if not serves(frame.body):
             return None
-        for item in seen.measurements:
+        for item in frame.measurements:
             if isinstance(item, LaserScan) and item.root_from_sensor[2, 2] >= _LEVEL:
                 free = self._free.setdefault(item.sensor, FreeSpace())
-                found = self._pair(item, _leg_middles(item, free, seen.settings.exclude))
+                found = self._pair(item, _leg_middles(item, free, frame.settings.exclude))
                 if found is not None:
-                    return _found(*found, item, seen)
+                    return _found(*found, item, frame)
         return None
 
     def _pair(self, scan: LaserScan, middles: list[FloatArray]) -> tuple[FloatArray, FloatArray] | None:
@@ -113,7 +113,7 @@ def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> li
     return middles
 
 
-def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, seen: Seen) -> Found:
+def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, frame: StartFrame) -> FoundStart:
     """Legs that stand under the middle of the pair; across their line they face where they went."""
     between = legs[1] - legs[0]
     middle = legs.mean(axis=0)
@@ -123,7 +123,7 @@ def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, seen: Seen) -> 
     ahead = ahead / np.linalg.norm(ahead)
     left = np.array([-ahead[1], ahead[0]])
     height = float(scan.root_from_sensor[2, 3])
-    ground = seen.settings.ground_z
+    ground = frame.settings.ground_z
     floor = height - _SHIN_HEIGHT_M if ground is None else ground
     joints: dict[str, FloatArray] = {}
     for side, sign, leg in zip("lr", (1.0, -1.0), sorted(legs, key=lambda leg: -float(leg @ left)), strict=True):
@@ -131,4 +131,4 @@ def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, seen: Seen) -> 
         shin = np.array([*leg, height])
         joints[f"{side}_hip"] = hip
         joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * LEG * _STATURE_M
-    return Found(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)
+    return FoundStart(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)

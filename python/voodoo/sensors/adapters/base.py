@@ -156,14 +156,14 @@ class Adapter(ABC, Generic[M]):
             MeasurementError: it cannot be used.
         """
 
-    def learn(self, item: M, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
-        """Learn from the estimate of a frame; `vouched`: somebody set the pose it started from."""
+    def learn(self, item: M, estimate: Estimate, memory: Memory, *, trusted_start: bool) -> None:
+        """Learn from the estimate of a frame; `trusted_start`: somebody set the pose it started from."""
 
     def forget(self, memory: Memory) -> None:
         """The person is gone: forget what belongs to them alone."""
 
     def picture(self, item: M) -> npt.NDArray[Any] | None:
-        """What a camera saw: colours (H, W, 3) BGR uint8, or depths (H, W) float32 [m]; None: no picture is known."""
+        """What a camera saw: colors (H, W, 3) BGR uint8, or depths (H, W) float32 [m]; None: no picture is known."""
         return None
 
     def draw(self, item: M, canvas: Canvas, memory: Memory) -> None:

@@ -1,4 +1,4 @@
-"""Colour regions of pictures as an input: where the colours of a limb end, its contour is."""
+"""Color regions of pictures as an input: where the colors of a limb end, its contour is."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from voodoo.tracker import Tracker
 _FARTHEST_S = 0.25
 """A picture that is older or newer than its frame by more [s] shows another pose; the tracker would refuse the frame."""
 _INK = (90, 240, 250)
-_GREY = 2
-"""Channels of a grey camera's picture differ by no more than coding makes of it."""
+_GRAY = 2
+"""Channels of a gray camera's picture differ by no more than coding makes of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is kept of a camera: its lens, whether it sees no colours, the tracker that was told of the empty scene, and whether
+    """What is kept of a camera: its lens, whether it sees no colors, the tracker that was told of the empty scene, and whether
     what it tells is drawn."""
 
     lens: Pinhole
-    grey: bool
-    told: Tracker
+    gray: bool
+    tracker: Tracker
     drawn: bool
 
     def picture(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-        """What the tracker is given of a picture (H, W, 3): without distortion, (H, W) of a grey camera."""
-        seen = self.lens.apply(image)
-        return np.ascontiguousarray(seen[:, :, 1]) if self.grey else seen
+        """What the tracker is given of a picture (H, W, 3): without distortion, (H, W) of a gray camera."""
+        observed = self.lens.apply(image)
+        return np.ascontiguousarray(observed[:, :, 1]) if self.gray else observed
 
 
 class ColorAdapter(Adapter[ColorImage]):
@@ -55,9 +55,9 @@ class ColorAdapter(Adapter[ColorImage]):
         if not isinstance(context.tracker, Tracker) or abs(item.stamp - context.stamp) > _FARTHEST_S:
             return
         known = context.memory.all(self.kind).get(item.sensor)
-        if known is None or known.lens.original != item.camera or known.told is not context.tracker:
+        if known is None or known.lens.original != item.camera or known.tracker is not context.tracker:
             drawn = context.settings.draw_regions
-            known = _Known(Pinhole(item.camera), _is_grey(item.image), context.tracker, drawn)
+            known = _Known(Pinhole(item.camera), _is_gray(item.image), context.tracker, drawn)
             empty = context.settings.empty_scene.get(item.sensor)
             if empty is not None:
                 context.tracker.set_background(item.sensor, [known.picture(picture) for picture in empty])
@@ -71,13 +71,13 @@ class ColorAdapter(Adapter[ColorImage]):
         )
 
     def draw(self, item: ColorImage, canvas: Canvas, memory: Memory) -> None:
-        """The border of what is the body by its colours, and the edges along its contour, where the settings ask for it."""
+        """The border of what is the body by its colors, and the edges along its contour, where the settings ask for it."""
         known = memory.all(self.kind).get(item.sensor)
-        if known is None or not known.drawn or known.lens.original != item.camera or not known.told.estimate.joints:
+        if known is None or not known.drawn or known.lens.original != item.camera or not known.tracker.estimate.joints:
             return
-        lines = known.told.region_lines(item.sensor)
-        told = np.isfinite(lines.sigmas)
-        edges = (lines.places + lines.offsets[:, None] * lines.normals)[told]
+        lines = known.tracker.region_lines(item.sensor)
+        finite = np.isfinite(lines.sigmas)
+        edges = (lines.places + lines.offsets[:, None] * lines.normals)[finite]
         frame = Frame(item.stamp)
         frame.add_color(
             known.picture(item.image),
@@ -85,7 +85,7 @@ class ColorAdapter(Adapter[ColorImage]):
             world_from_sensor=item.root_from_sensor,
             source=item.sensor,
         )
-        likely = known.told.segment(frame)[item.sensor]
+        likely = known.tracker.segment(frame)[item.sensor]
         size = (item.camera.width, item.camera.height)
         mask = cv2.resize((likely > LIKELY).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
         scale = np.array(size) / (known.lens.camera.width, known.lens.camera.height)
@@ -93,6 +93,6 @@ class ColorAdapter(Adapter[ColorImage]):
         canvas.regions(item, mask, marks=marks, names={}, color=_INK)
 
 
-def _is_grey(image: npt.NDArray[np.uint8]) -> bool:
+def _is_gray(image: npt.NDArray[np.uint8]) -> bool:
     low, high = image.min(axis=2), image.max(axis=2)
-    return bool((high - low <= _GREY).all())
+    return bool((high - low <= _GRAY).all())

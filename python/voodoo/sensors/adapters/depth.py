@@ -30,11 +30,11 @@ class DepthAdapter(Adapter[DepthImage]):
         chosen = context.settings
         image = item.image
         if chosen.depth_filter is not None:
-            image = chosen.depth_filter.apply(image, metres_per_unit=item.metres_per_unit)
+            image = chosen.depth_filter.apply(image, meters_per_unit=item.meters_per_unit)
         frame.add_depth(
             image,
             camera=item.camera,
-            metres_per_unit=item.metres_per_unit,
+            meters_per_unit=item.meters_per_unit,
             world_from_sensor=item.root_from_sensor,
             weight=context.range_weight(chosen.depth_noise, chosen.sharing, item.root_from_sensor),
             source=item.sensor,
@@ -42,21 +42,21 @@ class DepthAdapter(Adapter[DepthImage]):
 
     def picture(self, item: DepthImage) -> npt.NDArray[Any]:
         """Depths [m]."""
-        return item.image.astype(np.float32) * item.metres_per_unit
+        return item.image.astype(np.float32) * item.meters_per_unit
 
     def log(self, item: DepthImage, log: Log, memory: Memory) -> None:
-        """The image, its points coloured by limb, and the person's silhouette."""
+        """The image, its points colored by limb, and the person's silhouette."""
         rr, path = log.rr, log.camera(item)
-        log.depth(f"{path}/picture", item.image, item.metres_per_unit)
+        log.depth(f"{path}/picture", item.image, item.meters_per_unit)
         # Of a large image every n-th row and column.
         step = every(item.image.size, log.most_points)
-        z = item.image[::step, ::step].astype(np.float32) * np.float32(item.metres_per_unit)
+        z = item.image[::step, ::step].astype(np.float32) * np.float32(item.meters_per_unit)
         valid = np.isfinite(z) & (z > 0.0)
         points = np.column_stack([item.camera.rays()[::step, ::step][valid] * z[valid, None], z[valid]])
         # What is behind the person stands in the image, which is shown in space as well.
         cloud = f"world/points/{log.entity(item.sensor)}"
         limbs = log.body_points(cloud, points, item.root_from_sensor, background=False)
-        log.outlines(path, item)
+        log.silhouettes(path, item)
         silhouette = np.zeros(z.shape, dtype=np.uint8)
         silhouette[valid] = np.where(limbs == log.limbs, 0, limbs + 1)
         whole = grown(silhouette, step, item.image.shape)

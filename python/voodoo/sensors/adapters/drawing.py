@@ -22,7 +22,7 @@ class Canvas(Protocol):
     """An overlay: the picture of one camera, or a view from above."""
 
     def dots(self, points_root: FloatArray, *, color: Color, radius: int) -> None:
-        """Points (N, 3) [m] of the root frame as dots; colours are BGR, radii pixels."""
+        """Points (N, 3) [m] of the root frame as dots; colors are BGR, radii pixels."""
 
     def rings(self, item: Pictured, pixels: FloatArray, strengths: FloatArray, *, color: Color) -> None:
         """Rings about pixels (N, 2) of a camera, fainter with less strength (N,), if this is its picture."""
@@ -63,16 +63,16 @@ class Log(Protocol):
     def camera(self, item: Pictured) -> str:
         """Log pose and calibration of a camera; the path of its picture."""
 
-    def outlines(self, path: str, item: Pictured) -> None:
+    def silhouettes(self, path: str, item: Pictured) -> None:
         """Log the outlines of the limbs as the camera sees them, into the picture at a path."""
 
-    def depth(self, path: str, image: npt.NDArray[Any], metres_per_unit: float) -> None:
+    def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:
         """Log a depth image (H, W), compressed: to a quarter of a percent, and in a file not more pixels than `most_points`."""
 
     def body_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True
     ) -> npt.NDArray[np.intp]:
-        """Log points (N, 3) of a sensor at `pose` (4, 4), coloured by limb, those on none only with `background`; the limb of
+        """Log points (N, 3) of a sensor at `pose` (4, 4), colored by limb, those on none only with `background`; the limb of
         each (N,), `limbs`: none."""
 
 

@@ -15,7 +15,7 @@ from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
 from voodoo.sensors.keypoints.sites import nearest_person
 
 KEYPOINT = (255, 120, 255)
-"""Colour in overlays, BGR."""
+"""Color in overlays, BGR."""
 
 
 class KeypointsAdapter(Adapter[KeypointImage]):
@@ -48,7 +48,7 @@ class KeypointsAdapter(Adapter[KeypointImage]):
         registered = next((depth for depth in context.depth_images if _same_camera(depth, item)), None)
         with_depth: dict[str, Any] = {}
         if registered is not None:
-            with_depth = {"depth": registered.image, "metres_per_unit": registered.metres_per_unit}
+            with_depth = {"depth": registered.image, "meters_per_unit": registered.meters_per_unit}
         # As lists: rows of an array, one by one, are slower.
         joints = dict(zip(context.estimate.joint_names, context.estimate.joint_positions.tolist(), strict=True))
         sites = [part.site for part in layout_of(item.layout).parts if part.site in joints]
@@ -80,7 +80,7 @@ class KeypointsAdapter(Adapter[KeypointImage]):
     def log(self, item: KeypointImage, log: Log, memory: Memory) -> None:
         """Rings in the camera's picture, with the outlines of the limbs."""
         path = log.camera(item)
-        log.outlines(path, item)
+        log.silhouettes(path, item)
         rows = np.vstack([*item.people, np.empty((0, 3))])
         rows = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0)]
         rings = np.column_stack([np.full((len(rows), 3), KEYPOINT), 60 + 195 * rows[:, 2].clip(0.0, 1.0)])

@@ -10,7 +10,7 @@ from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 
 MARKER = (60, 60, 255)
-"""Colour in overlays, BGR."""
+"""Color in overlays, BGR."""
 
 
 class MarkersAdapter(Adapter[MarkerSet]):

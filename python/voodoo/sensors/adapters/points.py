@@ -13,7 +13,7 @@ from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
 
 SCAN, CLOUD = (90, 230, 90), (225, 225, 120)
-"""Colours in overlays, BGR."""
+"""Colors in overlays, BGR."""
 
 
 class PointsAdapter(Adapter[PointCloud]):
@@ -38,7 +38,7 @@ class PointsAdapter(Adapter[PointCloud]):
         canvas.dots(transform(item.root_from_sensor, item.points), color=CLOUD, radius=1)
 
     def log(self, item: PointCloud, log: Log, memory: Memory) -> None:
-        """Points coloured by limb."""
+        """Points colored by limb."""
         some = item.points[:: max(len(item.points) // log.most_points, 1)]
         log.body_points(f"world/points/{log.entity(item.sensor)}", some, item.root_from_sensor)
 

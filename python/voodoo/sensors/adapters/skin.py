@@ -1,4 +1,4 @@
-"""Skin in colour images as an input: rays of head and hands."""
+"""Skin in color images as an input: rays of head and hands."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.skin.tracker import SkinTracker
 
 SKIN = (80, 255, 255)
-"""Colour in overlays, BGR."""
+"""Color in overlays, BGR."""
 SCENE = "scene"
 """Under this `Memory` keeps what may be the still scene of a depth camera."""
 
 
 class SkinAdapter(Adapter[ColorImage]):
-    """Colour images; `Memory` keeps the skin tracker of each camera under "skin"."""
+    """Color images; `Memory` keeps the skin tracker of each camera under "skin"."""
 
     kind = "skin"
     measurement = ColorImage
@@ -58,15 +58,15 @@ class SkinAdapter(Adapter[ColorImage]):
         )
         context.rays.extend(rays)
 
-    def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, vouched: bool) -> None:
-        """Colours and background of the picture."""
+    def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, trusted_start: bool) -> None:
+        """Colors and background of the picture."""
         skin = memory.all(self.kind).get(item.sensor)
         if skin is not None:
-            # The first frame shows the pose that was set; without it a colour camera alone would never begin.
-            skin.learn(item.image, item.camera, item.root_from_sensor, estimate, vouched=vouched)
+            # The first frame shows the pose that was set; without it a color camera alone would never begin.
+            skin.learn(item.image, item.camera, item.root_from_sensor, estimate, trusted_start=trusted_start)
 
     def forget(self, memory: Memory) -> None:
-        """The next person's skin has other colours."""
+        """The next person's skin has other colors."""
         memory.drop(self.kind)
 
     def picture(self, item: ColorImage) -> npt.NDArray[Any]:
@@ -89,7 +89,7 @@ class SkinAdapter(Adapter[ColorImage]):
         """The picture with the outlines of the limbs and the skin candidates."""
         rr, path = log.rr, log.camera(item)
         log.send(f"{path}/picture", rr.Image(item.image, color_model="BGR").compress(jpeg_quality=80))
-        log.outlines(path, item)
+        log.silhouettes(path, item)
         skin = memory.all(self.kind).get(item.sensor)
         if skin is not None:
             places = [candidate.pixel for candidate in skin.candidates]
@@ -105,7 +105,7 @@ def _body_view(item: ColorImage, context: Context, predicted: Mapping[str, Float
         depth.image,
         depth_camera=depth.camera,
         world_from_depth=depth.root_from_sensor,
-        metres_per_unit=depth.metres_per_unit,
+        meters_per_unit=depth.meters_per_unit,
         color_camera=item.camera,
         world_from_color=item.root_from_sensor,
         joints=list(predicted.values()),

@@ -19,7 +19,7 @@ _FEWEST = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
+class AssignedKeypoints:
     """The keypoints of one picture by person.
 
     Args:
@@ -31,7 +31,9 @@ class Shared:
     rest: KeypointImage
 
 
-def shared_out(item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDArray[np.float64]]]) -> Shared:
+def assign_keypoints(
+    item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDArray[np.float64]]]
+) -> AssignedKeypoints:
     """Give the keypoints of a picture to persons, all of them at once, by the distances of their rays.
 
     Args:
@@ -49,16 +51,16 @@ def shared_out(item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDA
                 of[numbers[row]] = replace(item, people=(item.people[column],))
                 taken.add(column)
     rest = tuple(rows for index, rows in enumerate(item.people) if index not in taken)
-    return Shared(of, replace(item, people=rest))
+    return AssignedKeypoints(of, replace(item, people=rest))
 
 
 def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, npt.NDArray[np.float64]]) -> float:
     """Median distance [m] of the rays of keypoints from where sites are expected; infinite with too few."""
-    seen = [site for site in site_pixels(rows, layout=item.layout)[0] if site.site in predicted]
-    if len(seen) < _FEWEST:
+    observed = [site for site in site_pixels(rows, layout=item.layout)[0] if site.site in predicted]
+    if len(observed) < _FEWEST:
         return float("inf")
-    origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in seen])
-    places = np.array([predicted[site.site] for site in seen])
+    origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in observed])
+    places = np.array([predicted[site.site] for site in observed])
     away = ray_distance(origin, directions, places)
     away = away[np.isfinite(away)]
     return float(np.median(away)) if len(away) >= _FEWEST else float("inf")

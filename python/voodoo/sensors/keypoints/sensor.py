@@ -99,7 +99,7 @@ class KeypointSensor:
         predicted: Mapping[str, npt.NDArray[np.float64]],
         gate: SiteGate | None = None,
         depth: DepthArray | None = None,
-        metres_per_unit: float = 0.001,
+        meters_per_unit: float = 0.001,
     ) -> KeypointReport:
         """Add the keypoints of one person in one image to a frame; for several cameras see `observe`.
 
@@ -112,7 +112,7 @@ class KeypointSensor:
             predicted=predicted,
             gate=gate,
             depth=depth,
-            metres_per_unit=metres_per_unit,
+            meters_per_unit=meters_per_unit,
         )
         add_rays(frame, rays, model=self.model)
         for site, (position, sigma) in points.items():
@@ -127,7 +127,7 @@ class KeypointSensor:
         predicted: Mapping[str, npt.NDArray[np.float64]],
         gate: SiteGate | None = None,
         depth: DepthArray | None = None,
-        metres_per_unit: float = 0.001,
+        meters_per_unit: float = 0.001,
         before: Mapping[str, float] | None = None,
     ) -> tuple[KeypointReport, list[SiteRay], dict[str, tuple[FloatArray, float]]]:
         """What the keypoints of one person say: rays, and with depth points.
@@ -142,7 +142,7 @@ class KeypointSensor:
             predicted: site name -> (3,) in the world, e.g. `tracker.estimate.joints`; sites not in it are not used.
             gate: drops what is too far from the prediction; None takes everything.
             depth: (H, W) uint16 or float32.
-            metres_per_unit: of `depth`.
+            meters_per_unit: of `depth`.
             before: site name -> how much of the person's body lies between it and the camera [m], see
                 `Tracker.body_before`; None: not known. Networks are as sure of what they guess as of what they see.
 
@@ -171,7 +171,7 @@ class KeypointSensor:
             gate=None if gate is None else gate.core,
             surface=None
             if depth is None
-            else lambda pixel: window_depth(depth, pixel, metres_per_unit=metres_per_unit),
+            else lambda pixel: window_depth(depth, pixel, meters_per_unit=meters_per_unit),
             before=before,
         )
         points = {site: (place, sigma) for site, place, sigma in places}

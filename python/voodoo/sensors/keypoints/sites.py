@@ -51,8 +51,8 @@ def site_pixels(
     check_confidence(min_confidence)
     parts = layout_of(layout).parts
     found = compiled(layout).pixels(checked_rows(keypoints, layout), min_confidence)
-    seen = [SitePixel(part.site, *of, part.spread) for part, of in zip(parts, found, strict=True) if of is not None]
-    return seen, [part.site for part, of in zip(parts, found, strict=True) if of is None]
+    observed = [SitePixel(part.site, *of, part.spread) for part, of in zip(parts, found, strict=True) if of is not None]
+    return observed, [part.site for part, of in zip(parts, found, strict=True) if of is None]
 
 
 def checked_rows(keypoints: npt.ArrayLike, layout: str) -> npt.NDArray[np.float64]:
@@ -76,7 +76,7 @@ def compiled(layout: str) -> _core.KeypointLayout:
     """A layout as the core holds it."""
     return _core.KeypointLayout(
         [
-            (part.site, list(part.shares.items()), part.spread, behind_surface(part.site))
+            (part.site, list(part.weights.items()), part.spread, behind_surface(part.site))
             for part in layout_of(layout).parts
         ]
     )

@@ -29,7 +29,7 @@ def behind_surface(site: str) -> float:
 
 
 def window_depth(
-    depth: DepthArray, pixel: tuple[float, float], *, metres_per_unit: float = 0.001, radius: int = 2
+    depth: DepthArray, pixel: tuple[float, float], *, meters_per_unit: float = 0.001, radius: int = 2
 ) -> float | None:
     """Depth [m] of the nearest surface around a pixel, None where fewer than a quarter of the window's pixels returned.
 
@@ -41,7 +41,7 @@ def window_depth(
     if not (0 <= u < width and 0 <= v < height):
         return None
     window = depth[max(v - radius, 0) : v + radius + 1, max(u - radius, 0) : u + radius + 1]
-    values = window.astype(np.float64).ravel() * metres_per_unit
+    values = window.astype(np.float64).ravel() * meters_per_unit
     values = values[np.isfinite(values) & (values > 0.0)]
     if len(values) < max(window.size // 4, 1):
         return None

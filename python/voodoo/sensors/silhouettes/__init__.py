@@ -1,4 +1,4 @@
-"""Masks of the person in depth and colour pictures, for voodoo.ik."""
+"""Masks of the person in depth and color pictures, for voodoo.ik."""
 
 from voodoo.sensors.silhouettes.color import Silhouettes, StillBackground
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth

@@ -1,4 +1,4 @@
-"""Silhouettes from static colour cameras by background subtraction: `Silhouettes` learns while it runs, `StillBackground` from
+"""Silhouettes from static color cameras by background subtraction: `Silhouettes` learns while it runs, `StillBackground` from
 pictures that are there beforehand, even if the person never leaves the place."""
 
 from __future__ import annotations
@@ -64,15 +64,15 @@ class Silhouettes:
 
 
 class StillBackground:
-    """What a camera that stands still sees behind the person: in each pixel the median colour of those pictures in which the
+    """What a camera that stands still sees behind the person: in each pixel the median color of those pictures in which the
     person cannot be there. Where that is never the case (`unknown`) the background around is continued (Telea 2004).
 
     Args:
         pictures: some tens spread over a recording, (H, W, 3) BGR uint8.
         occupied: for each picture, (H, W) where the person may be; None: anywhere, so that the person must leave every place in
             more than half of the pictures.
-        threshold: least difference of the foreground in any colour, 0 to 255, or
-        chroma: in colour alone, whatever the light (CIE 1976 a*, b*): skin in the shade is as dark as a dark floor, but redder.
+        threshold: least difference of the foreground in any color, 0 to 255, or
+        chroma: in color alone, whatever the light (CIE 1976 a*, b*): skin in the shade is as dark as a dark floor, but redder.
         smallest: regions of less area are specks [px].
 
     Raises:
@@ -113,7 +113,7 @@ class StillBackground:
             raise MeasurementError("occupied: expected pixels where the person is not in some picture, found none")
         hidden = self.unknown.astype(np.uint8)
         self._background = cv2.inpaint(np.nan_to_num(median).astype(np.uint8), hidden, _INPAINT_PX, cv2.INPAINT_TELEA)
-        self._colours = _colours(np.asarray(self._background, dtype=np.uint8))
+        self._colors = _colors(np.asarray(self._background, dtype=np.uint8))
         self._shape, self._threshold, self._chroma, self._smallest = pictures[0].shape, threshold, chroma, smallest
 
     def mask(self, picture: ByteImage) -> Mask:
@@ -125,9 +125,9 @@ class StillBackground:
         _check(picture, self._shape)
         smooth = _smooth(picture)
         differs = cv2.absdiff(smooth, self._background).max(axis=2) > self._threshold
-        # A low threshold: smoothing carries vivid colours a pixel beyond their border.
-        colourful = np.linalg.norm(_colours(smooth) - self._colours, axis=2) > self._chroma
-        differs |= cv2.erode(colourful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
+        # A low threshold: smoothing carries vivid colors a pixel beyond their border.
+        colorful = np.linalg.norm(_colors(smooth) - self._colors, axis=2) > self._chroma
+        differs |= cv2.erode(colorful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
         return _large(differs.astype(np.uint8), self._smallest)
 
 
@@ -142,7 +142,7 @@ def _smooth(picture: ByteImage) -> ByteImage:
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), _SMOOTH_PX), dtype=np.uint8)
 
 
-def _colours(picture: ByteImage) -> npt.NDArray[np.float32]:
+def _colors(picture: ByteImage) -> npt.NDArray[np.float32]:
     """(H, W, 2): a* and b* of CIE 1976, without the lightness."""
     return cv2.cvtColor(picture.astype(np.float32) / np.float32(255.0), cv2.COLOR_BGR2LAB)[..., 1:]
 

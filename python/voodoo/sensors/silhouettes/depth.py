@@ -1,5 +1,5 @@
 """Masks of the person in depth pictures, for voodoo.ik: what hangs together with the known sites, and what stands before the
-still scene near them. Those of colour pictures are in voodoo.sensors.silhouettes.color."""
+still scene near them. Those of color pictures are in voodoo.sensors.silhouettes.color."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ import numpy.typing as npt
 from voodoo.errors import MeasurementError
 from voodoo.measurements import DepthImage
 from voodoo.model.projection import CameraView
-from voodoo.sensors.depth import depth_points, metres
+from voodoo.sensors.depth import depth_points, meters
 from voodoo.sensors.silhouettes.masks import Mask, filled, without_specks
 from voodoo.sensors.silhouettes.sites import known_place
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _STEP = 0.03
-"""Two neighbours whose depths differ by more than this share lie on different things."""
+"""Two neighbors whose depths differ by more than this share lie on different things."""
 _FLOOR_M = 0.05
 _IN_FRONT_M, _BEHIND_M = 0.30, 0.05
 """A body's surface lies in front of its joints: depths around a known site that belong to the person."""
 _REACH_M = 0.6
 """No elbow or knee is farther from a known shoulder, hand, hip or ankle, girth included."""
 _BEFORE = (0.04, 0.012)
-"""What stands before the scene is nearer by this: metres, and share of the depth (three deviations of a structured-light camera
+"""What stands before the scene is nearer by this: meters, and share of the depth (three deviations of a structured-light camera
 at 4 m)."""
 _SPECK_PX = 30
 
@@ -43,7 +43,7 @@ class StillScene:
         """
         if not images or len({image.image.shape for image in images}) != 1:
             raise MeasurementError(f"images: expected some of one size, found {len(images)}")
-        depths = np.sort(np.stack([metres(image) for image in images]), axis=0)  # NaN comes last
+        depths = np.sort(np.stack([meters(image) for image in images]), axis=0)  # NaN comes last
         last = np.isfinite(depths).sum(axis=0)[None] - 1
         # The farthest but one, since one alone may be an error; then the middle of what lies as deep.
         deep = np.take_along_axis(depths, np.maximum(last - 1, 0), axis=0)
@@ -58,7 +58,7 @@ class StillScene:
             MeasurementError: another size.
         """
         if z.shape != self._depth.shape:
-            raise MeasurementError(f"depth: expected shape {self._depth.shape} as learnt, found {z.shape}")
+            raise MeasurementError(f"depth: expected shape {self._depth.shape} as learned, found {z.shape}")
         with np.errstate(invalid="ignore"):
             return np.asarray(z < _nearest_of(self._depth), dtype=bool)
 
@@ -87,7 +87,7 @@ def from_depth(
     places = {site: known_place(site, position) for site, position in known.items()}
     points, valid = depth_points(depth)
     solid = valid & (points[:, 2] > _FLOOR_M) if level else valid
-    z = np.where(solid.reshape(height, width), metres(depth), np.nan)
+    z = np.where(solid.reshape(height, width), meters(depth), np.nan)
     view = CameraView(depth.camera, depth.root_from_sensor)
     seeds = []
     for place in places.values():

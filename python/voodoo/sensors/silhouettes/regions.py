@@ -22,14 +22,14 @@ _SMALLEST_PX = 60
 
 
 class RegionSilhouettes:
-    """What of pictures is the body, by colours that are learnt where it was.
+    """What of pictures is the body, by colors that are learned where it was.
 
     Args:
         body: in the sizes that its postures have.
     """
 
     def __init__(self, body: Body) -> None:
-        """Nothing is learnt yet."""
+        """Nothing is learned yet."""
         self._tracker = Tracker(body)
         self._lenses: dict[str, Pinhole] = {}
 
@@ -39,7 +39,7 @@ class RegionSilhouettes:
         """The masks of pictures of one time and the cameras without distortion that they belong to, one a picture, near a
         posture: limb name -> (4, 4) in the pictures' root frame.
 
-        A camera that is new learns the colours at that posture, which must be right, then.
+        A camera that is new learns the colors at that posture, which must be right, then.
 
         Raises:
             VoodooError: a picture or posture that cannot be used.
@@ -51,7 +51,7 @@ class RegionSilhouettes:
         return [(mask, self._lenses[item.sensor].camera) for mask, item in zip(masks, pictures, strict=True)]
 
     def learn(self, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]) -> None:
-        """Learn the colours in pictures of one time, where the body was found in them.
+        """Learn the colors in pictures of one time, where the body was found in them.
 
         Raises:
             VoodooError: a picture or posture that cannot be used.

@@ -21,9 +21,9 @@ _TRUNK = {"l_shoulder", "r_shoulder", "l_hip", "r_hip"}
 
 
 _LIMBS = tuple(
-    (f"{side}_{first}", f"{side}_{middle}", f"{side}_{last}", share)
+    (f"{side}_{first}", f"{side}_{middle}", f"{side}_{last}", fraction)
     for side in "lr"
-    for first, middle, last, share in (
+    for first, middle, last, fraction in (
         ("shoulder", "elbow", "wrist", 0.332),
         ("shoulder", "elbow", "hand", 0.377),
         ("hip", "knee", "ankle", 0.491),
@@ -67,14 +67,14 @@ def surroundings(
         cv2.polylines(mask, [hull], True, 1, max(round(2.0 * by * scale), 1))
 
     rest = set(ends)
-    for first, middle, last, share in _LIMBS:
+    for first, middle, last, fraction in _LIMBS:
         if first in ends and middle in ends and last in ends:
             widened([first, middle], _GIRTH_M)
             widened([middle, last], _GIRTH_M)
             rest -= {middle, last}
         elif first in ends and last in ends:
             straight = float(np.linalg.norm(places[first] - places[last]))
-            bend = 0.5 * float(np.sqrt(max((share * height) ** 2 - straight**2, 0.0)))
+            bend = 0.5 * float(np.sqrt(max((fraction * height) ** 2 - straight**2, 0.0)))
             widened([first, last], bend + _GIRTH_M)
             rest.discard(last)
     if rest:

@@ -1,4 +1,4 @@
-"""Skin colour as a cue for head and hands."""
+"""Skin color as a cue for head and hands."""
 
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.sensors.skin.tracker import SkinTracker

@@ -1,4 +1,4 @@
-"""Skin colour as a cue for head and hands (K06 III-A): segmentation that adapts, regions, and their assignment.
+"""Skin color as a cue for head and hands (K06 III-A): segmentation that adapts, regions, and their assignment.
 
 All regions become candidates without a label. They are followed in space, so that a hand keeps its name while the body
 model falls behind; `voodoo_core::skin` says what keeps a hand with its owner. With a depth image a region is a place in
@@ -43,7 +43,7 @@ class FollowedRegion(NamedTuple):
         stamp: when it was last seen [s].
         velocity: (3,) [m/s].
         far: of each site how far it was from there, squared shares of the gate.
-        doubt: of each site how long it has spoken against being it [s].
+        mismatch_s: of each site how long it has spoken against being it [s].
     """
 
     label: str | None
@@ -51,14 +51,14 @@ class FollowedRegion(NamedTuple):
     stamp: float
     velocity: tuple[float, ...]
     far: tuple[float, ...]
-    doubt: tuple[float, ...]
+    mismatch_s: tuple[float, ...]
 
 
 class SkinTracker:
     """The skin cue of one camera."""
 
     def __init__(self, settings: SkinSettings | None = None) -> None:
-        """Start with the colours of all skins; `learn` makes them one person's."""
+        """Start with the colors of all skins; `learn` makes them one person's."""
         self.settings = chosen = settings or SkinSettings()
         self._sites = tuple(chosen.sites)
         self._teacher = _core.SkinTeacher()
@@ -83,12 +83,12 @@ class SkinTracker:
 
     @property
     def settled(self) -> bool:
-        """True when enough pictures were learnt from."""
-        return self._teacher.learnt >= self.settings.settled_frames
+        """True when enough pictures were learned from."""
+        return self._teacher.learned >= self.settings.settled_frames
 
     @property
-    def colours(self) -> npt.NDArray[np.float32]:
-        """Histogram of skin's colours (64, 64, 8), by Cr, Cb and Y."""
+    def colors(self) -> npt.NDArray[np.float32]:
+        """Histogram of skin's colors (64, 64, 8), by Cr, Cb and Y."""
         return self._teacher.skin
 
     @property
@@ -146,7 +146,7 @@ class SkinTracker:
             others: other persons; what is nearer to them than to the body is theirs.
             arm_lost: sites whose limb the other sensors do not show where the body has it.
             upper_arm_visible: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
-            head_visible: sites whose own limb they show there, see `SkinSettings.shown_bias`.
+            head_visible: sites whose own limb they show there, see `SkinSettings.visible_bias`.
             source: name for `Estimate.sources`.
             moved: site name -> (3,) where it is at the time of the rays; None: that of the picture.
 
@@ -177,7 +177,7 @@ class SkinTracker:
             site = self._sites[number]
             bias = self.settings.sites[site]
             if site in head_visible:
-                bias = max(bias, self.settings.shown_bias.get(site, bias))
+                bias = max(bias, self.settings.visible_bias.get(site, bias))
             ray = SiteRay(site, origin, direction, noise.sigma(z, focal), source, bias=bias, place=place)
             rays.append(ray if moved is None else ray.moved(moved[site] - predicted[site]))
         return rays
@@ -190,23 +190,23 @@ class SkinTracker:
         estimate: Estimate,
         *,
         rate_hz: float = 30.0,
-        vouched: bool = False,
+        trusted_start: bool = False,
     ) -> None:
-        """Learn colours and background from a picture and the estimate of its time; only while tracking is good.
+        """Learn colors and background from a picture and the estimate of its time; only while tracking is good.
 
-        Colours are learnt around the sites that were matched (all of them before the cue has settled), and only from
+        Colors are learned around the sites that were matched (all of them before the cue has settled), and only from
         pixels that were skin already, or nearly: the hair on a head seen from behind is not skin.
 
         Args:
             image, camera, world_from_sensor: as in `observe`.
             estimate: of the picture's time.
             rate_hz: of the pictures.
-            vouched: the pose is right whatever the status says: somebody set it.
+            trusted_start: the pose is right whatever the status says: somebody set it.
 
         Raises:
             MeasurementError: the image is not of the camera's size.
         """
-        if estimate.status != "tracking" and not vouched:
+        if estimate.status != "tracking" and not trusted_start:
             return
         pose = rigid(world_from_sensor)
         _check_image(image, camera)

@@ -47,15 +47,15 @@ mod tests {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let then = body.rest_pose(Pose::IDENTITY);
         let motion = Pose::from_parts(Vec3::new(0.3, -0.2, 0.1), Quat::from_rotation_z(0.4));
-        for chain in TwoBone::of(&body) {
+        for chain in TwoBone::from_body(&body) {
             let mut now: Vec<Pose> = then.iter().map(|pose| motion * *pose).collect();
-            let wanted = now.clone();
+            let expected = now.clone();
             // The arm itself went elsewhere.
             chain.limbs().for_each(|limb| now[limb] = Pose::IDENTITY);
             move_with_parent(&chain, &body, &then, &mut now);
-            for (found, wanted) in now.iter().zip(&wanted) {
-                assert!((found.translation - wanted.translation).length() < 1e-12);
-                assert!(found.rotation.angle_between(wanted.rotation) < 1e-6);
+            for (found, expected) in now.iter().zip(&expected) {
+                assert!((found.translation - expected.translation).length() < 1e-12);
+                assert!(found.rotation.angle_between(expected.rotation) < 1e-6);
             }
         }
     }

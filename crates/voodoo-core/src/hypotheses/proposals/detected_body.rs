@@ -15,7 +15,7 @@ impl Propose for DetectedBody<'_> {
         if !at.chain().leg || self.0.len() != at.matched.poses.len() {
             return;
         }
-        let origin = at.context.seen.origin();
+        let origin = at.context.observation.origin();
         pool.body.poses.clear();
         pool.body.poses.extend(self.0.iter().map(|pose| shifted(pose, origin)));
         pool.body.set(Basis::Body);
@@ -31,28 +31,28 @@ mod tests {
     use crate::testing::{before_wall, farthest, moved, standing, with_context, without_background};
 
     #[test]
-    fn of_a_leg_in_doubt_the_whole_body_is_proposed_in_the_frame_of_now_and_of_an_arm_it_is_not() {
+    fn of_an_uncertain_leg_the_whole_body_is_proposed_in_the_frame_of_now_and_of_an_arm_it_is_not() {
         let (model, poses) = standing();
         let (pixels, config, origin) =
             (before_wall(&model.body, &poses), without_background(), Vec3::new(2.0, -1.0, 0.5));
-        let seen_at = moved(&poses, 0.1 * Vec3::X + origin);
+        let truth_at = moved(&poses, 0.1 * Vec3::X + origin);
         with_context(&pixels, &config, &model, &poses, |context| {
-            let mut seen = context.seen;
-            seen.views.origin = origin;
+            let mut observation = context.observation;
+            observation.views.origin = origin;
             let fit = Fit::new(&config).unwrap();
             let proposed = |leg: bool, detected: &[Pose]| {
                 let index = model.extremities.iter().position(|chain| chain.leg == leg).unwrap();
-                let context = Context { seen, ..context };
+                let context = Context { observation, ..context };
                 let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
                 let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
                 DetectedBody(detected).propose(at, &[], &mut rough, &mut pool);
                 let found: Vec<_> = pool.found().map(|proposal| proposal.poses.clone()).collect();
                 found
             };
-            let found = proposed(true, &seen_at);
+            let found = proposed(true, &truth_at);
             assert_eq!(found.len(), 1);
             assert!(farthest(&found[0], &moved(&poses, 0.1 * Vec3::X)) < 1e-12);
-            assert!(proposed(false, &seen_at).is_empty());
+            assert!(proposed(false, &truth_at).is_empty());
             assert!(proposed(true, &[]).is_empty(), "nobody looked");
         });
     }

@@ -17,8 +17,8 @@ impl DetectedEnd<'_> {
         let detected = self.0?;
         let last = chain.ends.first()?;
         let joint = body.limbs()[*last].parent.as_ref().map(|(_, joint)| joint)?;
-        if let Some(seen) = detected.on_limb(*last) {
-            return Some(seen.position);
+        if let Some(detected) = detected.on_limb(*last) {
+            return Some(detected.position);
         }
         let beyond = chain.end(poses) - poses[*last] * joint.limb_from_joint.translation;
         Some(detected.hangs_by(*last)?.position + beyond)
@@ -28,7 +28,7 @@ impl DetectedEnd<'_> {
 impl Propose for DetectedEnd<'_> {
     fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
         let Some(end) = self.end(at) else { return };
-        let place = end - at.context.seen.origin();
+        let place = end - at.context.observation.origin();
         // The detector's elbow is no better than its wrist.
         let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected.poses);
         if cost < f64::INFINITY {

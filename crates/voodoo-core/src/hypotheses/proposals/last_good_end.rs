@@ -11,7 +11,7 @@ pub(in crate::hypotheses) struct LastGoodEnd;
 impl Propose for LastGoodEnd {
     fn propose(&mut self, at: Extremity, history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
         let Some(end) = history[at.index].last_good_end else { return };
-        let place = end - at.context.seen.origin();
+        let place = end - at.context.observation.origin();
         let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.rest.poses);
         // Pictures judge it as it is: a refinement takes as long as the frame.
         let most = if at.regions.is_some() { pool.least } else { f64::INFINITY };
@@ -33,7 +33,7 @@ mod tests {
         let (model, poses) = standing();
         let (wrong, _) = raised(&model, &poses, 0.2);
         let index = first_arm(&model);
-        let wanted = model.extremities[index].end(&poses);
+        let expected = model.extremities[index].end(&poses);
         let (pixels, config) = (before_wall(&model.body, &poses), without_background());
         with_context(&pixels, &config, &model, &wrong, |context| {
             let mut fit = Fit::new(&config).unwrap();
@@ -43,11 +43,11 @@ mod tests {
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
             LastGoodEnd.propose(at, &history, &mut rough, &mut pool);
             assert_eq!(pool.found().count(), 0, "nobody knows where");
-            history[index].last_good_end = Some(wanted);
+            history[index].last_good_end = Some(expected);
             LastGoodEnd.propose(at, &history, &mut rough, &mut pool);
             let found: Vec<_> = pool.found().collect();
             assert_eq!((found.len(), found[0].basis), (1, Basis::Rest));
-            assert!(model.extremities[index].end(&found[0].poses).distance(wanted) < 0.005);
+            assert!(model.extremities[index].end(&found[0].poses).distance(expected) < 0.005);
             for limb in (0..poses.len()).filter(|limb| !model.extremities[index].limbs().any(|own| own == *limb)) {
                 assert_eq!(found[0].poses[limb], wrong[limb]);
             }

@@ -15,7 +15,7 @@ impl Propose for LastProposal {
         if !own.persistence.voted_before() || own.last_proposal.is_empty() {
             return;
         }
-        let origin = at.context.seen.origin();
+        let origin = at.context.observation.origin();
         pool.again.poses.clear();
         pool.again.poses.extend(own.last_proposal.iter().map(|pose| shifted(pose, origin)));
         pool.again.set(own.last_basis);
@@ -35,17 +35,21 @@ mod tests {
     #[test]
     fn what_the_frame_before_asked_for_is_proposed_again_in_the_frame_of_now() {
         let (model, poses) = standing();
-        let (wanted, _) = raised(&model, &poses, 0.2);
+        let (expected, _) = raised(&model, &poses, 0.2);
         let (pixels, config, index) = (before_wall(&model.body, &poses), without_background(), first_arm(&model));
         with_context(&pixels, &config, &model, &poses, |context| {
-            let mut seen = context.seen;
-            seen.views.origin = Vec3::new(2.0, -1.0, 0.5);
+            let mut observation = context.observation;
+            observation.views.origin = Vec3::new(2.0, -1.0, 0.5);
             let fit = Fit::new(&config).unwrap();
-            let at =
-                Extremity { context: Context { seen, ..context }, matched: fit.matched(&poses), regions: None, index };
+            let at = Extremity {
+                context: Context { observation, ..context },
+                matched: fit.matched(&poses),
+                regions: None,
+                index,
+            };
             let mut history = vec![History::default(); model.extremities.len()];
             let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
-            history[index].last_proposal = wanted.clone();
+            history[index].last_proposal = expected.clone();
             history[index].last_basis = Basis::Lean;
             history[index].persistence.observe(Some(1), false, Times { before: 0.0, now: 0.1 });
             LastProposal.propose(at, &history, &mut rough, &mut pool);
@@ -55,7 +59,7 @@ mod tests {
             LastProposal.propose(at, &history, &mut rough, &mut pool);
             let found: Vec<_> = pool.found().collect();
             assert_eq!((found.len(), found[0].basis), (1, Basis::Lean));
-            assert!(farthest(&found[0].poses, &moved(&wanted, -seen.views.origin)) < 1e-12);
+            assert!(farthest(&found[0].poses, &moved(&expected, -observation.views.origin)) < 1e-12);
         });
     }
 }

@@ -1,20 +1,20 @@
 //! Where an arm, a leg or the trunk may be instead: each kind of proposal is a file.
 
 mod carried_by_parent;
+mod color_directions;
 mod detected_body;
 mod detected_end;
 mod last_good_end;
 mod last_proposal;
-mod shown_by_colors;
 mod trunk_lean;
 mod unexplained_cluster;
 
 pub(super) use carried_by_parent::CarriedByParent;
+pub(super) use color_directions::ColorDirections;
 pub(super) use detected_body::DetectedBody;
 pub(super) use detected_end::DetectedEnd;
 pub(super) use last_good_end::LastGoodEnd;
 pub(super) use last_proposal::LastProposal;
-pub(super) use shown_by_colors::ShownByColors;
 pub(super) use trunk_lean::TrunkLean;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 

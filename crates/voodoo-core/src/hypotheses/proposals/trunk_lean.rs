@@ -52,7 +52,7 @@ enum Stance {
 }
 
 /// A leg and the place of its foot, working frame.
-type Standing<'a> = (&'a TwoBone, Vec3);
+type StandingLeg<'a> = (&'a TwoBone, Vec3);
 
 impl TrunkLean {
     /// Learns what leans and what stands of a body.
@@ -98,7 +98,7 @@ impl TrunkLean {
         let extremities = &context.model.extremities;
         let [one, two] = self.legs?;
         let (one_end, two_end) = (history[one].last_good_end?, history[two].last_good_end?);
-        let origin = context.seen.origin();
+        let origin = context.observation.origin();
         let legs = [(&extremities[one], one_end - origin), (&extremities[two], two_end - origin)];
         let (shoulders, axis) = self.shoulders(context, matched);
         let steps = [0.0, -1.0, 1.0, -2.0, 2.0];
@@ -108,7 +108,7 @@ impl TrunkLean {
         for angle in leans.iter().map(|step| step * LEAN) {
             let mut cost = self.lean_trunk(context, matched, shoulders, Quat::from_axis_angle(axis, angle));
             for leg in legs {
-                cost += self.stand(context, matched, leg);
+                cost += self.place_leg(context, matched, leg);
             }
             cost += rough_cost(&self.distances.leaning, &self.sample.weights);
             if stance.is_none() {
@@ -132,8 +132,8 @@ impl TrunkLean {
     }
 
     /// Draws the sample, and its distances to the limbs that neither lean nor stand.
-    fn explain_what_stays(&mut self, context: Context, matched: Matched, legs: [Standing; 2]) {
-        let candidates = context.seen.candidates;
+    fn explain_what_stays(&mut self, context: Context, matched: Matched, legs: [StandingLeg; 2]) {
+        let candidates = context.observation.candidates;
         self.make_room(candidates.len());
         self.sample.assign(&candidates.points, &candidates.weight);
         self.sample.subsample(ROUGH_SAMPLE);
@@ -158,24 +158,26 @@ impl TrunkLean {
             trial[limb] =
                 Pose::from_parts(shoulders + turn * (pose.translation - shoulders), (turn * pose.rotation).normalize());
             explain(body, limb, trial, &sample.points, leaning, scratch);
-            cost += limb_visibility(context.seen.views, &body.limbs()[limb], &trial[limb]).cost();
+            cost += limb_visibility(context.observation.views, &body.limbs()[limb], &trial[limb]).cost();
         }
         cost
     }
 
     /// Puts a leg on its foot's place below the trunk of `trial`, with the bend that costs least; what speaks against it there.
-    fn stand(&mut self, context: Context, matched: Matched, (leg, end): Standing) -> f64 {
+    fn place_leg(&mut self, context: Context, matched: Matched, (leg, end): StandingLeg) -> f64 {
         let body = &context.model.body;
         let Self { sample, distances: Distances { leaning, tried, scratch, .. }, trial, .. } = self;
-        let seen =
-            |limb: usize, poses: &[Pose]| limb_visibility(context.seen.views, &body.limbs()[limb], &poses[limb]).cost();
+        let visible_cost = |limb: usize, poses: &[Pose]| {
+            limb_visibility(context.observation.views, &body.limbs()[limb], &poses[limb]).cost()
+        };
         let (mut bend, mut least, mut own) = (0.0, f64::INFINITY, 0.0);
         for swivel in 0..SWIVELS {
             let swivel = TAU * swivel as f64 / SWIVELS as f64;
             leg.reach(body, trial, end, swivel);
             tried.clone_from(leaning);
             leg.limbs().for_each(|limb| explain(body, limb, trial, &sample.points, tried, scratch));
-            let against = leg.limbs().map(|limb| seen(limb, trial)).sum::<f64>() + strain(context, matched, leg, trial);
+            let against =
+                leg.limbs().map(|limb| visible_cost(limb, trial)).sum::<f64>() + strain(context, matched, leg, trial);
             let cost = rough_cost(tried, &sample.weights) + against;
             if cost < least {
                 (bend, least, own) = (swivel, cost, against);
@@ -239,7 +241,8 @@ mod tests {
             });
             poses.push(Pose::from_parts(at, rotation));
         }
-        let feet: Vec<Vec3> = TwoBone::of(body).iter().filter(|leg| leg.leg).map(|leg| leg.end(&poses)).collect();
+        let feet: Vec<Vec3> =
+            TwoBone::from_body(body).iter().filter(|leg| leg.leg).map(|leg| leg.end(&poses)).collect();
         let shift = Vec3::new(0.0, 0.9, 2.6) - 0.5 * (feet[0] + feet[1]);
         poses.iter().map(|pose| Pose::from_parts(pose.translation + shift, pose.rotation)).collect()
     }

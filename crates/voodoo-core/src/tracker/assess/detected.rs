@@ -7,7 +7,7 @@ use crate::visibility::evidence::EXPLAINED;
 
 /// Log odds that a limb is right, by where a detector sees its near end and that of the `next` one: where it sees all of a limb
 /// aside, the limb is wrong however sure one joint may be. Poses are in a frame with this `origin` in the world.
-pub(super) fn said_by_detection(
+pub(super) fn detection_log_odds(
     detected: Detected,
     body: &Body,
     poses: &[Pose],
@@ -16,16 +16,16 @@ pub(super) fn said_by_detection(
 ) -> f64 {
     let apart = |limb: usize| {
         let (parent, joint) = body.limbs()[limb].parent.as_ref()?;
-        let seen = detected.hangs_by(limb)?;
+        let detected = detected.hangs_by(limb)?;
         let tracked = poses[*parent] * joint.parent_from_joint.translation + origin;
-        Some(said_by_joint(tracked - seen.position, seen.sigma))
+        Some(joint_log_odds(tracked - detected.position, detected.sigma))
     };
     limbs.into_iter().flatten().filter_map(apart).sum()
 }
 
-/// The same of a joint that a detector, with this standard deviation along each axis, sees aside, metres: of a right one the mean
+/// The same of a joint that a detector, with this standard deviation along each axis, sees aside, meters: of a right one the mean
 /// square is the variance. What is tracked is as near to the truth as points to the limb that explains them.
-fn said_by_joint(apart: Vec3, sigma: f64) -> f64 {
+fn joint_log_odds(apart: Vec3, sigma: f64) -> f64 {
     let variance = sigma * sigma + EXPLAINED * EXPLAINED;
     apart.to_array().iter().map(|along| 0.5 * (1.0 - along * along / variance)).sum()
 }
@@ -37,24 +37,27 @@ mod tests {
     use crate::testing::standing;
 
     /// What a detector with this standard deviation says of the first arm's limbs that sees everything so far aside.
-    fn said(aside: Vec3, sigma: f64) -> [f64; 2] {
+    fn log_odds(aside: Vec3, sigma: f64) -> [f64; 2] {
         let (model, poses) = standing();
         let body = &model.body;
         let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
         let place = |site| body.site_position(&poses, site) + aside + Vec3::X;
         let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
         let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
-        let seen = Detected { detection: &detection, map: &JointMap::new(body, &names, &[]) };
+        let detected = Detected { detection: &detection, map: &JointMap::new(body, &names, &[]) };
         let arm = &model.extremities[0];
         [(arm.upper, Some(arm.lower)), (arm.lower, arm.ends.first().copied())]
-            .map(|(limb, next)| said_by_detection(seen, body, &poses, Vec3::X, [Some(limb), next]))
+            .map(|(limb, next)| detection_log_odds(detected, body, &poses, Vec3::X, [Some(limb), next]))
     }
 
     #[test]
     fn a_detector_speaks_for_what_it_sees_there_and_against_what_it_sees_elsewhere_as_it_is_sure() {
-        for (there, aside) in said(Vec3::ZERO, 0.03).into_iter().zip(said(0.2 * Vec3::X, 0.03)) {
+        for (there, aside) in log_odds(Vec3::ZERO, 0.03).into_iter().zip(log_odds(0.2 * Vec3::X, 0.03)) {
             assert!((there - 3.0).abs() < 1e-9 && aside < -10.0, "{there} {aside}");
         }
-        assert!(said(0.2 * Vec3::X, 0.2).iter().all(|said| *said > 0.0), "a detector that knows little says little");
+        assert!(
+            log_odds(0.2 * Vec3::X, 0.2).iter().all(|value| *value > 0.0),
+            "a detector that knows little says little"
+        );
     }
 }

@@ -1,17 +1,17 @@
 //! Whether arms and legs are where they are thought to be, where pictures are all that shows them: what is not known to a few
-//! centimetres by what edges told is not called measured.
+//! centimeters by what edges told is not called measured.
 
 use super::Assessor;
 use crate::association::correspondence::RegionSupport;
 use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::tracker::estimate::LimbStatus;
-use crate::uncertainty::Found;
+use crate::uncertainty::FittedPose;
 use crate::visibility::evidence::EXPLAINED;
 
-/// How much less sure a limb is whose second opinion ends so many metres away, as a factor of its standard deviation: where both agree
+/// How much less sure a limb is whose second opinion ends so many meters away, as a factor of its standard deviation: where both agree
 /// as well as a point with the limb that explains it, as sure as by edges alone.
-fn doubted_by(apart: f64) -> f64 {
+fn sigma_factor(apart: f64) -> f64 {
     (apart / EXPLAINED).sqrt()
 }
 
@@ -20,47 +20,47 @@ impl Assessor {
     pub(in crate::tracker) fn follow_edges(
         &mut self,
         model: &Model,
-        found: Found,
-        differs: impl Fn(usize) -> Option<f64>,
+        found: FittedPose,
+        branch_distance: impl Fn(usize) -> Option<f64>,
     ) {
-        let Found { poses, correspondences, time_scale, config, .. } = found;
+        let FittedPose { poses, correspondences, time_scale, config, .. } = found;
         let points = correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let pictures = !correspondences.region_support.is_empty();
-        if points || !pictures && self.unsure.is_empty() {
+        if points || !pictures && self.edge_uncertainty.is_empty() {
             self.forget_edges();
             return;
         }
         self.edges.observe(model, poses, correspondences, time_scale, config);
-        let Self { edges, unsure, .. } = self;
-        unsure.resize(poses.len(), f64::NAN);
-        for (limb, known) in unsure.iter_mut().enumerate() {
+        let Self { edges, edge_uncertainty, .. } = self;
+        edge_uncertainty.resize(poses.len(), f64::NAN);
+        for (limb, known) in edge_uncertainty.iter_mut().enumerate() {
             let support = correspondences.region_support.get(limb).copied();
-            let RegionSupport { own, shown, .. } = support.unwrap_or_default();
-            let sigma = edges.end_sigma(limb) * differs(limb).map_or(1.0, doubted_by);
+            let RegionSupport { own, visible, .. } = support.unwrap_or_default();
+            let sigma = edges.end_sigma(limb) * branch_distance(limb).map_or(1.0, sigma_factor);
             // To be known as well as a point is explained is enough. What speaks for all of a limb makes it surer by a factor of e.
-            *known = (sigma / EXPLAINED).ln() - own[0] * shown;
+            *known = (sigma / EXPLAINED).ln() - own[0] * visible;
         }
     }
 
     /// Nothing that edges told before counts.
     pub(super) fn forget_edges(&mut self) {
         self.edges.forget();
-        self.unsure.clear();
+        self.edge_uncertainty.clear();
     }
 
     /// Edges of pictures are all there is.
-    pub(super) fn told_by_edges(&self) -> bool {
-        !self.unsure.is_empty()
+    pub(super) fn is_by_edges_alone(&self) -> bool {
+        !self.edge_uncertainty.is_empty()
     }
 
     /// Statuses of arms and legs by what edges told, if that is all there is.
-    pub(super) fn doubt_by_edges(&self, extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
-        for chain in extremities.iter().filter(|_| self.told_by_edges()) {
+    pub(super) fn report_edges(&self, extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
+        for chain in extremities.iter().filter(|_| self.is_by_edges_alone()) {
             for limb in [chain.upper, chain.lower] {
                 statuses[limb] = match statuses[limb] {
-                    _ if self.unsure[limb] < 0.0 => LimbStatus::Measured,
+                    _ if self.edge_uncertainty[limb] < 0.0 => LimbStatus::Measured,
                     LimbStatus::Measured => LimbStatus::Inferred,
-                    doubtful => doubtful,
+                    limb_suspect => limb_suspect,
                 };
             }
             chain.ends.iter().for_each(|end| statuses[*end] = statuses[chain.lower]);
@@ -77,17 +77,17 @@ mod tests {
     use crate::testing::{first_arm, standing};
 
     #[test]
-    fn arms_and_legs_are_measured_where_edges_told_where_they_are() {
+    fn arms_and_legs_are_measured_where_edges_are_sharp() {
         let (model, poses) = standing();
         let chain = &model.extremities[0];
         let statuses = |internal: LimbStatus, sure: bool| {
             let mut assessor =
-                Assessor { unsure: vec![if sure { -1.0 } else { 1.0 }; poses.len()], ..Assessor::default() };
+                Assessor { edge_uncertainty: vec![if sure { -1.0 } else { 1.0 }; poses.len()], ..Assessor::default() };
             let mut statuses = vec![internal; poses.len()];
-            assessor.doubt_by_edges(&model.extremities, &mut statuses);
+            assessor.report_edges(&model.extremities, &mut statuses);
             assessor.forget_edges();
             let mut forgotten = vec![internal; poses.len()];
-            assessor.doubt_by_edges(&model.extremities, &mut forgotten);
+            assessor.report_edges(&model.extremities, &mut forgotten);
             assert_eq!(forgotten, vec![internal; poses.len()], "edges are not all there is");
             (statuses[0], [chain.upper, chain.lower, chain.ends[0]].map(|limb| statuses[limb]))
         };
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limb_is_in_doubt_where_a_second_opinion_ends_elsewhere() {
+    fn a_limb_is_uncertain_where_a_second_opinion_ends_elsewhere() {
         let (model, poses) = standing();
         let mut correspondences = Correspondences::default();
         for (limb, part) in model.body.limbs().iter().enumerate() {
@@ -113,11 +113,11 @@ mod tests {
                     source: 0,
                 });
             }
-            let support = RegionSupport { own: [0.6; 2], shown: 0.6, ..RegionSupport::default() };
+            let support = RegionSupport { own: [0.6; 2], visible: 0.6, ..RegionSupport::default() };
             correspondences.region_support.push(support);
         }
         let (body, config) = (&model.body, Config::default());
-        let found = Found {
+        let found = FittedPose {
             body,
             poses: &poses,
             correspondences: &correspondences,
@@ -131,12 +131,12 @@ mod tests {
         let mut status = |apart: Option<f64>| {
             assessor.follow_edges(&model, found, |_| apart);
             let mut statuses = vec![LimbStatus::Measured; poses.len()];
-            assessor.doubt_by_edges(&model.extremities, &mut statuses);
-            (statuses[arm.lower] == LimbStatus::Measured, assessor.unsure[arm.lower])
+            assessor.report_edges(&model.extremities, &mut statuses);
+            (statuses[arm.lower] == LimbStatus::Measured, assessor.edge_uncertainty[arm.lower])
         };
         let (alone, agreed) = (status(None), status(Some(0.0)));
         assert!(alone.0 && agreed.0 && agreed.1 < alone.1, "{alone:?} {agreed:?}");
-        let differs = status(Some(5.0));
-        assert!(!differs.0 && differs.1 > alone.1, "{differs:?}");
+        let branch_distance = status(Some(5.0));
+        assert!(!branch_distance.0 && branch_distance.1 > alone.1, "{branch_distance:?}");
     }
 }

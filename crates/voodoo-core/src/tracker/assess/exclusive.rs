@@ -1,4 +1,4 @@
-//! What each limb explains and no other but its neighbours.
+//! What each limb explains and no other but its neighbors.
 
 use crate::body::Body;
 use crate::hypotheses::ROUGH_SAMPLE;
@@ -17,18 +17,18 @@ pub(super) struct Exclusive {
     distances: Vec<f32>,
     /// Distances of the whole sample, limb after limb.
     all: Vec<f32>,
-    nearest: Nearest,
+    nearest: SampleNearest,
 }
 
 /// Of each point of the sample the nearest limb, how far it is, and how many are near enough to explain it.
 #[derive(Debug, Default)]
-struct Nearest {
+struct SampleNearest {
     limb: Vec<u32>,
     distance: Vec<f32>,
     near: Vec<u32>,
 }
 
-impl Nearest {
+impl SampleNearest {
     /// Of so many points, before any limb is known.
     fn begin(&mut self, count: usize) {
         self.distance.clear();
@@ -105,11 +105,11 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
-    /// Weight of what each limb alone explains of an image of `seen`, at `poses`; the weight of all candidates.
-    fn counted(seen: &[Pose], poses: &[Pose], change: impl Fn(&Candidates, &mut Exclusive)) -> (Vec<f64>, f64) {
+    /// Weight of what each limb alone explains of an image of `truth`, at `poses`; the weight of all candidates.
+    fn counted(truth: &[Pose], poses: &[Pose], change: impl Fn(&Candidates, &mut Exclusive)) -> (Vec<f64>, f64) {
         let (model, config) = (standing().0, without_background());
-        with_context(&before_wall(&model.body, seen), &config, &model, poses, |context| {
-            let candidates = context.seen.candidates;
+        with_context(&before_wall(&model.body, truth), &config, &model, poses, |context| {
+            let candidates = context.observation.candidates;
             let mut exclusive = Exclusive::default();
             // What was counted before is forgotten.
             exclusive.count(&model.body, poses, candidates);

@@ -16,12 +16,12 @@ pub(super) struct LimbHistory {
     /// Share of the facing patches that cameras see past.
     contradicted: f64,
     /// Share of the facing patches not hidden.
-    shown: f64,
+    visible: f64,
     /// That images show this limb, and no other, where it is, and so that of its far end; of limbs of which an image says
     /// something.
-    shows: Option<[TwoState; 2]>,
+    states: Option<[TwoState; 2]>,
     frames: usize,
-    /// How its far end moved in the last frame, and by how much otherwise than in the one before, metres.
+    /// How its far end moved in the last frame, and by how much otherwise than in the one before, meters.
     motion: Vec3,
     unexpected: f64,
 }
@@ -30,35 +30,35 @@ impl LimbHistory {
     /// Takes a frame's shares: explained by it alone, seen past, not hidden.
     pub(super) fn update(&mut self, now: [f64; 3]) {
         let keep = if self.frames == 0 { 0.0 } else { MEMORY };
-        let shares = [&mut self.exclusive, &mut self.contradicted, &mut self.shown];
-        for (value, now) in shares.into_iter().zip(now) {
+        let means = [&mut self.exclusive, &mut self.contradicted, &mut self.visible];
+        for (value, now) in means.into_iter().zip(now) {
             *value = keep * *value + (1.0 - keep) * now;
         }
         self.frames += 1;
     }
 
-    /// Takes how its far end moved since the frame before, metres.
+    /// Takes how its far end moved since the frame before, meters.
     pub(super) fn moved(&mut self, motion: Vec3) {
         self.unexpected = motion.distance(self.motion);
         self.motion = motion;
     }
 
-    /// By how many metres its far end moved otherwise than from the last frame but one to the last.
+    /// By how many meters its far end moved otherwise than from the last frame but one to the last.
     pub(super) fn unexpected(&self) -> f64 {
         self.unexpected
     }
 
     /// Takes what a frame's images say of the limb and of its far end, and what a detector says of it, log odds, after a motion that
-    /// was unexpected by so many metres.
-    pub(super) fn show(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
-        let mut states = self.shows.unwrap_or_default();
+    /// was unexpected by so many meters.
+    pub(super) fn observe(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
+        let mut states = self.states.unwrap_or_default();
         states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, detected, unexpected));
-        self.shows = Some(states);
+        self.states = Some(states);
     }
 
     /// No image says anything of the limb.
-    pub(super) fn hide(&mut self) {
-        self.shows = None;
+    pub(super) fn clear_states(&mut self) {
+        self.states = None;
     }
 
     /// The status by what the limb alone explains.
@@ -66,7 +66,7 @@ impl LimbHistory {
         // What it alone explains has to be twice that at which images leave it open.
         if self.exclusive >= 2.0 * EVEN && self.contradicted <= LITTLE {
             LimbStatus::Measured
-        } else if self.shown < LITTLE && self.contradicted <= LITTLE {
+        } else if self.visible < LITTLE && self.contradicted <= LITTLE {
             LimbStatus::Inferred
         } else {
             LimbStatus::Lost
@@ -75,22 +75,22 @@ impl LimbHistory {
 
     /// The status of a limb of an arm or leg: the one by support, or what images show of it.
     pub(super) fn status(&self, supported: LimbStatus) -> LimbStatus {
-        match self.shows {
+        match self.states {
             None => supported,
-            Some([whole, _]) if whole.holds() => LimbStatus::Measured,
+            Some([whole, _]) if whole.is_likely() => LimbStatus::Measured,
             Some(_) if self.contradicted > LITTLE => LimbStatus::Lost,
             Some(_) => LimbStatus::Inferred,
         }
     }
 
     /// Whether the limb is right or wrong may as well be the other way round.
-    pub(super) fn is_in_doubt(&self) -> bool {
-        self.shows.is_some_and(|[whole, _]| whole.is_in_doubt())
+    pub(super) fn is_uncertain(&self) -> bool {
+        self.states.is_some_and(|[whole, _]| whole.is_uncertain())
     }
 
     /// The far end of the limb shows: what hangs on it is where it is.
-    pub(super) fn end_shows(&self) -> bool {
-        self.shows.is_none_or(|[_, end]| end.holds())
+    pub(super) fn is_end_supported(&self) -> bool {
+        self.states.is_none_or(|[_, end]| end.is_likely())
     }
 }
 
@@ -103,8 +103,8 @@ mod tests {
         for now in frames {
             limb.update(*now);
             match evidence {
-                Some(evidence) => limb.show(evidence, 0.0, 0.0),
-                None => limb.hide(),
+                Some(evidence) => limb.observe(evidence, 0.0, 0.0),
+                None => limb.clear_states(),
             }
         }
         limb
@@ -125,16 +125,16 @@ mod tests {
     }
 
     #[test]
-    fn images_correct_what_support_says() {
+    fn images_correct_what_support_reports() {
         let weak = after(&[[0.5, 0.0, 1.0]], Some([-1.0, -1.0]));
         assert_eq!(weak.status(weak.supported()), LimbStatus::Inferred);
         let past = after(&[[0.5, 0.5, 1.0]], Some([-1.0, -1.0]));
         assert_eq!(past.status(LimbStatus::Measured), LimbStatus::Lost, "cameras see past it");
         let strong = after(&[[0.0, 0.0, 1.0]], Some([2.0, -1.0]));
         assert_eq!(strong.status(strong.supported()), LimbStatus::Measured);
-        assert!(!strong.end_shows());
+        assert!(!strong.is_end_supported());
         let unseen = after(&[[0.5, 0.0, 1.0]], None);
         assert_eq!(unseen.status(LimbStatus::Lost), LimbStatus::Lost);
-        assert!(unseen.end_shows());
+        assert!(unseen.is_end_supported());
     }
 }

@@ -26,16 +26,16 @@ use crate::detect::Detected;
 use crate::fit::{Context, Matched};
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
-use crate::uncertainty::{ByEdges, Uncertainty};
+use crate::uncertainty::{EdgeFilter, Uncertainty};
 use crate::visibility::evidence::{EXPLAINED, limb_visibility};
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
 use crate::visibility::{FEW, LITTLE};
-use detected::said_by_detection;
+use detected::detection_log_odds;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
-use two_state::{EVEN, all, either, said_by};
+use two_state::{EVEN, all_log_odds, any_log_odds, support_log_odds};
 
 /// Share of the past frames in what is known of how round a body is: a blurred frame is no cupboard.
 const ROUNDNESS_MEMORY: f64 = 0.9;
@@ -56,9 +56,9 @@ pub(super) struct Assessor {
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
     uncertainty: Uncertainty,
-    edges: ByEdges,
+    edges: EdgeFilter,
     /// Of every limb by what edges told, a logarithm: above 0 it is in doubt. Empty where they are not all there is.
-    unsure: Vec<f64>,
+    edge_uncertainty: Vec<f64>,
 }
 
 impl Assessor {
@@ -82,13 +82,13 @@ impl Assessor {
     }
 
     /// A pose that nobody vouches for: what is seen of it now decides.
-    pub(super) fn doubt_pose(&mut self) {
+    pub(super) fn distrust_pose(&mut self) {
         self.forget_limbs();
         self.round = None;
     }
 
     /// Whether the body, or one of its limbs, was not where it should have been.
-    pub(super) fn doubts(&self) -> bool {
+    pub(super) fn has_suspect_limb(&self) -> bool {
         self.status != Status::Tracking || self.internal.contains(&LimbStatus::Lost)
     }
 
@@ -104,19 +104,19 @@ impl Assessor {
     }
 
     /// Whether it is in doubt if one of the arms and legs is right.
-    pub(super) fn is_unsure(&self) -> bool {
-        self.limbs.iter().any(LimbHistory::is_in_doubt)
+    pub(super) fn is_uncertain(&self) -> bool {
+        self.limbs.iter().any(LimbHistory::is_uncertain)
     }
 
     /// Whether the tracker relies on a limb.
-    pub(super) fn relied_on(&self, limb: usize) -> bool {
+    pub(super) fn is_reliable(&self, limb: usize) -> bool {
         self.internal.get(limb) == Some(&LimbStatus::Measured)
     }
 
     /// The status that the tracker goes by, of the body and its limbs; `detected` is what a detector says of this frame, if it looked
     /// and the pose is not taken from it.
     pub(super) fn assess(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
-        if context.seen.candidates.is_empty() && matched.correspondences.sites.is_empty() {
+        if context.observation.candidates.is_empty() && matched.correspondences.sites.is_empty() {
             // Nothing was measured: what was known before does not speak for this frame.
             self.limbs.clear();
         }
@@ -137,7 +137,7 @@ impl Assessor {
             internal[limb] = limbs[limb].status(internal[limb]);
         }
         inherit_status(extremities, internal);
-        if let Some(now) = roundness(context.seen.views, &context.model.body, matched.poses) {
+        if let Some(now) = roundness(context.observation.views, &context.model.body, matched.poses) {
             let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
             self.round = Some(self.round.map_or(now, mixed));
         }
@@ -158,18 +158,19 @@ impl Assessor {
             return;
         }
         statuses.extend_from_slice(&self.internal);
-        self.doubt_by_edges(&model.extremities, statuses);
+        self.report_edges(&model.extremities, statuses);
         // A body that is lost altogether has no limb that is not.
         if statuses.iter().any(|status| *status != LimbStatus::Lost) {
             for chain in &model.extremities {
                 // A forearm may be known by its inner part, but not the hand.
-                let hidden = statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].end_shows();
+                let hidden =
+                    statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].is_end_supported();
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
-        let status = if self.told_by_edges() { overall(statuses) } else { self.status };
-        let doubtful = status == Status::Tracking && measured_share(statuses) < 1.0 - SOME;
-        estimate.status = if doubtful { Status::Degraded } else { status };
+        let status = if self.is_by_edges_alone() { overall(statuses) } else { self.status };
+        let limb_suspect = status == Status::Tracking && measured_fraction(statuses) < 1.0 - SOME;
+        estimate.status = if limb_suspect { Status::Degraded } else { status };
     }
 
     fn forget_limbs(&mut self) {
@@ -179,24 +180,24 @@ impl Assessor {
 
     /// What this frame says about every limb.
     fn update_limbs(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
-        let (body, views, poses) = (&context.model.body, context.seen.views, matched.poses);
+        let (body, views, poses) = (&context.model.body, context.observation.views, matched.poses);
         self.limbs.resize(poses.len(), LimbHistory::default());
-        self.exclusive.count(body, poses, context.seen.candidates);
+        self.exclusive.count(body, poses, context.observation.candidates);
         measure_support(views, body, poses, &context.model.extremities, &mut self.raycasters, &mut self.supports);
         for (limb, history) in self.limbs.iter_mut().enumerate() {
-            let seen = limb_visibility(views, &body.limbs()[limb], &poses[limb]).image;
-            let visible = seen.front_facing - seen.occluded;
+            let visibility = limb_visibility(views, &body.limbs()[limb], &poses[limb]).image;
+            let visible = visibility.front_facing - visibility.occluded;
             let exclusive = self.exclusive.weight[limb];
-            let mut now = if seen.front_facing > 0.0 {
-                let past = seen.free_space / seen.front_facing;
-                [exclusive / visible.max(FEW), past, visible / seen.front_facing]
+            let mut now = if visibility.front_facing > 0.0 {
+                let past = visibility.free_space / visibility.front_facing;
+                [exclusive / visible.max(FEW), past, visible / visibility.front_facing]
             } else {
                 [2.0 * EVEN * exclusive / FEW, 0.0, 0.0]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
             // The hips tell where the pelvis is, the shoulders the clavicles: where no depth image looks, that is measured.
-            let unseen = seen.front_facing == 0.0;
+            let unseen = visibility.front_facing == 0.0;
             let joined = |pair: &SitePair| unseen && near(pair) && limb_joined_at(body, poses, pair) == Some(limb);
             let support = &mut self.supports[limb];
             if matched.correspondences.sites.iter().any(|pair| site(pair) || joined(pair)) {
@@ -205,7 +206,7 @@ impl Assessor {
             }
             // Where no depth image looks, pictures tell.
             if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
-                now = [colors.own[0] * colors.shown, colors.against[0], colors.shown];
+                now = [colors.own[0] * colors.visible, colors.against[0], colors.visible];
             }
             // What other sensors than depth cameras see of a limb no depth image disproves.
             support.known &= self.exclusive.clouds[limb] < FEW;
@@ -221,28 +222,28 @@ impl Assessor {
     /// What this frame's images, and a detector that looked at them, say about arms and legs.
     fn weigh_images(&mut self, context: Context, poses: &[Pose], detected: Option<Detected>) {
         let Self { limbs, supports, .. } = self;
-        let (model, origin) = (context.model, context.seen.origin());
+        let (model, origin) = (context.model, context.observation.origin());
         for chain in &model.extremities {
-            let said = |limb: usize, part: usize| {
+            let log_odds = |limb: usize, part: usize| {
                 let support = &supports[limb];
-                if support.known { said_by(support.net()[part]) } else { f64::INFINITY }
+                if support.known { support_log_odds(support.net_support()[part]) } else { f64::INFINITY }
             };
-            let [upper, lower] = [chain.upper, chain.lower].map(|limb| said(limb, 0));
-            let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| said(limb, 1));
-            let of_upper = all(&[upper, either(upper_end, lower)]);
-            let of_lower = [all(&[upper, lower]), all(&[upper, lower, lower_end])];
+            let [upper, lower] = [chain.upper, chain.lower].map(|limb| log_odds(limb, 0));
+            let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| log_odds(limb, 1));
+            let of_upper = all_log_odds(&[upper, any_log_odds(upper_end, lower)]);
+            let of_lower = [all_log_odds(&[upper, lower]), all_log_odds(&[upper, lower, lower_end])];
             let unexpected = limbs[chain.upper].unexpected().max(limbs[chain.lower].unexpected());
             let next = [Some(chain.lower), chain.ends.first().copied()];
             for ((limb, evidence), next) in
                 [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)].into_iter().zip(next)
             {
                 if !supports[limb].known {
-                    limbs[limb].hide();
+                    limbs[limb].clear_states();
                     continue;
                 }
-                let log_odds =
-                    detected.map(|seen| said_by_detection(seen, &model.body, poses, origin, [Some(limb), next]));
-                limbs[limb].show(evidence, log_odds.unwrap_or_default(), unexpected);
+                let log_odds = detected
+                    .map(|detected| detection_log_odds(detected, &model.body, poses, origin, [Some(limb), next]));
+                limbs[limb].observe(evidence, log_odds.unwrap_or_default(), unexpected);
             }
         }
     }
@@ -252,8 +253,8 @@ impl Assessor {
 /// apart.
 fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize> {
     let (parent, joint) = body.limbs()[pair.limb].parent.as_ref()?;
-    let centre = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
-    ((pair.x - centre).length() < EXPLAINED).then_some(*parent)
+    let center = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
+    ((pair.x - center).length() < EXPLAINED).then_some(*parent)
 }
 
 /// Hands and feet show too few patches to tell on their own: they have the status of what they hang on.
@@ -263,13 +264,13 @@ fn inherit_status(extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
     }
 }
 
-fn measured_share(limbs: &[LimbStatus]) -> f64 {
+fn measured_fraction(limbs: &[LimbStatus]) -> f64 {
     limbs.iter().filter(|limb| **limb == LimbStatus::Measured).count() as f64 / limbs.len() as f64
 }
 
 /// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
 fn overall(limbs: &[LimbStatus]) -> Status {
-    let measured = measured_share(limbs);
+    let measured = measured_fraction(limbs);
     if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < 2.0 * SOME) {
         Status::Lost
     } else if measured < 1.0 - SOME {
@@ -291,7 +292,7 @@ mod tests {
     use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
 
     /// Lets an assessor look at poses in an image, in so many frames.
-    fn look(assessor: &mut Assessor, pixels: &[u16], poses: &[Pose], frames: usize) {
+    fn assess_frames(assessor: &mut Assessor, pixels: &[u16], poses: &[Pose], frames: usize) {
         let (model, config) = (standing().0, without_background());
         with_context(pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
@@ -313,19 +314,19 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_that_was_set_is_trusted_before_anything_is_seen() {
+    fn a_pose_that_was_set_is_trusted_before_anything_is_visible() {
         let estimate = reported(&trusting());
         assert_eq!(estimate.status, Status::Tracking);
         assert_eq!(estimate.limb_status, vec![LimbStatus::Inferred; standing().1.len()]);
-        assert!(!trusting().relied_on(0), "nothing was seen");
+        assert!(!trusting().is_reliable(0), "nothing was seen");
         assert_eq!(reported(&Assessor::default()).status, Status::Searching);
     }
 
     #[test]
-    fn a_right_pose_is_tracked_and_what_is_seen_of_it_is_measured() {
+    fn a_right_pose_is_tracked_and_what_is_visible_of_it_is_measured() {
         let (model, poses) = standing();
         let mut assessor = trusting();
-        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+        assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
         let estimate = reported(&assessor);
         assert_eq!((assessor.status(), estimate.status), (Status::Tracking, Status::Tracking));
         // Clavicles and a neck show little that the trunk would not explain.
@@ -334,20 +335,20 @@ mod tests {
             if small(limb) {
                 continue;
             }
-            assert_eq!((*status, assessor.relied_on(limb)), (LimbStatus::Measured, true), "{}", own.name);
+            assert_eq!((*status, assessor.is_reliable(limb)), (LimbStatus::Measured, true), "{}", own.name);
         }
     }
 
     #[test]
-    fn a_body_beside_what_is_seen_is_lost_and_so_is_one_before_nothing() {
+    fn a_body_beside_what_is_visible_is_lost_and_so_is_one_before_nothing() {
         let (model, poses) = standing();
         let nothing = vec![0; before_wall(&model.body, &poses).len()];
-        let seen = before_wall(&model.body, &poses);
+        let image = before_wall(&model.body, &poses);
         // What no longer shows at all is lost at once.
-        for (pixels, off, frames) in [(&seen, 0.5, 3), (&nothing, 0.0, 1)] {
+        for (pixels, off, frames) in [(&image, 0.5, 3), (&nothing, 0.0, 1)] {
             let mut assessor = trusting();
-            look(&mut assessor, &seen, &poses, 5);
-            look(&mut assessor, pixels, &moved(&poses, off * Vec3::X), frames);
+            assess_frames(&mut assessor, &image, &poses, 5);
+            assess_frames(&mut assessor, pixels, &moved(&poses, off * Vec3::X), frames);
             let estimate = reported(&assessor);
             assert_eq!(estimate.status, Status::Lost);
             assert!(estimate.limb_status.iter().all(|status| *status != LimbStatus::Measured), "{estimate:?}");
@@ -355,18 +356,18 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_measures_nothing_loses_the_body_whatever_was_seen_before() {
+    fn a_frame_that_measures_nothing_loses_the_body_whatever_was_visible_before() {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
         let mut assessor = trusting();
-        look(&mut assessor, &pixels, &poses, 5);
+        assess_frames(&mut assessor, &pixels, &poses, 5);
         assert_eq!(reported(&assessor).status, Status::Tracking);
         with_context(&pixels, &without_background(), &model, &poses, |context| {
             let (frame, candidates) = (Frame::empty(1.0), Candidates::default());
-            let mut seen = context.seen.with(&candidates);
-            (seen.views.frame, seen.views.segmented) = (&frame, &[]);
+            let mut observation = context.observation.with(&candidates);
+            (observation.views.frame, observation.views.segmented) = (&frame, &[]);
             let matched = Matched { correspondences: &Correspondences::default(), poses: &poses };
-            assessor.assess(Context { seen, ..context }, matched, None);
+            assessor.assess(Context { observation, ..context }, matched, None);
         });
         assert_eq!(reported(&assessor).status, Status::Lost);
     }
@@ -379,31 +380,31 @@ mod tests {
         let behind = poses[0].translation + Vec3::new(0.02 * aside, -0.1, 0.16);
         arm.reach(&model.body, &mut poses, behind, 0.0);
         let mut assessor = trusting();
-        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 3);
+        assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 3);
         let estimate = reported(&assessor);
         assert_eq!(estimate.status, Status::Tracking);
         for limb in [arm.lower, arm.ends[0]] {
-            assert_eq!((estimate.limb_status[limb], assessor.relied_on(limb)), (LimbStatus::Inferred, false));
+            assert_eq!((estimate.limb_status[limb], assessor.is_reliable(limb)), (LimbStatus::Inferred, false));
         }
     }
 
     #[test]
-    fn what_is_flat_is_lost_in_time_and_at_once_where_nobody_vouches_for_it() {
+    fn what_is_flat_is_lost_in_time_and_at_once_where_nobody_trusts_it() {
         let (model, poses) = standing();
         let mut pixels = vec![0; depth(&model.body, &poses).len()];
         put_board(&mut pixels, Vec3::new(0.0, 0.0, 2.5), [0.35, 0.9]);
         let mut assessor = trusting();
-        look(&mut assessor, &pixels, &poses, 10);
+        assess_frames(&mut assessor, &pixels, &poses, 10);
         assert_ne!(assessor.status(), Status::Lost, "a blurred frame is flat, too");
-        look(&mut assessor, &pixels, &poses, 10);
+        assess_frames(&mut assessor, &pixels, &poses, 10);
         assert_eq!(reported(&assessor).status, Status::Lost);
         // A body that comes back does so in time.
-        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+        assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
         assert_eq!(assessor.status(), Status::Lost);
-        look(&mut assessor, &before_wall(&model.body, &poses), &poses, 4);
+        assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 4);
         assert_eq!(assessor.status(), Status::Tracking);
         assessor.moved();
-        look(&mut assessor, &pixels, &poses, 1);
+        assess_frames(&mut assessor, &pixels, &poses, 1);
         assert_eq!(assessor.status(), Status::Lost);
     }
 
@@ -412,13 +413,13 @@ mod tests {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
         let mut assessor = trusting();
-        look(&mut assessor, &pixels, &poses, 1);
+        assess_frames(&mut assessor, &pixels, &poses, 1);
         assessor.give_up();
         assert_eq!(reported(&assessor).status, Status::Lost);
-        assert!((0..poses.len()).all(|limb| !assessor.relied_on(limb)));
+        assert!((0..poses.len()).all(|limb| !assessor.is_reliable(limb)));
         assert_eq!(reported(&assessor).limb_status, vec![LimbStatus::Lost; poses.len()]);
         assessor.moved();
-        look(&mut assessor, &pixels, &poses, 1);
+        assess_frames(&mut assessor, &pixels, &poses, 1);
         assert_eq!(reported(&assessor).status, Status::Tracking);
     }
 

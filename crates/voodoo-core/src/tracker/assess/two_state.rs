@@ -10,7 +10,7 @@ pub(super) const EVEN: f64 = 0.08;
 /// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
 /// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
 const CHANGES: f64 = 0.05;
-/// An arm or leg of which an end is so far, metres, from where its last motion would have brought it is wrong before it is seen
+/// An arm or leg of which an end is so far, meters, from where its last motion would have brought it is wrong before it is seen
 /// there, and with the square of a shorter way the likelier: what was predicted is off by a share of it.
 const FAR: f64 = 0.15;
 
@@ -21,45 +21,45 @@ pub(super) struct TwoState {
 }
 
 impl TwoState {
-    /// Takes what a frame's images and a detector say, log odds, after a motion that was unexpected by so many metres.
+    /// Takes what a frame's images and a detector say, log odds, after a motion that was unexpected by so many meters.
     pub(super) fn observe(&mut self, images: f64, detector: f64, unexpected: f64) {
         let before = probability(self.log_odds);
         let goes_wrong = (CHANGES + (unexpected / FAR).powi(2)).min(1.0);
         let now = before * (1.0 - goes_wrong) + (1.0 - before) * CHANGES;
-        let said = [images, detector].map(|said| said.clamp(-most_said(), most_said()));
-        self.log_odds = (now / (1.0 - now)).ln() + said[0] + said[1];
+        let evidence = [images, detector].map(|value| value.clamp(-max_log_odds(), max_log_odds()));
+        self.log_odds = (now / (1.0 - now)).ln() + evidence[0] + evidence[1];
     }
 
     /// It is likelier right than wrong.
-    pub(super) fn holds(&self) -> bool {
+    pub(super) fn is_likely(&self) -> bool {
         self.log_odds >= 0.0
     }
 
     /// It may as well be the other way round: a frame that shows nothing would say more.
-    pub(super) fn is_in_doubt(&self) -> bool {
-        self.log_odds.abs() < -said_by(0.0)
+    pub(super) fn is_uncertain(&self) -> bool {
+        self.log_odds.abs() < -support_log_odds(0.0)
     }
 }
 
 /// Log odds that what shows so much, as a share less what contradicts it, is right.
-pub(super) fn said_by(share: f64) -> f64 {
-    share / EVEN - 1.0
+pub(super) fn support_log_odds(fraction: f64) -> f64 {
+    fraction / EVEN - 1.0
 }
 
 /// Log odds that all of several things are right, given those of each.
-pub(super) fn all(log_odds: &[f64]) -> f64 {
+pub(super) fn all_log_odds(log_odds: &[f64]) -> f64 {
     // log(1 + exp(-z)), of each, without overflow.
     let against: f64 = log_odds.iter().map(|z| (-z.abs()).exp().ln_1p() + (-z).max(0.0)).sum();
     -against.exp_m1().ln()
 }
 
 /// Log odds that one of two things is right at least.
-pub(super) fn either(one: f64, other: f64) -> f64 {
-    -all(&[-one, -other])
+pub(super) fn any_log_odds(one: f64, other: f64) -> f64 {
+    -all_log_odds(&[-one, -other])
 }
 
 /// The log odds that what stood still did not change.
-fn most_said() -> f64 {
+fn max_log_odds() -> f64 {
     ((1.0 - CHANGES) / CHANGES).ln()
 }
 
@@ -79,45 +79,48 @@ mod tests {
 
     #[test]
     fn one_weak_frame_against_what_was_sure_does_not_turn_it_and_several_do() {
-        let (good, bad) = ((most_said(), 0.0), (-1.0, 0.0));
-        assert!(after(&[good, good, bad, bad]).holds());
-        assert!(!after(&[good, good, bad, bad, bad, bad, bad]).holds());
-        assert!(!after(&[bad]).holds() && after(&[good]).holds(), "nothing is taken for granted");
+        let (good, bad) = ((max_log_odds(), 0.0), (-1.0, 0.0));
+        assert!(after(&[good, good, bad, bad]).is_likely());
+        assert!(!after(&[good, good, bad, bad, bad, bad, bad]).is_likely());
+        assert!(!after(&[bad]).is_likely() && after(&[good]).is_likely(), "nothing is taken for granted");
     }
 
     #[test]
     fn what_moved_far_needs_evidence_anew() {
-        let weak = |moved| after(&[(most_said(), 0.0), (-1.0, moved)]).holds();
+        let weak = |moved| after(&[(max_log_odds(), 0.0), (-1.0, moved)]).is_likely();
         assert!(weak(0.02) && !weak(0.15));
         // And so it comes back.
-        assert!(after(&[(-most_said(), 0.0), (most_said(), 0.0), (1.0, 0.0)]).holds());
+        assert!(after(&[(-max_log_odds(), 0.0), (max_log_odds(), 0.0), (1.0, 0.0)]).is_likely());
     }
 
     #[test]
-    fn one_look_of_a_detector_turns_no_limb_that_images_have_long_been_sure_of_and_two_turn_what_they_leave_open() {
-        let look = -20.0;
-        let mut state = after(&[(most_said(), 0.0); 5]);
-        state.observe(most_said(), look, 0.0);
-        assert!(state.holds() && !state.is_in_doubt());
-        state.observe(0.0, look, 0.0);
-        state.observe(0.0, look, 0.0);
-        assert!(!state.holds() && TwoState::default().is_in_doubt());
+    fn one_detection_turns_no_limb_that_images_have_long_been_sure_of_and_two_turn_what_they_leave_open() {
+        let detection = -20.0;
+        let mut state = after(&[(max_log_odds(), 0.0); 5]);
+        state.observe(max_log_odds(), detection, 0.0);
+        assert!(state.is_likely() && !state.is_uncertain());
+        state.observe(0.0, detection, 0.0);
+        state.observe(0.0, detection, 0.0);
+        assert!(!state.is_likely() && TwoState::default().is_uncertain());
     }
 
     #[test]
     fn probabilities_of_independent_things_multiply() {
         for (one, other) in [(0.3, -1.2), (2.0, 1.0), (-2.0, 0.5)] {
             let both = probability(one) * probability(other);
-            assert!((probability(all(&[one, other])) - both).abs() < 1e-12);
+            assert!((probability(all_log_odds(&[one, other])) - both).abs() < 1e-12);
             let any = 1.0 - (1.0 - probability(one)) * (1.0 - probability(other));
-            assert!((probability(either(one, other)) - any).abs() < 1e-12);
+            assert!((probability(any_log_odds(one, other)) - any).abs() < 1e-12);
         }
-        assert_eq!([all(&[-90.0, 90.0]), either(-90.0, 5.0)], [-90.0, 5.0]);
-        assert_eq!([all(&[f64::INFINITY]), all(&[1.0, f64::NEG_INFINITY])], [f64::INFINITY, f64::NEG_INFINITY]);
+        assert_eq!([all_log_odds(&[-90.0, 90.0]), any_log_odds(-90.0, 5.0)], [-90.0, 5.0]);
+        assert_eq!(
+            [all_log_odds(&[f64::INFINITY]), all_log_odds(&[1.0, f64::NEG_INFINITY])],
+            [f64::INFINITY, f64::NEG_INFINITY]
+        );
     }
 
     #[test]
-    fn odds_are_even_at_a_share_and_grow_from_there() {
-        assert_eq!([said_by(0.0), said_by(EVEN), said_by(2.0 * EVEN)], [-1.0, 0.0, 1.0]);
+    fn odds_are_even_at_a_fraction_and_grow_from_there() {
+        assert_eq!([support_log_odds(0.0), support_log_odds(EVEN), support_log_odds(2.0 * EVEN)], [-1.0, 0.0, 1.0]);
     }
 }

@@ -18,7 +18,7 @@ const LOOSER: f64 = 3.0;
 
 /// The other body.
 #[derive(Debug, Default)]
-pub(super) struct Second {
+pub(super) struct Branch {
     /// World frame; without poses there is none.
     motion: Motion,
     /// In this frame, working frame: its poses, those expected and those before, and the first body with one of its arms or legs.
@@ -28,7 +28,7 @@ pub(super) struct Second {
     tried: Vec<Pose>,
 }
 
-impl Second {
+impl Branch {
     /// There is none until the next frame has been followed; room for so many limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
         let Self { motion, poses, predicted, previous, tried } = self;
@@ -41,11 +41,11 @@ impl Second {
     /// Follows the second body in a frame, before the first one is: `fit` holds its matches afterwards. Returns the ICP steps.
     pub(super) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
         let Self { motion, poses, predicted, previous, .. } = self;
-        if !is_wanted(context) || motion.poses.len() != context.model.body.limbs().len() {
+        if !is_enabled(context) || motion.poses.len() != context.model.body.limbs().len() {
             motion.poses.clear();
             return 0;
         }
-        let (frame, origin) = (context.seen.frame(), context.seen.origin());
+        let (frame, origin) = (context.observation.frame(), context.observation.origin());
         let config = Config { motion_scale: LOOSER * context.config.motion_scale, ..context.config.clone() };
         motion.expect(&context.model.body, frame.stamp, config.prediction, predicted);
         predicted.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
@@ -68,13 +68,13 @@ impl Second {
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
     ) -> usize {
-        let (body, origin) = (&context.model.body, context.seen.origin());
+        let (body, origin) = (&context.model.body, context.observation.origin());
         let mut steps = 0;
         if self.motion.poses.len() != poses.len() {
-            if is_wanted(context) {
+            if is_enabled(context) {
                 // From here on they go their own ways.
                 self.motion.restart(poses.iter().map(|pose| shifted(pose, -origin)).collect());
-                self.motion.commit(context.seen.frame().stamp);
+                self.motion.commit(context.observation.frame().stamp);
             }
             return steps;
         }
@@ -86,7 +86,7 @@ impl Second {
             }
             let now = refined.cost(context, fit, poses);
             self.tried.clone_from(poses);
-            chain.put(body, &mut self.tried, self.poses[chain.lower].translation, chain.end(&self.poses));
+            chain.place_between(body, &mut self.tried, self.poses[chain.lower].translation, chain.end(&self.poses));
             let cost = refined.refine(context, fit, &self.tried);
             steps += REFINE;
             if cost.total < now.total - GAIN {
@@ -94,25 +94,25 @@ impl Second {
                 predicted.clone_from(&self.tried);
                 continue;
             }
-            fit.exchange(&mut refined.matched);
+            fit.swap_matches(&mut refined.matched);
             if cost.total > now.total + GAIN {
-                chain.put(body, &mut self.poses, poses[chain.lower].translation, chain.end(poses));
+                chain.place_between(body, &mut self.poses, poses[chain.lower].translation, chain.end(poses));
             }
         }
         set_shifted(&mut self.motion.poses, &self.poses, -origin);
         steps
     }
 
-    /// How far from the first body's limb, world frame, the second one's ends, metres; none where there is no second body.
-    pub(super) fn differs(&self, limb: usize, length: f64, world_from_limb: &Pose) -> Option<f64> {
+    /// How far from the first body's limb, world frame, the second one's ends, meters; none where there is no second body.
+    pub(super) fn end_distance(&self, limb: usize, length: f64, world_from_limb: &Pose) -> Option<f64> {
         let end = length * Vec3::Z;
         self.motion.poses.get(limb).map(|own| (*own * end).distance(*world_from_limb * end))
     }
 }
 
 /// Few pictures are all that is seen.
-fn is_wanted(context: Context) -> bool {
-    context.pictures_alone() && context.seen.frame().colors.len() <= FEW_CAMERAS
+fn is_enabled(context: Context) -> bool {
+    context.pictures_alone() && context.observation.frame().colors.len() <= FEW_CAMERAS
 }
 
 fn set_shifted(to: &mut Vec<Pose>, from: &[Pose], origin: Vec3) {
@@ -127,34 +127,34 @@ mod tests {
     use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
     #[test]
-    fn where_depth_is_seen_there_is_no_second_opinion() {
+    fn where_depth_is_visible_there_is_no_second_opinion() {
         let (model, mut poses) = standing();
         let (pixels, config) = (before_wall(&model.body, &poses), without_background());
         with_context(&pixels, &config, &model, &poses.clone(), |context| {
-            let (mut second, mut fit) = (Second::default(), Fit::new(&config).unwrap());
+            let (mut branch, mut fit) = (Branch::default(), Fit::new(&config).unwrap());
             let mut predicted = poses.clone();
             // One that was is given up.
-            second.motion.restart(poses.clone());
-            assert_eq!(second.follow(context, &mut fit), 0);
-            let steps = second.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
-            assert_eq!((steps, second.differs(0, 0.1, &poses[0])), (0, None));
+            branch.motion.restart(poses.clone());
+            assert_eq!(branch.follow(context, &mut fit), 0);
+            let steps = branch.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
+            assert_eq!((steps, branch.end_distance(0, 0.1, &poses[0])), (0, None));
         });
     }
 
     /// What becomes of two bodies that stand so before an image of the standing body: the first one's arm and the second one's, as
     /// distances of their ends from where the arm is seen, and the ICP steps.
     fn compared(first: &[Pose], other: &[Pose]) -> ([f64; 2], usize) {
-        let (model, seen) = standing();
-        let (pixels, config) = (before_wall(&model.body, &seen), without_background());
+        let (model, truth) = standing();
+        let (pixels, config) = (before_wall(&model.body, &truth), without_background());
         with_context(&pixels, &config, &model, first, |context| {
-            let (mut second, mut fit) = (Second::default(), Fit::new(&config).unwrap());
-            second.motion.restart(other.to_vec());
+            let (mut branch, mut fit) = (Branch::default(), Fit::new(&config).unwrap());
+            branch.motion.restart(other.to_vec());
             fit.match_last(context, first);
             let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
-            let steps = second.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
+            let steps = branch.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
             let arm = &model.extremities[first_arm(&model)];
             assert_eq!(poses == first, predicted == first, "what is taken is what is expected");
-            ([&poses, &second.motion.poses].map(|poses| arm.end(poses).distance(arm.end(&seen))), steps)
+            ([&poses, &branch.motion.poses].map(|poses| arm.end(poses).distance(arm.end(&truth))), steps)
         })
     }
 
@@ -174,10 +174,10 @@ mod tests {
         let (model, poses) = standing();
         let (other, _) = raised(&model, &poses, 0.2);
         let arm = &model.extremities[first_arm(&model)];
-        let mut second = Second::default();
-        second.motion.restart(moved(&other, 0.02 * Vec3::X));
+        let mut branch = Branch::default();
+        branch.motion.restart(moved(&other, 0.02 * Vec3::X));
         let differs =
-            |limb: usize| second.differs(limb, model.body.limbs()[limb].shape.length(), &poses[limb]).unwrap();
+            |limb: usize| branch.end_distance(limb, model.body.limbs()[limb].shape.length(), &poses[limb]).unwrap();
         assert!((differs(0) - 0.02).abs() < 1e-9, "the trunk is only shifted: {}", differs(0));
         assert!(differs(arm.lower) > 0.15, "{}", differs(arm.lower));
     }

@@ -5,19 +5,19 @@ use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
 use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
-use crate::observation::share::{NOBODY, Share};
+use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
-/// A surface explains what lies within this of where it is expected, metres: as far as candidates are looked for.
+/// A surface explains what lies within this of where it is expected, meters: as far as candidates are looked for.
 const REACH: f32 = 0.20;
 
-/// Neighbours in a row stand for one another so that a row has at most about this many.
+/// Neighbors in a row stand for one another so that a row has at most about this many.
 const COLUMNS: usize = 106;
-/// On one surface depths of neighbours differ by less, metres.
+/// On one surface depths of neighbors differ by less, meters.
 const LIKE_DEPTH: f32 = 0.05;
 
 /// A body where it is expected.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Claimant<'a> {
+pub(super) struct PredictedBody<'a> {
     pub(super) number: u16,
     pub(super) body: &'a Body,
     /// World frame.
@@ -26,11 +26,11 @@ pub(super) struct Claimant<'a> {
 
 /// The owners of all pixels and points, and working memory.
 #[derive(Debug, Default)]
-pub(super) struct Claims {
+pub(super) struct PixelAssignment {
     owners: Vec<Vec<u16>>,
     cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
-    /// Of every pixel of an image its depth, metres, and whether something returned that is no scene.
+    /// Of every pixel of an image its depth, meters, and whether something returned that is no scene.
     depth: Vec<f32>,
     open: Vec<bool>,
     queries: Points,
@@ -40,39 +40,39 @@ pub(super) struct Claims {
     limb: Vec<f32>,
 }
 
-impl Claims {
+impl PixelAssignment {
     /// Image after image, the number of who explains each pixel.
     pub(super) fn owners(&self) -> &[Vec<u16>] {
         &self.owners
     }
 
     /// The share of a person in the frame.
-    pub(super) fn share<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> Share<'a> {
-        Share { owners: &self.owners, cloud_owners: &self.cloud_owners, own: number as u16, scene }
+    pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
+        OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own: number as u16, scene }
     }
 
     /// How many pixels and free points somebody explains.
-    pub(super) fn explained(&self, number: usize) -> usize {
+    pub(super) fn count(&self, number: usize) -> usize {
         let owners = self.owners.iter().chain(&self.cloud_owners).flatten();
         owners.filter(|owner| usize::from(**owner) == number).count()
     }
 
     /// Gives every pixel that is no scene, and every free point, to the body whose surface is nearest, within reach.
-    pub(super) fn settle<'a>(
+    pub(super) fn assign<'a>(
         &mut self,
         frame: &Frame,
         scene: &Backgrounds,
-        bodies: impl Iterator<Item = Claimant<'a>> + Clone,
+        bodies: impl Iterator<Item = PredictedBody<'a>> + Clone,
     ) {
         self.owners.resize_with(frame.images.len(), Vec::new);
         for (number, image) in frame.images.iter().enumerate() {
-            let mut owners = self.unclaimed(number, image.pixels.len(), |claims| &mut claims.owners);
-            let background = scene.of(image).map_or(&[][..], Background::depth);
+            let mut owners = self.unassigned(number, image.pixels.len(), |assignment| &mut assignment.owners);
+            let background = scene.of_image(image).map_or(&[][..], Background::depth);
             self.measure(image, background);
-            for Claimant { number, body, poses } in bodies.clone() {
+            for PredictedBody { number, body, poses } in bodies.clone() {
                 if let Some(origin) = poses.first().map(|root| root.translation) {
                     self.gather(image, origin, &body_box(body, poses, f64::from(REACH)));
-                    self.claim(number, body, poses, origin, &mut owners);
+                    self.assign_nearest(number, body, poses, origin, &mut owners);
                 }
             }
             self.owners[number] = owners;
@@ -80,15 +80,15 @@ impl Claims {
         self.cloud_owners.resize_with(frame.clouds.len(), Vec::new);
         for (number, cloud) in frame.clouds.iter().enumerate() {
             let free = if cloud.scope == Scope::Free { cloud.points.len() } else { 0 };
-            let mut owners = self.unclaimed(number, free, |claims| &mut claims.cloud_owners);
+            let mut owners = self.unassigned(number, free, |assignment| &mut assignment.cloud_owners);
             if free == 0 {
                 self.cloud_owners[number] = owners;
                 continue;
             }
-            for Claimant { number, body, poses } in bodies.clone() {
+            for PredictedBody { number, body, poses } in bodies.clone() {
                 if let Some(origin) = poses.first().map(|root| root.translation) {
                     self.gather_cloud(cloud, origin, &body_box(body, poses, f64::from(REACH)));
-                    self.claim(number, body, poses, origin, &mut owners);
+                    self.assign_nearest(number, body, poses, origin, &mut owners);
                 }
             }
             self.cloud_owners[number] = owners;
@@ -96,17 +96,17 @@ impl Claims {
     }
 
     /// Owners of so many pixels or points who are nobody yet, in the memory of earlier ones.
-    fn unclaimed(&mut self, number: usize, count: usize, of: impl Fn(&mut Self) -> &mut Vec<Vec<u16>>) -> Vec<u16> {
+    fn unassigned(&mut self, number: usize, count: usize, of: impl Fn(&mut Self) -> &mut Vec<Vec<u16>>) -> Vec<u16> {
         self.distances.clear();
         self.distances.resize(count, REACH);
         let mut owners = std::mem::take(&mut of(self)[number]);
         owners.clear();
-        owners.resize(count, NOBODY);
+        owners.resize(count, NO_OWNER);
         owners
     }
 
     /// Gives a body what was gathered about `origin` and no other body is nearer to.
-    fn claim(&mut self, number: u16, body: &Body, poses: &[Pose], origin: Vec3, owners: &mut [u16]) {
+    fn assign_nearest(&mut self, number: u16, body: &Body, poses: &[Pose], origin: Vec3, owners: &mut [u16]) {
         let Self { distances, queries, pixels, nearest, limb, .. } = self;
         nearest.clear();
         nearest.resize(queries.len(), REACH);
@@ -137,10 +137,10 @@ impl Claims {
         }
     }
 
-    /// Of all pixels of an image the depth, metres, and of those that are no scene whether something returned; what all bodies ask.
+    /// Of all pixels of an image the depth, meters, and of those that are no scene whether something returned; what all bodies ask.
     fn measure(&mut self, image: &DepthImage, background: &[f32]) {
         let Self { depth, open, .. } = self;
-        let scale = image.metres_per_unit as f32;
+        let scale = image.meters_per_unit as f32;
         depth.clear();
         match image.pixels {
             DepthPixels::U16(pixels) => depth.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
@@ -149,11 +149,11 @@ impl Claims {
         open.clear();
         open.extend(depth.iter().map(|z| *z > 0.0 && z.is_finite()));
         for ((open, z), background) in open.iter_mut().zip(depth.iter()).zip(background) {
-            *open &= !Background::holds(*background, *z);
+            *open &= !Background::contains(*background, *z);
         }
     }
 
-    /// The returns within a box of the world that are no scene, about `origin`: of neighbours on one surface the first stands for
+    /// The returns within a box of the world that are no scene, about `origin`: of neighbors on one surface the first stands for
     /// all.
     fn gather(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb) {
         let [columns, rows] = image_window(image, &image.world_from_sensor, bounds);

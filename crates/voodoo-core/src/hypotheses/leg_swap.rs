@@ -1,4 +1,4 @@
-//! The two legs exchanged: clothed alike, each lies on the colours of the other, and only both together can come right.
+//! The two legs exchanged: clothed alike, each lies on the colors of the other, and only both together can come right.
 //!
 //! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
 
@@ -13,7 +13,7 @@ use crate::math::{Pose, Vec3, shifted};
 
 /// When one looks, and where the legs would be.
 #[derive(Debug, Default)]
-pub(super) struct Exchange {
+pub(super) struct LegSwap {
     /// The body with exchanged legs, working frame.
     poses: Vec<Pose>,
     /// The same as it was found in the frame before, world, and for how many frames; empty if it is not followed.
@@ -24,7 +24,7 @@ pub(super) struct Exchange {
     frames: usize,
 }
 
-impl Exchange {
+impl LegSwap {
     /// Forgets what was, and makes room for a body of so many limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
         (self.frames, self.age, self.gained) = (0, 0, 0.0);
@@ -34,11 +34,11 @@ impl Exchange {
         }
     }
 
-    /// Tries the legs where the other one is, if a leg is `doubtful` or it is time to look. Returns the number of ICP steps.
+    /// Tries the legs where the other one is, if a leg is `is_suspect` or it is time to look. Returns the number of ICP steps.
     pub(super) fn attempt(
         &mut self,
         context: Context,
-        doubtful: impl Fn(usize) -> bool,
+        is_suspect: impl Fn(usize) -> bool,
         refined: &mut Refined,
         fit: &mut Fit,
         poses: &mut Vec<Pose>,
@@ -47,56 +47,56 @@ impl Exchange {
         let chains = &context.model.extremities;
         let mut legs = (0..chains.len()).filter(|index| chains[*index].leg);
         let (Some(one), Some(other), None) = (legs.next(), legs.next(), legs.next()) else { return 0 };
-        if !self.is_due(doubtful(one) || doubtful(other)) {
+        if !self.is_due(is_suspect(one) || is_suspect(other)) {
             return 0;
         }
-        let (origin, now) = (context.seen.origin(), refined.cost(context, fit, poses));
-        self.put(&context.model.body, [&chains[one], &chains[other]], poses, origin);
+        let (origin, now) = (context.observation.origin(), refined.cost(context, fit, poses));
+        self.swap_legs(&context.model.body, [&chains[one], &chains[other]], poses, origin);
         // Legs that stand right lose more when they are exchanged, before they are refined.
-        if !self.goes_on() && refined.cost(context, fit, &self.poses).evidence > (1.0 - CLUTTER) * now.evidence {
+        if !self.is_ongoing() && refined.cost(context, fit, &self.poses).evidence > (1.0 - CLUTTER) * now.evidence {
             return 0;
         }
         let cost = refined.refine(context, fit, &self.poses);
-        if self.gains(now, cost) {
+        if self.accumulate(now, cost) {
             poses.clone_from(&refined.poses);
             predicted.clone_from(&self.poses);
         } else {
-            fit.exchange(&mut refined.matched);
+            fit.swap_matches(&mut refined.matched);
         }
         self.keep(&refined.poses, origin);
         REFINE
     }
 
     /// Whether to look in this frame; to be called in every one.
-    fn is_due(&mut self, doubtful: bool) -> bool {
+    fn is_due(&mut self, is_suspect: bool) -> bool {
         self.frames = (self.frames + 1) % REST;
-        self.frames == 0 || doubtful || self.goes_on()
+        self.frames == 0 || is_suspect || self.is_ongoing()
     }
 
     /// It is followed from the frame before.
-    fn goes_on(&self) -> bool {
+    fn is_ongoing(&self) -> bool {
         !self.followed.is_empty()
     }
 
     /// Puts each of two legs where the other one is, or where it was found to be in the frame before.
-    fn put(&mut self, body: &Body, legs: [&TwoBone; 2], poses: &[Pose], origin: Vec3) {
+    fn swap_legs(&mut self, body: &Body, legs: [&TwoBone; 2], poses: &[Pose], origin: Vec3) {
         self.poses.clear();
-        if self.goes_on() {
+        if self.is_ongoing() {
             self.poses.extend(self.followed.iter().map(|pose| shifted(pose, origin)));
             return;
         }
         self.poses.extend_from_slice(poses);
         for (own, other) in [(legs[0], legs[1]), (legs[1], legs[0])] {
-            own.put(body, &mut self.poses, poses[other.lower].translation, other.end(poses));
+            own.place_between(body, &mut self.poses, poses[other.lower].translation, other.end(poses));
         }
     }
 
     /// Takes note of what a frame says of it; true when it is to be taken.
-    fn gains(&mut self, now: Cost, exchanged: Cost) -> bool {
+    fn accumulate(&mut self, now: Cost, swapped: Cost) -> bool {
         // No frame counts for more than half: it may be disturbed.
-        self.gained = (self.gained + (now.total - exchanged.total).min(0.5 * SURE_GAIN)).max(0.0);
+        self.gained = (self.gained + (now.total - swapped.total).min(0.5 * SURE_GAIN)).max(0.0);
         self.age += 1;
-        let close = exchanged.evidence < now.evidence + SURE_GAIN;
+        let close = swapped.evidence < now.evidence + SURE_GAIN;
         let taken = close && self.gained > SURE_GAIN;
         if taken || !close || self.age > REST {
             (self.age, self.gained) = (0, 0.0);
@@ -127,43 +127,43 @@ mod tests {
     fn each_leg_ends_where_the_other_one_did_and_nothing_else_moves() {
         let (model, poses) = standing();
         let legs: Vec<&TwoBone> = model.extremities.iter().filter(|chain| chain.leg).collect();
-        let mut exchange = Exchange::default();
-        exchange.put(&model.body, [legs[0], legs[1]], &poses, Vec3::ZERO);
+        let mut leg_swap = LegSwap::default();
+        leg_swap.swap_legs(&model.body, [legs[0], legs[1]], &poses, Vec3::ZERO);
         for (own, other) in [(legs[0], legs[1]), (legs[1], legs[0])] {
-            let way = own.end(&exchange.poses).distance(other.end(&poses));
+            let way = own.end(&leg_swap.poses).distance(other.end(&poses));
             assert!(way < 0.08, "{way} m");
-            assert!(own.root(&model.body, &exchange.poses).distance(own.root(&model.body, &poses)) < 1e-9);
+            assert!(own.root(&model.body, &leg_swap.poses).distance(own.root(&model.body, &poses)) < 1e-9);
         }
         for limb in (0..poses.len()).filter(|limb| !legs.iter().any(|leg| leg.limbs().any(|own| own == *limb))) {
-            assert_eq!(exchange.poses[limb], poses[limb]);
+            assert_eq!(leg_swap.poses[limb], poses[limb]);
         }
     }
 
     #[test]
-    fn it_is_taken_when_several_frames_say_so_and_dropped_when_they_do_not() {
+    fn it_is_taken_when_several_frames_report_so_and_dropped_when_they_do_not() {
         let (now, better, far) = (cost(2000.0), cost(2090.0), cost(1500.0));
-        let mut exchange = Exchange::default();
-        let said: Vec<bool> = (0..4).map(|_| exchange.gains(now, better)).collect();
-        assert_eq!(said, [false, false, true, false], "no frame counts for more than half");
-        let mut exchange = Exchange::default();
-        assert!([better, better, far, better, better].iter().all(|cost| !exchange.gains(now, *cost)));
+        let mut leg_swap = LegSwap::default();
+        let decisions: Vec<bool> = (0..4).map(|_| leg_swap.accumulate(now, better)).collect();
+        assert_eq!(decisions, [false, false, true, false], "no frame counts for more than half");
+        let mut leg_swap = LegSwap::default();
+        assert!([better, better, far, better, better].iter().all(|cost| !leg_swap.accumulate(now, *cost)));
         // What is as good is followed for some frames.
         let (_, poses) = standing();
         let followed: Vec<bool> = (0..10)
             .map(|_| {
-                exchange.gains(now, now);
-                exchange.keep(&poses, Vec3::ZERO);
-                exchange.goes_on()
+                leg_swap.accumulate(now, now);
+                leg_swap.keep(&poses, Vec3::ZERO);
+                leg_swap.is_ongoing()
             })
             .collect();
         assert_eq!(followed.iter().filter(|goes_on| !**goes_on).count(), 10 / (REST + 1), "{followed:?}");
     }
 
     #[test]
-    fn one_looks_every_so_often_and_at_once_where_a_leg_is_in_doubt() {
-        let mut exchange = Exchange::default();
-        let due: Vec<bool> = (0..8).map(|_| exchange.is_due(false)).collect();
+    fn one_looks_every_so_often_and_at_once_where_a_leg_is_uncertain() {
+        let mut leg_swap = LegSwap::default();
+        let due: Vec<bool> = (0..8).map(|_| leg_swap.is_due(false)).collect();
         assert_eq!(due.iter().filter(|due| **due).count(), 8 / REST);
-        assert!(exchange.is_due(true));
+        assert!(leg_swap.is_due(true));
     }
 }

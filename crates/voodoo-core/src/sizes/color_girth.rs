@@ -1,4 +1,4 @@
-//! Girths by the edges of colour regions, where no depth tells them.
+//! Girths by the edges of color regions, where no depth tells them.
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
@@ -11,26 +11,26 @@ use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Edges of neighbouring lines err alike: so many tell as much as one.
+/// Edges of neighboring lines err alike: so many tell as much as one.
 const LINES_ALIKE: f64 = 3.0;
 /// Girths follow in every so many frames.
 const GIRTHS_EVERY: u32 = 4;
-/// How far the axis of a tracked limb is off across itself, metres.
+/// How far the axis of a tracked limb is off across itself, meters.
 const AXIS_SIGMA: f64 = 0.02;
 
-/// What anthropometry leaves open of the length of hands, feet and heads, metres.
+/// What anthropometry leaves open of the length of hands, feet and heads, meters.
 const TIP_SIGMA: f64 = 0.03;
 /// What it leaves open of a limb's length where those of the others are known, as a share.
 const PROPORTION_SIGMA: f64 = 0.05;
 
 /// What is known of the surface of one limb.
 #[derive(Clone, Copy, Debug)]
-struct Outline {
+struct ColorGirth {
     information: SMatrix<f64, 5, 5>,
     total: GirthFit,
 }
 
-impl Default for Outline {
+impl Default for ColorGirth {
     fn default() -> Self {
         let sigmas = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA]);
         Self {
@@ -46,16 +46,16 @@ fn weight(pair: &RegionPair) -> f64 {
 }
 
 /// Normal equations of a limb's edges: for shift and girth.
-struct Asked {
+struct GirthSystem {
     h: SMatrix<f64, 5, 5>,
     g: SVector<f64, 5>,
 }
 
-fn asked<'a>(
+fn girth_system<'a>(
     shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     pairs: impl Iterator<Item = &'a RegionPair>,
-) -> Asked {
+) -> GirthSystem {
     let (mut h, mut g) = (SMatrix::zeros(), SVector::zeros());
     for pair in pairs {
         let foot = working_from_limb.inverse_transform_point(pair.x);
@@ -66,10 +66,10 @@ fn asked<'a>(
         h += weight * row * row.transpose();
         g += weight * pair.distance * row;
     }
-    Asked { h, g }
+    GirthSystem { h, g }
 }
 
-impl Outline {
+impl ColorGirth {
     /// The surface of a limb whose pose is known, from its edges in the first frame: a Gauss-Newton step, the changes made so
     /// far drawn to none.
     fn start<'a>(
@@ -78,7 +78,7 @@ impl Outline {
         working_from_limb: &Pose,
         pairs: impl Iterator<Item = &'a RegionPair>,
     ) -> Option<GirthFit> {
-        let Asked { h, g } = asked(shape, working_from_limb, pairs);
+        let GirthSystem { h, g } = girth_system(shape, working_from_limb, pairs);
         if h.trace() <= 0.0 {
             return None;
         }
@@ -116,7 +116,7 @@ impl Outline {
         working_from_limb: &Pose,
         pairs: impl Iterator<Item = &'a RegionPair>,
     ) -> Option<GirthFit> {
-        let Asked { h, g } = asked(shape, working_from_limb, pairs);
+        let GirthSystem { h, g } = girth_system(shape, working_from_limb, pairs);
         if h.trace() <= 0.0 {
             return None;
         }
@@ -139,7 +139,7 @@ impl Outline {
             return None;
         }
         let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
-        let (total, done) = self.total.then(&GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors });
+        let (total, done) = self.total.followed_by(&GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors });
         self.total = total;
         Some(done)
     }
@@ -147,35 +147,37 @@ impl Outline {
 
 /// What is known of the surfaces of all limbs; nothing where depth tells it.
 #[derive(Debug, Default)]
-pub(super) struct Outlines {
-    limbs: Vec<Outline>,
+pub(super) struct ColorGirths {
+    limbs: Vec<ColorGirth>,
     /// Frames since girths followed.
     frames: u32,
 }
 
-impl Outlines {
+impl ColorGirths {
     /// Forgets everything.
     pub(super) fn clear(&mut self) {
         self.limbs.clear();
     }
 
-    /// Fits the limbs' surfaces to the edges of their colours, where nothing else shows them.
+    /// Fits the limbs' surfaces to the edges of their colors, where nothing else shows them.
     pub(super) fn start(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
-        if !setting.seen.candidates.is_empty() || setting.seen.frame().colors.is_empty() {
+        if !setting.observation.candidates.is_empty() || setting.observation.frame().colors.is_empty() {
             return;
         }
-        (self.limbs, self.frames) = (vec![Outline::default(); poses.len()], 0);
-        level_pairs(model, poses);
+        (self.limbs, self.frames) = (vec![ColorGirth::default(); poses.len()], 0);
+        equalize_pairs(model, poses);
         for _ in 0..GIRTH_STEPS {
-            fit.match_outline(setting.of(model), poses);
-            for (limb, outline) in self.limbs.iter_mut().enumerate() {
+            fit.match_single_edges(setting.with_model(model), poses);
+            for (limb, color_girth) in self.limbs.iter_mut().enumerate() {
                 let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
                 let part = &model.body.limbs()[limb];
                 if part.match_caps[1] {
-                    let longer = outline.tip(&part.shape, &poses[limb], pairs.clone());
+                    let longer = color_girth.tip(&part.shape, &poses[limb], pairs.clone());
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
-                let Some(step) = outline.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else { continue };
+                let Some(step) = color_girth.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else {
+                    continue;
+                };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
@@ -184,16 +186,16 @@ impl Outlines {
         }
     }
 
-    /// Draws the girths to the edges of colours.
+    /// Draws the girths to the edges of colors.
     pub(super) fn follow(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
         self.frames = (self.frames + 1) % GIRTHS_EVERY;
         if self.limbs.is_empty() || self.frames != 0 {
             return;
         }
-        fit.match_outline(setting.of(model), poses);
-        for (limb, outline) in self.limbs.iter_mut().enumerate() {
+        fit.match_single_edges(setting.with_model(model), poses);
+        for (limb, color_girth) in self.limbs.iter_mut().enumerate() {
             let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-            if let Some(step) = outline.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
+            if let Some(step) = color_girth.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
                 model.body.change_girth(limb, step.shift, step.axes());
             }
         }
@@ -202,7 +204,7 @@ impl Outlines {
 
 /// Gives both limbs of a pair one length: in contours alone, a wrong start shows for long. That is the mean of theirs, and the
 /// less they are alike, the more what they would be by the others: how unlike pairs are tells how far off the start is.
-fn level_pairs(model: &mut Model, poses: &mut [Pose]) {
+fn equalize_pairs(model: &mut Model, poses: &mut [Pose]) {
     let length = |body: &Body, limb: usize| body.limbs()[limb].shape.length();
     let pairs: Vec<_> = model.body.pairs().into_iter().filter(|pair| pair.len() == 2).collect();
     let [mut off, mut sum, mut usual] = [0.0; 3];
@@ -216,9 +218,9 @@ fn level_pairs(model: &mut Model, poses: &mut [Pose]) {
     let off = 0.25 * off;
     for pair in &pairs {
         let [one, other] = [0, 1].map(|side| length(&model.body, pair[side]));
-        let wanted = length(&model.reference_body, pair[0]) * sum / usual;
-        let share = off / (off + (PROPORTION_SIGMA * wanted).powi(2));
-        let length = 0.5 * (one + other) * (1.0 - share) + wanted * share;
+        let proportional = length(&model.reference_body, pair[0]) * sum / usual;
+        let weight_of_proportion = off / (off + (PROPORTION_SIGMA * proportional).powi(2));
+        let length = 0.5 * (one + other) * (1.0 - weight_of_proportion) + proportional * weight_of_proportion;
         for (limb, before) in pair.iter().zip([one, other]) {
             model.body.change_length(*limb, length / before);
         }
@@ -232,17 +234,17 @@ mod tests {
     use super::*;
     use crate::testing::standing;
 
-    /// Mean error of lengths, as a share, of a start whose arms and legs have lengths off by `shares`, left and right.
-    fn off(shares: [[f64; 2]; 4]) -> f64 {
+    /// Mean error of lengths, as a share, of a start whose arms and legs have lengths off by `offsets`, left and right.
+    fn off(offsets: [[f64; 2]; 4]) -> f64 {
         let (mut model, mut poses) = standing();
         let true_body = model.body.clone();
         let limb = |name: &str| true_body.limb_index(name).unwrap();
-        for (name, shares) in ["upperarm", "forearm", "thigh", "calf"].iter().zip(shares) {
-            for (side, share) in ["l", "r"].iter().zip(shares) {
-                model.body.change_length(limb(&format!("{side}_{name}")), 1.0 + share);
+        for (name, offsets) in ["upperarm", "forearm", "thigh", "calf"].iter().zip(offsets) {
+            for (side, offset) in ["l", "r"].iter().zip(offsets) {
+                model.body.change_length(limb(&format!("{side}_{name}")), 1.0 + offset);
             }
         }
-        level_pairs(&mut model, &mut poses);
+        equalize_pairs(&mut model, &mut poses);
         let ratio = |name: &str| {
             let length = |body: &Body| body.limbs()[limb(name)].shape.length();
             (length(&model.body) / length(&true_body) - 1.0).abs()
@@ -254,7 +256,7 @@ mod tests {
     fn the_less_alike_pairs_are_the_more_are_lengths_those_of_proportion() {
         let alike = [[0.15, 0.15], [-0.1, -0.1], [0.05, 0.05], [-0.1, -0.1]];
         assert!((off(alike) - 0.1).abs() < 1e-9, "a person may have such limbs");
-        let unlike = [[-0.3, 0.0], [-0.1, 0.2], [0.2, 0.0], [0.0, -0.2]];
-        assert!(off(unlike) < 0.06, "{}; the means alone are 0.1 off", off(unlike));
+        let unequal = [[-0.3, 0.0], [-0.1, 0.2], [0.2, 0.0], [0.0, -0.2]];
+        assert!(off(unequal) < 0.06, "{}; the means alone are 0.1 off", off(unequal));
     }
 }

@@ -20,11 +20,11 @@ const FAR_OUT: f64 = 1.5;
 const TIPS_APART: f64 = 3.0;
 /// A hand at a tip reaches this far from it, radii of a palm.
 const HAND_AT_TIP: f64 = 3.2;
-/// Columns and rows from a pixel to its eight neighbours, counter-clockwise in the picture.
-const NEIGHBOUR_STEPS: [[i32; 2]; 8] = [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
+/// Columns and rows from a pixel to its eight neighbors, counter-clockwise in the picture.
+const NEIGHBOR_STEPS: [[i32; 2]; 8] = [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
 
 impl Cutout {
-    fn is(&self, [u, v]: [i32; 2]) -> bool {
+    fn contains(&self, [u, v]: [i32; 2]) -> bool {
         let inside = u >= 0 && v >= 0 && (u as usize) < self.width;
         inside && self.mask.get(v as usize * self.width + u as usize).is_some_and(|pixel| *pixel != 0)
     }
@@ -34,14 +34,14 @@ impl Cutout {
     pub(super) fn border(&self) -> Vec<[i32; 2]> {
         let Some(first) = self.mask.iter().position(|pixel| *pixel != 0) else { return Vec::new() };
         let start = [(first % self.width) as i32, (first / self.width) as i32];
-        let step = |[u, v]: [i32; 2], turn: usize| [u + NEIGHBOUR_STEPS[turn & 7][0], v + NEIGHBOUR_STEPS[turn & 7][1]];
+        let step = |[u, v]: [i32; 2], turn: usize| [u + NEIGHBOR_STEPS[turn & 7][0], v + NEIGHBOR_STEPS[turn & 7][1]];
         // Clockwise from the left, where nothing is, to the last pixel of the round.
-        let Some(to_last) = (5..12).rev().find(|turn| self.is(step(start, *turn))) else { return vec![start] };
+        let Some(to_last) = (5..12).rev().find(|turn| self.contains(step(start, *turn))) else { return vec![start] };
         let last = step(start, to_last);
         let (mut here, mut back) = (start, to_last & 7);
         let mut border = Vec::new();
         loop {
-            let Some(turn) = (back + 1..back + 9).find(|turn| self.is(step(here, *turn))) else { return border };
+            let Some(turn) = (back + 1..back + 9).find(|turn| self.contains(step(here, *turn))) else { return border };
             border.push(here);
             let next = step(here, turn);
             if next == start && here == last {
@@ -113,9 +113,9 @@ impl Cutout {
 
     /// Middles (column, row) of the parts of the region around its tips, farthest first, for a palm of this radius, pixels.
     pub(super) fn tips(&self, palm: f64) -> Vec<[f64; 2]> {
-        let outline = self.border();
-        let count = outline.len();
-        let away: Vec<f64> = outline
+        let border = self.border();
+        let count = border.len();
+        let away: Vec<f64> = border
             .iter()
             .map(|[u, v]| (f64::from(*u) - self.middle[0]).powi(2) + (f64::from(*v) - self.middle[1]).powi(2))
             .collect();
@@ -132,7 +132,7 @@ impl Cutout {
         let mut taken: Vec<[f64; 2]> = Vec::new();
         let mut tips = Vec::new();
         for peak in peaks {
-            let tip = outline[peak].map(f64::from);
+            let tip = border[peak].map(f64::from);
             let apart = |other: &[f64; 2]| (tip[0] - other[0]).hypot(tip[1] - other[1]);
             if taken.len() == MOST_TIPS {
                 break;

@@ -1,4 +1,4 @@
-//! What a camera sees without anybody: a colour for every pixel, and how likely another one is that of the scene.
+//! What a camera sees without anybody: a color for every pixel, and how likely another one is that of the scene.
 
 use super::histogram::Kind;
 use crate::error::TrackError;
@@ -6,13 +6,13 @@ use crate::observation::picture::{ColorImage, ColorPixels};
 
 /// Least standard deviation of a channel, of 255: noise, and what compression makes of it.
 const LEAST_SIGMA: f32 = 6.0;
-/// How likely a pixel without the body shows what it did before, and how likely anything of the surroundings' colours: shadows
+/// How likely a pixel without the body shows what it did before, and how likely anything of the surroundings' colors: shadows
 /// and lamps change many.
 const CHANGED: f32 = 0.5;
 
 /// The scene as one camera sees it.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scene {
+pub(super) struct EmptyScene {
     size: [usize; 2],
     kind: Kind,
     mean: Vec<[u8; 3]>,
@@ -21,21 +21,21 @@ pub(super) struct Scene {
     narrow: f32,
 }
 
-impl Scene {
+impl EmptyScene {
     /// The mean of pictures of one size (height, width) and kind, and how they differ.
-    pub(super) fn of(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, TrackError> {
+    pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, TrackError> {
         let wrong = |index: usize, found: String| {
             let expected = "pictures of the empty scene, all of one size and kind";
             Err(TrackError::measurement(format!("images[{index}]"), expected, found))
         };
         let Some((first, size)) = pictures.first() else { return wrong(0, "none".into()) };
-        let kind = Kind::of(first);
+        let kind = Kind::new(first);
         for (index, (pixels, found)) in pictures.iter().enumerate() {
             let count = found[0].saturating_mul(found[1]);
-            if found != size || Kind::of(pixels) != kind || pixels.len() != count || count == 0 {
+            if found != size || Kind::new(pixels) != kind || pixels.len() != count || count == 0 {
                 return wrong(
                     index,
-                    format!("{:?} of {}x{} beside {}x{}", Kind::of(pixels), found[1], found[0], size[1], size[0]),
+                    format!("{:?} of {}x{} beside {}x{}", Kind::new(pixels), found[1], found[0], size[1], size[0]),
                 );
             }
         }
@@ -59,14 +59,14 @@ impl Scene {
         let width = (std::f32::consts::TAU.sqrt() * sigma).ln();
         let most = match kind {
             Kind::Color => (16.0_f32).ln() * 3.0 - 3.0 * width,
-            Kind::Grey => -width,
+            Kind::Gray => -width,
         };
         Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })
     }
 
     /// Refuses a picture that cannot be compared.
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
-        if self.size == [picture.camera.height(), picture.camera.width()] && self.kind == Kind::of(&picture.pixels) {
+        if self.size == [picture.camera.height(), picture.camera.width()] && self.kind == Kind::new(&picture.pixels) {
             return Ok(());
         }
         let what = format!("color[{index}].image");
@@ -75,13 +75,13 @@ impl Scene {
         Err(TrackError::measurement(what, "a picture like those of the empty scene", found))
     }
 
-    /// Logarithm of how likely a pixel that shows no body has this colour, where `around` is that of the surroundings.
+    /// Logarithm of how likely a pixel that shows no body has this color, where `around` is that of the surroundings.
     #[inline]
     pub(super) fn log(&self, index: usize, pixel: [u8; 3], around: f32) -> f32 {
-        let (here, seen) = (self.mean[index].map(f32::from), pixel.map(f32::from));
+        let (here, value) = (self.mean[index].map(f32::from), pixel.map(f32::from));
         let square: f32 = match self.kind {
-            Kind::Color => (0..3).map(|channel| (seen[channel] - here[channel]).powi(2)).sum(),
-            Kind::Grey => (seen[0] - here[0]).powi(2),
+            Kind::Color => (0..3).map(|channel| (value[channel] - here[channel]).powi(2)).sum(),
+            Kind::Gray => (value[0] - here[0]).powi(2),
         };
         (self.most - self.narrow * square).max(around) + CHANGED.ln()
     }

@@ -1,4 +1,4 @@
-//! The arm or leg is where pictures show its colours: its upper limb in all directions, then its lower one on the best of these.
+//! The arm or leg is where pictures show its colors: its upper limb in all directions, then its lower one on the best of these.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,13 +10,13 @@ use crate::math::{Pose, Vec3};
 
 /// Looks in all directions; working memory.
 #[derive(Debug, Default)]
-pub(in crate::hypotheses) struct ShownByColors {
+pub(in crate::hypotheses) struct ColorDirections {
     trial: Vec<Pose>,
     /// The best directions of the upper limb, working frame, and what they cost.
     kept: Vec<(f64, Vec3)>,
 }
 
-impl Propose for ShownByColors {
+impl Propose for ColorDirections {
     fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
         if at.regions.is_none() {
             return;
@@ -26,7 +26,7 @@ impl Propose for ShownByColors {
         for &(_, upper) in &self.kept {
             let bend = at.root() + at.chain().lengths[0] * upper;
             for lower in directions() {
-                let change = |poses: &mut [Pose]| at.chain().put(body, poses, bend, bend + lower);
+                let change = |poses: &mut [Pose]| at.chain().place_between(body, poses, bend, bend + lower);
                 let least = rough.changed(at, change, pool.least, &mut pool.points.poses);
                 if least < pool.least {
                     pool.least = least;
@@ -37,7 +37,7 @@ impl Propose for ShownByColors {
     }
 }
 
-impl ShownByColors {
+impl ColorDirections {
     /// Room for a body of so many limbs.
     pub(in crate::hypotheses) fn make_room(&mut self, limbs: usize) {
         self.trial.clear();
@@ -54,9 +54,9 @@ impl ShownByColors {
         for upper in directions().chain([poses[chain.upper].rotation * Vec3::Z]) {
             trial.clear();
             trial.extend_from_slice(poses);
-            chain.put(body, trial, at.root() + upper, at.root() + 2.0 * upper);
-            let shown = rough.score.claimed(at, trial, [chain.upper].into_iter()).gained;
-            let cost = limit_strain(body, trial, chain.upper) - shown;
+            chain.place_between(body, trial, at.root() + upper, at.root() + 2.0 * upper);
+            let visible = rough.score.pixel_gain(at, trial, [chain.upper].into_iter()).gained;
+            let cost = limit_strain(body, trial, chain.upper) - visible;
             let place = kept.partition_point(|(other, _)| *other <= cost);
             if place < SWIVELS {
                 kept.truncate(SWIVELS - 1);

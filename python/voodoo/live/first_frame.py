@@ -11,7 +11,7 @@ from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
 
 
-class FirstLook(Recording):
+class FirstFrame(Recording):
     """A recording without frames that has the sensors of a live source.
 
     Args:

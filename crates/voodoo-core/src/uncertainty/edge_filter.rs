@@ -4,7 +4,7 @@
 //! from the same side, nothing does. What was known of every unknown of the chain is kept with all that ties it to others,
 //! fades as the body moves, and grows by what this frame's edges tell.
 
-use super::{MOST_UNSURE, USUAL_MOTION};
+use super::{MAX_SIGMA, USUAL_MOTION};
 use crate::association::correspondence::Correspondences;
 use crate::body::kinematics::freedoms;
 use crate::body::two_bone::TwoBone;
@@ -15,16 +15,16 @@ use crate::solver::{ChainSolver, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Regions, Sites, Term};
 
-/// Standard deviation of every unknown of a pose that was set, radians and metres.
+/// Standard deviation of every unknown of a pose that was set, radians and meters.
 const AS_SET: f64 = 0.03;
 /// Share of what edges tell of a limb that is no part of an arm or leg: clothes hang on the trunk, hair on the head.
 const LOOSE: f64 = 0.1;
 /// What is told of a limb of which no line speaks: so little.
-const LEAST_TOLD: f64 = 1e-3;
+const MIN_WEIGHT: f64 = 1e-3;
 
 /// What is known of a pose, from frame to frame.
 #[derive(Debug, Default)]
-pub(crate) struct ByEdges {
+pub(crate) struct EdgeFilter {
     normal: NormalEquations,
     system: ChainSolver,
     spread: Spread,
@@ -34,18 +34,18 @@ pub(crate) struct ByEdges {
     still: Vec<f64>,
     factored: Vec<f64>,
     solved: Vec<f64>,
-    /// Of every limb's far end, metres; empty before the first frame.
+    /// Of every limb's far end, meters; empty before the first frame.
     sigma: Vec<f64>,
 }
 
-impl ByEdges {
+impl EdgeFilter {
     /// Nothing is known of the pose that comes next but that it was set.
     pub(crate) fn forget(&mut self) {
         self.known.clear();
         self.sigma.clear();
     }
 
-    /// Standard deviation of where a limb ends, metres, after the last frame; infinite where that is not known.
+    /// Standard deviation of where a limb ends, meters, after the last frame; infinite where that is not known.
     pub(crate) fn end_sigma(&self, limb: usize) -> f64 {
         self.sigma.get(limb).copied().unwrap_or(f64::INFINITY)
     }
@@ -65,7 +65,7 @@ impl ByEdges {
         let Self { normal, system, spread, known, sigma, .. } = self;
         sigma.clear();
         if !system.factor_added(body, normal, poses, known) {
-            know_alone(known, self.still.len(), MOST_UNSURE);
+            know_alone(known, self.still.len(), MAX_SIGMA);
             return;
         }
         for (limb, part) in body.limbs().iter().enumerate() {
@@ -80,7 +80,7 @@ impl ByEdges {
         let Self { known, still, factored, solved, .. } = self;
         still.clear();
         for limb in body.limbs() {
-            let sigma = limb.parent.as_ref().map_or(MOST_UNSURE, |(_, joint)| USUAL_MOTION * joint.motion * time_scale);
+            let sigma = limb.parent.as_ref().map_or(MAX_SIGMA, |(_, joint)| USUAL_MOTION * joint.motion * time_scale);
             let count = limb.parent.as_ref().map_or(6, |(_, joint)| freedoms(joint));
             still.extend((0..count).map(|_| 1.0 / (sigma * sigma)));
         }
@@ -95,7 +95,7 @@ impl ByEdges {
         solved.clear();
         solved.extend((0..n * n).map(|index| known[(index / n).max(index % n) * n + (index / n).min(index % n)]));
         if !factor(factored, n) {
-            know_alone(known, n, MOST_UNSURE);
+            know_alone(known, n, MAX_SIGMA);
             return;
         }
         for row in (0..n).rev() {
@@ -103,14 +103,14 @@ impl ByEdges {
             let own = &mut rest[..n];
             own.iter_mut().for_each(|value| *value /= factored[row * n + row]);
             for (other, values) in before.chunks_exact_mut(n).enumerate() {
-                let share = factored[row * n + other];
-                if share != 0.0 {
-                    values.iter_mut().zip(&*own).for_each(|(value, own)| *value -= share * own);
+                let factor_value = factored[row * n + other];
+                if factor_value != 0.0 {
+                    values.iter_mut().zip(&*own).for_each(|(value, own)| *value -= factor_value * own);
                 }
             }
             for (index, values) in known.chunks_exact_mut(n).enumerate() {
-                let share = own[index];
-                values[..=index].iter_mut().zip(&*own).for_each(|(value, own)| *value -= share * own);
+                let factor_value = own[index];
+                values[..=index].iter_mut().zip(&*own).for_each(|(value, own)| *value -= factor_value * own);
             }
         }
     }
@@ -128,11 +128,11 @@ impl ByEdges {
         normal.clear(poses.len());
         Regions { pairs: &correspondences.regions }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
-            let said =
+            let support_net =
                 correspondences.region_support.get(limb).map_or(0.0, |support| support.own[0] - support.against[0]);
-            let told = (said.max(0.0) * said).max(LEAST_TOLD);
+            let weight = (support_net.max(0.0) * support_net).max(MIN_WEIGHT);
             let loose = extremities.iter().flat_map(TwoBone::limbs).all(|other| other != limb);
-            block.h *= if loose { LOOSE * told } else { told };
+            block.h *= if loose { LOOSE * weight } else { weight };
         }
         let information = 1.0 / (config.point_sigma * config.point_sigma);
         Sites { correspondences, information, scale: SITE_SCALE, biased: true }.add(body, poses, normal);
@@ -172,10 +172,10 @@ mod tests {
     fn sigmas(frames: &[(&[Vec3], f64)]) -> Vec<f64> {
         let (model, poses) = standing();
         let lower = model.extremities[crate::testing::first_arm(&model)].lower;
-        let mut told = ByEdges::default();
+        let mut filter = EdgeFilter::default();
         let observe = |(normals, own): &(&[Vec3], f64)| {
-            told.observe(&model, &poses, &edges(&model, &poses, normals, *own), 1.0, &Config::default());
-            told.end_sigma(lower)
+            filter.observe(&model, &poses, &edges(&model, &poses, normals, *own), 1.0, &Config::default());
+            filter.end_sigma(lower)
         };
         frames.iter().map(observe).collect()
     }
@@ -185,41 +185,41 @@ mod tests {
         let (two, one): (&[Vec3], &[Vec3]) = (&Vec3::AXES, &[Vec3::X, Vec3::Y]);
         let both = sigmas(&[(two, 1.0); 20]);
         assert!(both.iter().all(|sigma| *sigma < 0.05), "{both:?}");
-        let told = sigmas(&[&[(two, 1.0)][..], &[(one, 1.0); 18], &[(two, 1.0)]].concat());
-        assert!((2..19).all(|frame| told[frame] >= told[frame - 1] - 1e-9), "{told:?}");
-        assert!(told[18] > 3.0 * both[18] && told[19] < 1.2 * both[19], "{told:?}");
+        let filter = sigmas(&[&[(two, 1.0)][..], &[(one, 1.0); 18], &[(two, 1.0)]].concat());
+        assert!((2..19).all(|frame| filter[frame] >= filter[frame - 1] - 1e-9), "{filter:?}");
+        assert!(filter[18] > 3.0 * both[18] && filter[19] < 1.2 * both[19], "{filter:?}");
     }
 
     #[test]
-    fn edges_that_do_not_speak_for_their_limb_tell_little() {
+    fn edges_that_do_not_speak_for_their_limb_report_little() {
         let normals: &[Vec3] = &Vec3::AXES;
-        let [sure, doubtful] = [1.0, 0.0].map(|own| sigmas(&[(normals, own); 10])[9]);
-        assert!(doubtful > 2.0 * sure, "{doubtful} {sure}");
+        let [sure, weak] = [1.0, 0.0].map(|own| sigmas(&[(normals, own); 10])[9]);
+        assert!(weak > 2.0 * sure, "{weak} {sure}");
     }
 
     #[test]
-    fn what_was_known_fades_as_the_dense_inverse_says() {
+    fn what_was_known_fades_as_the_dense_inverse_reports() {
         let (model, poses) = standing();
-        let mut told = ByEdges::default();
+        let mut filter = EdgeFilter::default();
         let found = edges(&model, &poses, &[Vec3::X, Vec3::Z], 0.7);
-        told.observe(&model, &poses, &found, 1.0, &Config::default());
-        let n = told.still.len();
+        filter.observe(&model, &poses, &found, 1.0, &Config::default());
+        let n = filter.still.len();
         let whole = |known: &[f64]| DMatrix::from_fn(n, n, |i, j| known[i.max(j) * n + i.min(j)]);
-        let before = whole(&told.known);
-        told.expect(&model.body, 2.0);
-        let moved = DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 / told.still[i] } else { 0.0 });
+        let before = whole(&filter.known);
+        filter.expect(&model.body, 2.0);
+        let moved = DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 / filter.still[i] } else { 0.0 });
         let expected = (before.try_inverse().unwrap() + moved).try_inverse().unwrap();
-        assert!((whole(&told.known) - &expected).amax() < 1e-6 * expected.amax());
+        assert!((whole(&filter.known) - &expected).amax() < 1e-6 * expected.amax());
     }
 
     #[test]
     fn nothing_is_known_before_the_first_frame() {
-        let mut told = ByEdges::default();
-        assert_eq!(told.end_sigma(0), f64::INFINITY);
+        let mut filter = EdgeFilter::default();
+        assert_eq!(filter.end_sigma(0), f64::INFINITY);
         let (model, poses) = standing();
-        told.observe(&model, &poses, &edges(&model, &poses, &[Vec3::X], 1.0), 1.0, &Config::default());
-        assert!(told.end_sigma(0) < 0.1);
-        told.forget();
-        assert_eq!(told.end_sigma(0), f64::INFINITY);
+        filter.observe(&model, &poses, &edges(&model, &poses, &[Vec3::X], 1.0), 1.0, &Config::default());
+        assert!(filter.end_sigma(0) < 0.1);
+        filter.forget();
+        assert_eq!(filter.end_sigma(0), f64::INFINITY);
     }
 }

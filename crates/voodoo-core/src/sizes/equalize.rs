@@ -7,19 +7,19 @@ use crate::hypotheses::{GAIN, overall_cost};
 use crate::math::Pose;
 use crate::solver::Gate;
 
-/// Points farther than this from the set pose say nothing about sizes, metres.
+/// Points farther than this from the set pose say nothing about sizes, meters.
 pub(super) const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 /// Nobody's arm is shorter than this share of the other one, nor a leg: one of them was set wrong.
-const UNLIKE_REACH: f64 = 0.88;
+const UNEQUAL_REACH: f64 = 0.88;
 
 /// Where one arm or leg of the start is much longer than the other, gives one the lengths of the other if that explains the first
 /// frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
-pub(super) fn equalise_limb_lengths(setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
+pub(super) fn equalize_limb_lengths(setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
     for pair in model.body.pairs() {
         let chain = |limb: &usize| model.extremities.iter().find(|chain| chain.upper == *limb).cloned();
         let [one, other] = &pair.iter().filter_map(chain).collect::<Vec<_>>()[..] else { continue };
         let [first, second] = [one, other].map(|chain| bones(&model.body, chain).iter().sum::<f64>());
-        if first.min(second) > UNLIKE_REACH * first.max(second) {
+        if first.min(second) > UNEQUAL_REACH * first.max(second) {
             continue;
         }
         let mut changed = |chain, like| with_lengths_of(like, setting, model, poses, fit, chain);
@@ -50,7 +50,7 @@ fn with_lengths_of(
     chain: &TwoBone,
 ) -> Changed {
     let mut body = model.body.clone();
-    let factors = bones(&body, like).into_iter().zip(bones(&body, chain)).map(|(wanted, own)| wanted / own);
+    let factors = bones(&body, like).into_iter().zip(bones(&body, chain)).map(|(expected, own)| expected / own);
     for (limb, factor) in [chain.upper, chain.lower].into_iter().zip(factors) {
         body.change_length(limb, factor);
     }
@@ -59,16 +59,16 @@ fn with_lengths_of(
     let mut tried = model.clone();
     tried.adopt(body);
     let mut found = set.clone();
-    fit.run(setting.of(&tried), &set, &mut found);
+    fit.run(setting.with_model(&tried), &set, &mut found);
     for limb in chain.limbs() {
         set[limb].rotation = found[limb].rotation;
     }
     tried.body.close_joints(&mut set);
-    fit.match_points(setting.of(&tried), &set, &START_GATE);
-    Changed { cost: overall_cost(setting.of(&tried), fit.matched(&set)).evidence, body: tried.body, poses: set }
+    fit.match_points(setting.with_model(&tried), &set, &START_GATE);
+    Changed { cost: overall_cost(setting.with_model(&tried), fit.matched(&set)).evidence, body: tried.body, poses: set }
 }
 
-/// Lengths of the two bones, metres.
+/// Lengths of the two bones, meters.
 fn bones(body: &Body, chain: &TwoBone) -> [f64; 2] {
     [chain.upper, chain.lower].map(|limb| body.limbs()[limb].shape.length())
 }

@@ -1,7 +1,7 @@
 //! What a detector reports of the person who is tracked, or of anybody where nobody is: where to start, where a lost body is, and
 //! whether a track is what it is taken for.
 
-use super::doubt::ELSEWHERE;
+use super::detection_check::ELSEWHERE;
 use crate::body::Body;
 use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings,
@@ -9,22 +9,22 @@ use crate::detect::{
 use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
-use crate::observation::share::Share;
+use crate::observation::ownership::OwnershipMask;
 
 /// Asks the detector, and keeps what it last saw.
 #[derive(Debug, Default)]
-pub(super) struct People {
+pub(super) struct PersonDetector {
     detector: BoundDetector,
-    seen: Option<PlacedDetection>,
+    detection: Option<PlacedDetection>,
     /// The image that shows it.
     image: usize,
     /// Log odds that what stands at the place that was looked at is a person; the surest of all images.
-    verdict: Option<f64>,
+    person_odds: Option<f64>,
     /// The floor on which it stood when it was found, world frame.
     pub(super) floor: Option<Ground>,
 }
 
-impl People {
+impl PersonDetector {
     /// Takes a detector for this body.
     pub(super) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.detector.set(detector, body);
@@ -36,7 +36,7 @@ impl People {
     }
 
     /// Whether there is a detector that can find the body.
-    pub(super) fn know(&self) -> bool {
+    pub(super) fn detects(&self) -> bool {
         self.detector.knows()
     }
 
@@ -56,66 +56,73 @@ impl People {
     }
 
     /// What was seen in this frame.
-    pub(super) fn seen(&self) -> Option<Detected<'_>> {
-        self.seen.as_ref().map(|seen| Detected { detection: &seen.detection, map: self.detector.map() })
+    pub(super) fn detection(&self) -> Option<Detected<'_>> {
+        self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
     }
 
     /// The root of the body and the log odds that it is a person, as seen in this frame.
     pub(super) fn place(&self) -> Option<(Vec3, f64)> {
-        self.seen.as_ref().map(|seen| (seen.root, seen.detection.person))
+        self.detection.as_ref().map(|detection| (detection.root, detection.detection.person))
     }
 
     /// Keeps the floor on which what was seen stands, if it was `found` there; else forgets it.
     pub(super) fn keep_floor(&mut self, found: bool) {
-        self.floor = self.seen().filter(|_| found).and_then(floor_under);
+        self.floor = self.detection().filter(|_| found).and_then(floor_under);
     }
 
     /// The pixels that show it.
-    pub(super) fn own(&self) -> Own<'_> {
-        let pixels = self.seen.as_ref().map_or(&[][..], |seen| &seen.detection.pixels);
+    pub(super) fn own_pixels(&self) -> Own<'_> {
+        let pixels = self.detection.as_ref().map_or(&[][..], |detection| &detection.detection.pixels);
         Own { image: self.image, pixels }
     }
 
     /// Log odds that what stands where the person was expected is a person, if anything of that size does.
-    pub(super) fn verdict(&self) -> Option<f64> {
-        self.verdict
+    pub(super) fn person_odds(&self) -> Option<f64> {
+        self.person_odds
     }
 
     /// Forgets what was seen.
     pub(super) fn forget(&mut self) {
-        (self.seen, self.verdict) = (None, None);
+        (self.detection, self.person_odds) = (None, None);
     }
 
     /// Forgets who was seen where it is not the person: the place of its root, world frame.
-    pub(super) fn leave_out(&mut self, not_there: impl Fn(Vec3) -> bool) {
-        self.seen = self.seen.take().filter(|seen| !not_there(seen.root));
+    pub(super) fn discard(&mut self, not_there: impl Fn(Vec3) -> bool) {
+        self.detection = self.detection.take().filter(|detection| !not_there(detection.root));
     }
 
     /// Looks for a body in all depth images of a frame, or in its share of them; keeps the surest person.
-    pub(super) fn look(&mut self, body: &Body, frame: &Frame, share: Option<Share>, query: DetectionQuery) {
+    pub(super) fn detect(
+        &mut self,
+        body: &Body,
+        frame: &Frame,
+        ownership: Option<OwnershipMask>,
+        query: DetectionQuery,
+    ) {
         self.forget();
         for (number, image) in frame.images.iter().enumerate() {
-            let (owners, own) = share.map_or((&[][..], None), |share| (share.owners(number), Some(share.own)));
+            let (owners, own) =
+                ownership.map_or((&[][..], None), |ownership| (ownership.owners(number), Some(ownership.own)));
             let around =
                 Surroundings { ground: frame.ground, excluded: frame.excluded, owners, own, ..Surroundings::default() };
-            for found in self.detector.look(body, image, &around, query) {
-                if self.seen.as_ref().is_none_or(|best| found.detection.person > best.detection.person) {
-                    (self.image, self.seen) = (number, Some(found));
+            for found in self.detector.detect(body, image, &around, query) {
+                if self.detection.as_ref().is_none_or(|best| found.detection.person > best.detection.person) {
+                    (self.image, self.detection) = (number, Some(found));
                 }
             }
             if let (DetectionQuery::Near(place), Some((person, bounds))) = (query, self.detector.nearest())
                 && bounds.contains(place)
             {
-                self.verdict = Some(self.verdict.map_or(person, |before| before.max(person)));
+                self.person_odds = Some(self.person_odds.map_or(person, |before| before.max(person)));
             }
         }
     }
 }
 
 /// The floor on which a detected person stands; a table below which their feet are is none.
-fn floor_under(seen: Detected) -> Option<Ground> {
-    seen.detection.floor.filter(|floor| {
-        let above = seen.ankles().map(|ankle| floor.normal.dot(ankle.position) - floor.offset);
+fn floor_under(detection: Detected) -> Option<Ground> {
+    detection.detection.floor.filter(|floor| {
+        let above = detection.ankles().map(|ankle| floor.normal.dot(ankle.position) - floor.offset);
         above.fold(f64::INFINITY, f64::min).abs() < ELSEWHERE
     })
 }

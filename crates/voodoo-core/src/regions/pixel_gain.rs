@@ -1,11 +1,11 @@
 //! How much of pictures only one limb explains: each pixel is the limb's that shows there, and no other one's.
 //!
-//! Two legs on the contour of one both lie on its colours. What a limb adds to what is seen without it tells them apart.
+//! Two legs on the contour of one both lie on its colors. What a limb adds to what is seen without it tells them apart.
 
 use super::histogram::bin_of;
-use super::labels::{Labels, NOTHING};
+use super::labels::{LimbLabels, NOTHING};
 use super::lines::NEARER_BY;
-use super::{Posed, Regions, scan};
+use super::{ColorRegions, Posed, scan};
 use crate::association::correspondence::RegionSupport;
 use crate::body::two_bone::TwoBone;
 use crate::camera::Camera;
@@ -22,15 +22,15 @@ const BACKDROP_BITS: u32 = 2;
 
 /// What pictures say of a limb, in patches, the mean of all cameras.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Claim {
-    /// What it explains better than what would be seen without it, less what it explains worse: of a limb whose colours are
+pub(crate) struct PixelGain {
+    /// What it explains better than what would be seen without it, less what it explains worse: of a limb whose colors are
     /// certain, all that shows.
     pub gained: f64,
     /// Its area in the pictures, hidden or not.
     pub area: f64,
 }
 
-impl std::ops::AddAssign for Claim {
+impl std::ops::AddAssign for PixelGain {
     fn add_assign(&mut self, other: Self) {
         self.gained += other.gained;
         self.area += other.area;
@@ -40,14 +40,14 @@ impl std::ops::AddAssign for Claim {
 /// What each camera sees of some limbs.
 #[derive(Debug, Default)]
 pub(crate) struct Backdrop {
-    planes: Vec<Labels>,
+    planes: Vec<LimbLabels>,
     camera_from_limb: Vec<Pose>,
 }
 
 impl Backdrop {
     /// Makes room for the pictures of a frame and so many limbs.
     pub(crate) fn make_room(&mut self, frame: &Frame, limbs: usize) {
-        self.planes.resize_with(frame.colors.len(), Labels::default);
+        self.planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
             labels.make_room(BACKDROP_BITS, picture.camera.width(), picture.camera.height());
         }
@@ -56,28 +56,28 @@ impl Backdrop {
     }
 }
 
-impl Regions {
-    /// Draws the limbs that are `shown` before what the cameras see.
-    pub(crate) fn draw(&self, frame: &Frame, posed: Posed, shown: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
+impl ColorRegions {
+    /// Draws the limbs that are `visible` before what the cameras see.
+    pub(crate) fn draw(&self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
         let Backdrop { planes, camera_from_limb } = backdrop;
-        planes.resize_with(frame.colors.len(), Labels::default);
+        planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (picture, labels) in frame.colors.iter().zip(planes) {
             let view = self.viewpoint(frame, picture, posed);
             camera_from_limb.clear();
-            camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.of(limb)));
-            labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &shown);
+            camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.limb_pose(limb)));
+            labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &visible);
         }
     }
 
     /// What a limb, which is not drawn, would explain of what is seen.
-    pub(crate) fn claim(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> Claim {
-        self.look_at(frame, posed, limb, backdrop, |(label, behind), depth| {
+    pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> PixelGain {
+        self.sum_over_limb(frame, posed, limb, backdrop, |(label, behind), depth| {
             (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
         })
     }
 
     /// What every limb of the arms and legs explains that nothing else does, into `supports`.
-    pub(crate) fn claim_all(
+    pub(crate) fn pixel_gains(
         &mut self,
         frame: &Frame,
         posed: Posed,
@@ -88,9 +88,9 @@ impl Regions {
         for chain in chains {
             self.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut backdrop);
             for limb in chain.limbs() {
-                let claim = self.claim(frame, posed, limb, &backdrop);
+                let gain = self.pixel_gain(frame, posed, limb, &backdrop);
                 if let Some(support) = supports.get_mut(limb) {
-                    (support.gained, support.area) = (claim.gained, claim.area);
+                    (support.gained, support.area) = (gain.gained, gain.area);
                 }
             }
         }
@@ -100,23 +100,23 @@ impl Regions {
     /// How well a body explains what is seen, every pixel by the limb that shows there; all of it is drawn.
     pub(crate) fn explained(&self, frame: &Frame, posed: Posed, backdrop: &Backdrop) -> f64 {
         let own = |limb: usize| {
-            let show = |(label, _): (u16, f64), _| (usize::from(label) == limb).then_some(NOTHING);
-            self.look_at(frame, posed, limb, backdrop, show).gained
+            let nothing_behind = |(label, _): (u16, f64), _| (usize::from(label) == limb).then_some(NOTHING);
+            self.sum_over_limb(frame, posed, limb, backdrop, nothing_behind).gained
         };
         (0..posed.poses.len()).map(own).sum()
     }
 
     /// Sums over the places of a limb; `behind` says what would be seen there without it, given what is drawn there and its
     /// depth, and the limb's.
-    fn look_at(
+    fn sum_over_limb(
         &self,
         frame: &Frame,
         posed: Posed,
         limb: usize,
         backdrop: &Backdrop,
         behind: impl Fn((u16, f64), f64) -> Option<u16>,
-    ) -> Claim {
-        let mut claim = Claim::default();
+    ) -> PixelGain {
+        let mut gain = PixelGain::default();
         let shape = &posed.body.limbs()[limb].shape;
         let group = usize::from(self.groups[limb]);
         for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
@@ -124,28 +124,33 @@ impl Regions {
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
             let (model, scene) = (&camera.model, camera.scene.as_ref());
             let unit = camera.unit;
-            let view = scan::View { picture, model, labels, scene, groups: &self.groups, unit };
-            places(shape, &self.viewpoint(frame, picture, posed).of(limb), picture.camera, |[u, v], depth, area| {
-                claim.area += area;
-                let [width, height] = [picture.camera.width(), picture.camera.height()];
-                if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
-                    return;
-                }
-                let (column, row) = (u as usize, v as usize);
-                let (label, before) = labels.at(column, row);
-                if let Some(other) = behind((label, f64::from(before)), depth) {
-                    let pixel = row * picture.camera.width() + column;
-                    let bin = bin_of(&picture.pixels, pixel);
-                    claim.gained += area * f64::from(view.certainty(group, other, pixel, bin));
-                }
-            });
+            let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
+            places(
+                shape,
+                &self.viewpoint(frame, picture, posed).limb_pose(limb),
+                picture.camera,
+                |[u, v], depth, area| {
+                    gain.area += area;
+                    let [width, height] = [picture.camera.width(), picture.camera.height()];
+                    if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
+                        return;
+                    }
+                    let (column, row) = (u as usize, v as usize);
+                    let (label, before) = labels.at(column, row);
+                    if let Some(other) = behind((label, f64::from(before)), depth) {
+                        let pixel = row * picture.camera.width() + column;
+                        let bin = bin_of(&picture.pixels, pixel);
+                        gain.gained += area * f64::from(view.certainty(group, other, pixel, bin));
+                    }
+                },
+            );
         }
         let cameras = frame.colors.len().max(1) as f64;
-        Claim { gained: claim.gained / cameras, area: claim.area / cameras }
+        PixelGain { gained: gain.gained / cameras, area: gain.area / cameras }
     }
 }
 
-/// Places on a limb as a camera sees it: pixels (the first one's corner is the origin), depth in metres, and area in patches.
+/// Places on a limb as a camera sees it: pixels (the first one's corner is the origin), depth in meters, and area in patches.
 fn places(
     shape: &TaperedEllipticCylinder,
     camera_from_limb: &Pose,
@@ -164,46 +169,46 @@ fn places(
     let [fx, fy] = camera.focal();
     let focal = 0.5 * (fx + fy);
     for along in ALONG {
-        let centre = ends[0] + (ends[1] - ends[0]) * along;
+        let center = ends[0] + (ends[1] - ends[0]) * along;
         let radius = radii[0] + (radii[1] - radii[0]) * along;
-        let metre = focal / centre.z;
-        let Some(seen) = camera.project(centre) else { continue };
-        let [u, v] = seen.map(|value| value + 0.5);
-        let patch = length / metre * 2.0 * radius / (ALONG.len() * OVER.len()) as f64 / REFERENCE_PATCH;
+        let meter = focal / center.z;
+        let Some(observed) = camera.project(center) else { continue };
+        let [u, v] = observed.map(|value| value + 0.5);
+        let patch = length / meter * 2.0 * radius / (ALONG.len() * OVER.len()) as f64 / REFERENCE_PATCH;
         for across in OVER {
-            let off = across * radius * metre;
-            each([u + off * aside[0], v + off * aside[1]], centre.z - radius, patch);
+            let off = across * radius * meter;
+            each([u + off * aside[0], v + off * aside[1]], center.z - radius, patch);
         }
     }
 }
 
 /// Where a camera saw the limbs: those of the moment it looked.
-pub(super) struct Viewpoint<'a> {
+pub(super) struct PictureViewpoint<'a> {
     pub(super) posed: Posed<'a>,
     /// How much of the last motion lies between the frame and the picture.
-    pub(super) share: f64,
+    pub(super) fraction: f64,
     pub(super) camera_from_working: Pose,
 }
 
-impl Viewpoint<'_> {
-    pub(super) fn of(&self, limb: usize) -> Pose {
+impl PictureViewpoint<'_> {
+    pub(super) fn limb_pose(&self, limb: usize) -> Pose {
         let now = &self.posed.poses[limb];
-        let before = self.posed.previous.get(limb).filter(|_| self.share != 0.0);
-        self.camera_from_working * before.map_or(*now, |before| super::moved_on(before, now, self.share))
+        let before = self.posed.previous.get(limb).filter(|_| self.fraction != 0.0);
+        self.camera_from_working * before.map_or(*now, |before| super::moved_on(before, now, self.fraction))
     }
 }
 
-impl Regions {
+impl ColorRegions {
     /// How a camera sees a body.
     pub(super) fn viewpoint<'a>(
         &self,
         frame: &Frame,
         picture: &crate::observation::picture::ColorImage,
         posed: Posed<'a>,
-    ) -> Viewpoint<'a> {
+    ) -> PictureViewpoint<'a> {
         let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
-        let share = (picture.stamp - frame.stamp) / passed;
+        let fraction = (picture.stamp - frame.stamp) / passed;
         let camera_from_working = shifted(&picture.world_from_sensor, posed.origin).inverse();
-        Viewpoint { posed, share, camera_from_working }
+        PictureViewpoint { posed, fraction, camera_from_working }
     }
 }

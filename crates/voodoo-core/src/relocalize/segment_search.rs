@@ -11,7 +11,7 @@ use crate::observation::segments::{Segment, Segments};
 
 /// What a search remembers, and its working memory.
 #[derive(Debug, Default)]
-pub(super) struct Search {
+pub(super) struct SegmentSearch {
     pub(super) segments: Segments,
     /// Poses as last tracked, or as they were set.
     tracked: Vec<Pose>,
@@ -19,7 +19,7 @@ pub(super) struct Search {
     best: Vec<Pose>,
 }
 
-impl Search {
+impl SegmentSearch {
     /// Remembers a tracked body.
     pub(super) fn remember(&mut self, poses: &[Pose]) {
         self.tracked.clear();
@@ -32,7 +32,7 @@ impl Search {
     }
 
     /// Whether a segment is as long as the body, or half or twice that.
-    pub(super) fn fits(&self, body: &Body, segment: Segment) -> bool {
+    pub(super) fn is_body_sized(&self, body: &Body, segment: Segment) -> bool {
         let length = body_box(body, &self.tracked, 0.0).extents().max_element();
         let extent = (segment.high - segment.low).max_element();
         extent > 0.5 * length && extent < 2.0 * length
@@ -40,7 +40,7 @@ impl Search {
 
     /// Whether the body is at a segment, whose points are the candidates of `context`, rather than at `present`; `trials` has its
     /// poses then.
-    pub(super) fn at(
+    pub(super) fn try_segment(
         &mut self,
         segment: Segment,
         context: Context,
@@ -50,7 +50,7 @@ impl Search {
     ) -> bool {
         let Self { tracked, turned, best, .. } = self;
         let stood = tracked.first().map_or(Vec3::Z, |root| root.rotation * Vec3::Z);
-        let up = context.seen.frame().ground.map_or(stood, |ground| ground.normal);
+        let up = context.observation.frame().ground.map_or(stood, |ground| ground.normal);
         let middle = body_box(&context.model.body, tracked, 0.0).center();
         let there = 0.5 * (segment.low + segment.high);
         best.clear();
@@ -60,13 +60,13 @@ impl Search {
             let moved = Pose::from_parts(there - turn * middle, turn);
             turned.clear();
             turned.extend(tracked.iter().map(|pose| moved * *pose));
-            let stray = trials.stray_share(context, turned);
+            let stray = trials.stray_fraction(context, turned);
             // Of two that explain as much the one that turns less.
             if stray < least {
                 least = stray;
                 std::mem::swap(best, turned);
             }
         }
-        !best.is_empty() && trials.at(context, fit, present, best, 0.0)
+        !best.is_empty() && trials.try_at(context, fit, present, best, 0.0)
     }
 }

@@ -1,0 +1,100 @@
+//! How long a body has been lost, and for how long it is looked after once it is back.
+
+use super::detection_check::NEW_TRACK_AGE;
+use super::occlusion::Occlusion;
+use crate::hypotheses::PATIENCE;
+
+/// What a frame said of the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FrameOutcome {
+    /// Time of the frame, seconds.
+    pub stamp: f64,
+    /// The body is lost.
+    pub lost: bool,
+    /// It is tracked, neither lost nor degraded.
+    pub tracked: bool,
+    /// Depth cameras that have been there gave no image: no sign that the body went.
+    pub silent: bool,
+}
+
+/// How long the body has been lost, and until when it is looked after.
+#[derive(Debug, Default)]
+pub(super) struct LossMonitor {
+    /// Frames in a row in which it was lost.
+    lost: usize,
+    /// Until when a body that is back is looked after, seconds.
+    until: Option<f64>,
+    /// What stands before it.
+    pub(super) occlusion: Occlusion,
+}
+
+impl LossMonitor {
+    /// The body was set anew: nothing is lost.
+    pub(super) fn restart(&mut self) {
+        *self = Self::default();
+    }
+
+    /// In how many of the last frames the body was lost, from the one on in which that is no blur; `None` otherwise.
+    pub(super) fn frames_searched(&self) -> Option<usize> {
+        self.lost.checked_sub(PATIENCE)
+    }
+
+    /// The body is back since a moment ago.
+    pub(super) fn recently_recovered(&self) -> bool {
+        self.until.is_some()
+    }
+
+    /// Counts a frame.
+    pub(super) fn observe(&mut self, outcome: FrameOutcome) {
+        let FrameOutcome { stamp, lost, tracked, silent } = outcome;
+        self.until = self.until.filter(|until| stamp < *until);
+        if lost {
+            self.lost += usize::from(!silent);
+        } else if tracked || self.frames_searched().is_none() {
+            if self.frames_searched().is_some() {
+                self.until = Some(stamp + NEW_TRACK_AGE);
+            }
+            self.lost = 0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn after(frames: impl IntoIterator<Item = FrameOutcome>) -> LossMonitor {
+        let mut loss = LossMonitor::default();
+        frames.into_iter().for_each(|outcome| loss.observe(outcome));
+        loss
+    }
+
+    fn outcome(stamp: f64, lost: bool) -> FrameOutcome {
+        FrameOutcome { stamp, lost, tracked: !lost, silent: false }
+    }
+
+    #[test]
+    fn a_body_is_lost_from_the_second_frame_on_that_reports_so() {
+        let searched = |frames: i32| after((0..frames).map(|frame| outcome(f64::from(frame), true))).frames_searched();
+        assert_eq!([1, 2, 3, 4].map(searched), [None, Some(0), Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn a_lost_frame_is_forgotten_and_a_silent_camera_counts_for_nothing() {
+        let blurred = [(0.0, false), (0.1, true), (0.2, false), (0.3, true)].map(|(stamp, lost)| outcome(stamp, lost));
+        let loss = after(blurred);
+        assert_eq!((loss.frames_searched(), loss.recently_recovered()), (None, false));
+        let silent = (0..20).map(|frame| FrameOutcome { silent: true, ..outcome(f64::from(frame), true) });
+        assert_eq!(after(silent).frames_searched(), None);
+    }
+
+    #[test]
+    fn a_body_that_is_back_is_monitored_for_a_while_and_one_that_is_degraded_is_not_back() {
+        let lost = [0.1, 0.2].map(|stamp| outcome(stamp, true));
+        let back = |stamp| after(lost.into_iter().chain([outcome(0.3, false), outcome(stamp, false)]));
+        assert!(back(0.4).recently_recovered() && back(0.4).frames_searched().is_none());
+        assert!(!back(0.3 + NEW_TRACK_AGE).recently_recovered());
+        let degraded = FrameOutcome { tracked: false, ..outcome(0.3, false) };
+        assert_eq!(after(lost.into_iter().chain([degraded])).frames_searched(), Some(0));
+    }
+}
