@@ -1,7 +1,7 @@
 """How many color cameras it takes: a recording of pictures, tracked by all of its cameras, by all but one, by two and by one.
 
-    python examples/color_cameras.py ../shared/data/pose2sim
-    python examples/color_cameras.py ../shared/data/multiview/mv_d1_walk_turn_cmu --pairs
+    python lab/experiments/color_cameras.py ../shared/data/pose2sim
+    python lab/experiments/color_cameras.py ../shared/data/multiview/mv_d1_walk_turn_cmu --pairs
 
 Prints a row for each choice: mean error of twelve joints against the recording's truth (at the best lag against a triangulation),
 share within 10 cm, share of frames called lost, and user time of a frame. Without a truth the errors are nan.

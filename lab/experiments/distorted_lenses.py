@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Is a depth camera with a distorting lens as good as a rectified one?
 
-    python lab/distorted_lenses.py --recordings ../shared/data/rendered --out target/lenses
+    python lab/experiments/distorted_lenses.py --recordings ../shared/data/rendered --out target/lenses
 
 Two kinds of sequences with exact truth are tracked by depth alone, through a pinhole and through a plumb-bob, a rational and a
 fisheye lens that show as much of the scene:
