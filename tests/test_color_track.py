@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 import color_scene as scene
 from bag_writer import write_bag
-from ik_cases import load_example
 from voodoo.cli import app
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import start_tracker
@@ -183,9 +182,3 @@ def test_the_front_end_hands_over_pinhole_pictures_with_their_own_stamps(bag, mo
             assert not about["camera"].distorted
             np.testing.assert_allclose(about["world_from_sensor"], scene.pose(n), atol=1e-9)
     assert json.loads((bag / "init.json").read_text())["height_m"] == 1.75
-
-
-def test_the_example_reports_how_many_cameras_it_takes(films, capsys):
-    means = load_example("color_cameras").main(films)
-    assert list(means)[:2] == ["all", "without videos/cam0.avi"] and max(means.values()) < 0.04
-    assert capsys.readouterr().out.count(" cm ") == 5

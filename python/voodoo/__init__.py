@@ -1,4 +1,4 @@
-"""voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from what the robot has."""
+"""voodoo: the 3-D pose of a person, or any articulated body, every frame, on a plain CPU, from the sensors of the robot."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -47,7 +47,7 @@ _Points = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 @final
 class Camera:
-    """A camera as the core holds it; use voodoo.Camera."""
+    """A camera of the core; use voodoo.Camera."""
 
     def __new__(
         cls,
@@ -58,10 +58,10 @@ class Camera:
         coefficients: Sequence[float],
     ) -> Camera: ...
     def project(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Pixels (N, 2) of points (N, 3) in the camera's frame [m]; NaN where there is none."""
+        """Pixels (N, 2) of points (N, 3) in the camera frame [m]; NaN where a point has no pixel."""
 
     def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """x/z, y/z (N, 2) of pixels (N, 2); NaN where the lens puts nothing."""
+        """x/z, y/z (N, 2) of pixels (N, 2); NaN where the lens model has no ray for the pixel."""
 
     def rays(self) -> npt.NDArray[np.float32]:
         """x/z, y/z (height, width, 2) of all pixels."""
@@ -77,39 +77,42 @@ def render_depth(
     camera: _Camera,
     world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int16]]:
-    """Depth (height, width) [m], 0 where nothing is seen, and index of the limb, -1 for none; see voodoo.render_depth."""
+    """Depth (height, width) [m], 0 where nothing is visible, and index of the limb, -1 for none; see voodoo.render_depth."""
 
 def nearest_surface(
     pixels: npt.NDArray[np.float64], depths: npt.NDArray[np.float64], *, pixel: tuple[float, float], radius: float
 ) -> float | None:
-    """Depth of the nearest surface around a place in a picture [m], None with fewer than three points there.
+    """Depth of the nearest surface around a pixel of an image [m]; None with fewer than three points there.
 
     Args:
-        pixels: (N, 2) where points are seen.
-        depths: (N,) [m].
-        pixel: the place (u, v).
-        radius: of what is looked at [px].
+        pixels: (N, 2) of the points in the image.
+        depths: (N,) of the points [m].
+        pixel: the pixel (u, v).
+        radius: of the neighborhood whose points are used [px].
 
     Raises:
-        MeasurementError: other shapes.
+        MeasurementError: arrays of other shapes.
     """
 
 def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Pairs (row, column) of finite costs (N, M) with the least sum, every row or every column once, by rows."""
+    """Pairs (row, column) that minimize the sum of finite costs (N, M), ordered by row.
+
+    Every row is assigned once if N <= M, else every column.
+    """
 
 @final
 class BodyView:
-    """What a depth camera saw of the body, in the picture of a color camera beside it.
+    """Depth measurements near the body, registered to the image of a color camera beside the depth camera.
 
     Args:
-        mask: (H, W) of the picture: True where something near the body was seen, or where the depth camera does not look.
-        pixels: (N, 2) of the points in the picture.
+        mask: (H, W) of the image: True where a point near the body was measured, or outside the depth camera's field of view.
+        pixels: (N, 2) of the points in the image.
         depths: (N,) of the points along the color camera's optical axis [m].
-        still: (N,) whether nothing behind a point was ever seen there: it may be the scene. None: not known.
-        before: (H, W) of the picture: True where something is before what was seen there once. None: not known.
+        still: (N,) whether no surface behind a point was ever observed, so that it may be the scene. None: not known.
+        before: (H, W) of the image: True where a surface lies in front of one observed earlier. None: not known.
 
     Raises:
-        MeasurementError: shapes that do not belong together.
+        MeasurementError: arrays whose shapes do not match.
     """
 
     def __new__(
@@ -133,10 +136,10 @@ class BodyView:
 
 @final
 class StillDepth:
-    """What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind
-    which nothing was ever seen. A table's edge does not become a hand.
+    """Candidates for the still scene of a static depth camera, so that a table's edge does not become a hand.
 
-    The surface of a person who has not moved yet looks the same, so this only tells what has moved.
+    A pixel is a candidate if its depth has not changed over some images and no surface behind it was ever observed. A person
+    who has not moved yet is a candidate too, so only a negative answer is certain: that pixel has changed.
     """
 
     def __new__(cls) -> StillDepth: ...
@@ -157,28 +160,29 @@ def body_view(
     margin: float,
     scene: StillDepth | None,
 ) -> BodyView:
-    """See voodoo.sensors.body_view.
+    """Registers a depth image near the body to a color image; see voodoo.sensors.body_view.
 
     Args:
-        depth: (H, W).
+        depth: (H, W) depth image.
         camera: its calibration.
         joints: (N, 3) of the body in the world [m].
         meters_per_unit: of `depth`.
         world_from_depth, color_from_depth: (4, 4).
         color_camera: calibration of the color camera.
-        beyond: where the depth camera does not look (H, W) at a distance from it [m], in the color picture.
-        reach: what is within so many rows and columns of a point belongs to it.
+        beyond: returns, for a distance from the depth camera [m], the pixels (H, W) of the color image outside the depth
+            camera's field of view.
+        reach: a point covers the pixels within this many rows and columns, to close gaps.
         step: every step-th row and column of the depth image is used.
         margin: enlargement of the box around the body [m].
-        scene: takes up the image.
+        scene: is updated with the image.
 
     Raises:
-        MeasurementError: shapes that do not belong together.
+        MeasurementError: arrays whose shapes do not match.
     """
 
 @final
 class SkinTeacher:
-    """What one camera's pictures taught of skin; see voodoo.sensors.skin."""
+    """The color and background models of skin of one camera; see voodoo.sensors.skin."""
 
     def __new__(cls) -> SkinTeacher: ...
     @property
@@ -200,7 +204,7 @@ class SkinTeacher:
 
 @final
 class SkinCue:
-    """Regions of skin in one camera's pictures, followed and named; see voodoo.sensors.skin."""
+    """The tracked skin regions of one camera and their assignment to sites; see voodoo.sensors.skin."""
 
     def __new__(
         cls,
@@ -241,7 +245,7 @@ class SkinCue:
 
 @final
 class KeypointLayout:
-    """A network's keypoints: of each site the keypoints with their shares, and its spread [m]."""
+    """The keypoint layout of a network: for each site its keypoints with weights, spread and depth behind the surface [m]."""
 
     def __new__(cls, parts: Sequence[tuple[str, Sequence[tuple[int, float]], float, float]]) -> KeypointLayout: ...
     def pixels(
@@ -276,7 +280,7 @@ class KeypointLayout:
 
 @final
 class SiteGate:
-    """Which measurements of sites are near enough to be believed; see voodoo.sensors.gating.SiteGate."""
+    """Gates around predicted sites that reject distant measurements; see voodoo.sensors.gating.SiteGate."""
 
     def __new__(cls, radius: float, growth: float, widest: float) -> SiteGate: ...
     def __copy__(self) -> SiteGate: ...
@@ -285,17 +289,17 @@ class SiteGate:
 
 @final
 class SiteRay:
-    """A site was seen on a ray.
+    """A ray on which a site was detected.
 
     Args:
         site: its name.
         origin: focal point (3,) in the world [m].
         direction: (3,) unit vector in the world.
-        sigma: standard deviation across the ray at the site [m].
+        sigma: standard deviation perpendicular to the ray at the site [m].
         source: name for `Estimate.sources`.
         trust: factor of its weight, in [0, 1].
-        bias: it may always be this far off [m]; see `Frame.add_position`.
-        place: (3,) where on the ray the site is [m], if a depth camera saw it; None: not known.
+        bias: greatest systematic error [m]; see `Frame.add_position`.
+        place: (3,) position of the site on the ray [m], if a depth camera measured it; None: not known.
         place_sigma: standard deviation of `place` along the ray [m].
     """
 
@@ -322,7 +326,7 @@ class SiteRay:
         """(3,) unit vector in the world."""
     @property
     def sigma(self) -> float:
-        """Standard deviation across the ray at the site [m]."""
+        """Standard deviation perpendicular to the ray at the site [m]."""
     @property
     def source(self) -> str:
         """Name for `Estimate.sources`."""
@@ -331,17 +335,17 @@ class SiteRay:
         """Factor of its weight, in [0, 1]."""
     @property
     def bias(self) -> float:
-        """It may always be this far off [m]."""
+        """Greatest systematic error [m]."""
     @property
     def place(self) -> npt.NDArray[np.float64] | None:
-        """(3,) where on the ray the site is [m], if a depth camera saw it; None: not known."""
+        """(3,) position of the site on the ray [m], if a depth camera measured it; None: not known."""
     @property
     def place_sigma(self) -> float:
         """Standard deviation of `place` along the ray [m]."""
     def moved(self, shift: npt.ArrayLike) -> SiteRay:
-        """The ray of a site that has gone on by (3,) [m] since it was seen."""
+        """Returns the ray of a site that has moved by (3,) [m] since it was detected."""
     def trusted(self, trust: float) -> SiteRay:
-        """The ray with another trust."""
+        """Returns the ray with another trust."""
 
 def carried(
     points: _Points,
@@ -350,30 +354,30 @@ def carried(
     elapsed: float,
     world_from_sensor: npt.NDArray[np.float64] | None = None,
 ) -> npt.NDArray[np.float64] | None:
-    """Where points (N, 3) are that were measured some time before the next frame, those on a limb moved on with it.
+    """Extrapolates points (N, 3) that were measured some time before the next frame: points on a limb move with it.
 
     Args:
         points: (N, 3) [m].
-        tracker: who follows the body.
+        tracker: the tracker of the body.
         elapsed: time from the measurement to the frame [s].
         world_from_sensor: pose of the sensor in whose frame the points are; None: they are in the world.
 
     Returns:
-        (N, 3), or None where nothing moves: too little time has passed, or the body's motion is not known.
+        (N, 3), or None if no point moves: too little time has passed, or the body's motion is not known.
     """
 
 def body_before(
     tracker: Tracker | tuple[People, int], sites: npt.NDArray[np.float64], camera: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    """Length of body (N,) [m] between places (N, 3) and a camera (3,); see voodoo.Tracker.body_before."""
+    """Length (N,) [m] within the body of the lines from positions (N, 3) to a camera (3,); see voodoo.Tracker.body_before."""
 
 def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[str, npt.NDArray[np.float64]]:
-    """Site name -> (3,) where it is expected at a time [m]; see voodoo.Tracker.predict."""
+    """Site name -> predicted position (3,) [m] at a time; see voodoo.Tracker.predict."""
 
 def _estimate(
     head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...], spread: tuple[Any, ...] | None = None
 ) -> Estimate:
-    """An estimate of what pickle and copy keep of it; earlier ones kept no `spread`."""
+    """Restores an estimate from its pickled state; `spread` (the covariances) may be missing in older pickles."""
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""
@@ -413,7 +417,7 @@ class TaperedEllipticCylinder:
             MeasurementError: not three finite numbers.
         """
     def closest_points(self, points: _Points) -> ClosestPoints:
-        """Closest surface points of many points (N, 3) [m] in the limb frame, by the tracker's SIMD kernel.
+        """Closest surface points of many points (N, 3) [m] in the limb frame, with the tracker's SIMD kernel.
 
         Raises:
             MeasurementError: wrong shape or dtype, or points that are not finite.
@@ -423,7 +427,7 @@ class TaperedEllipticCylinder:
 
 @final
 class ClosestPoints:
-    """Closest points (N, 3), outward normals (N, 3), signed distances (N,) and regions (N,), see REGIONS."""
+    """Closest points (N, 3), outward normals (N, 3), signed distances (N,) and regions (N,) of the surface, see REGIONS."""
 
     @property
     def points(self) -> npt.NDArray[np.float32]: ...
@@ -436,7 +440,7 @@ class ClosestPoints:
 
 @final
 class Body:
-    """A body as the core holds it; use voodoo.Body."""
+    """A body of the core; use voodoo.Body."""
 
     def __new__(cls, name: str, limbs: Sequence[Any], sites: Sequence[Any]) -> Body: ...
     def __getnewargs__(self) -> tuple[str, list[Any], list[Any]]: ...
@@ -451,11 +455,11 @@ class Body:
 class Frame:
     """All measurements of one instant, from any number of sensors.
 
-    Arrays are referenced, not copied (unless they are not contiguous): leave them unchanged until the step. Names of limbs
-    and sites, weights, finiteness and the stamp are checked by the step, which refuses the whole frame.
+    Contiguous arrays are referenced, not copied: leave them unchanged until the step. Names of limbs and sites, weights,
+    finiteness and the stamp are checked by the step. If one of them is invalid, the step rejects the whole frame.
 
     Args:
-        stamp: time [s] by any clock; every step's is after the last one's.
+        stamp: time [s] of any clock; it must increase from step to step.
     """
 
     def __new__(cls, stamp: float) -> Frame: ...
@@ -472,14 +476,14 @@ class Frame:
         on_body: bool = False,
         source: str = "points",
     ) -> None:
-        """Add 3-D points (N, 3) [m] in the sensor's frame (K06 IV-A, first three kinds).
+        """Add 3-D points (N, 3) [m] in the sensor frame (K06 IV-A, first three kinds).
 
-        Far from the world's origin (map coordinates) float32 has no digits left for a body: give points in the sensor's frame.
+        Far from the world's origin (map coordinates) float32 is too coarse for a body: pass points in the sensor frame.
 
         Args:
             points: float32 or float64, finite; no masked array.
             world_from_sensor: rigid (4, 4); identity by default.
-            weight: weight of each point, above zero; a larger one costs no time.
+            weight: weight of each point, above zero; it does not affect the computation time.
             limb: the points are known to be on this limb.
             on_body: the points are known to be on the body; not needed with `limb`.
             source: name for the report in `Estimate.sources`.
@@ -500,11 +504,11 @@ class Frame:
         """Add an organized depth image: depth along the optical axis (z, not range).
 
         Args:
-            image: (height, width) uint16 or float32; 0, negative or not finite where nothing returned; no masked array.
+            image: (height, width) uint16 or float32; 0, negative or not finite where there is no return; no masked array.
             camera: its calibration, a voodoo.Camera of the same size.
-            meters_per_unit: of the image. The default is that of uint16 in millimeters; an image in meters needs 1.0.
+            meters_per_unit: of the image. The default is for uint16 in millimeters; an image in meters needs 1.0.
             world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
-            weight: weight of each pixel, above zero; a larger one costs no time.
+            weight: weight of each pixel, above zero; it does not affect the computation time.
             source: name for the report in `Estimate.sources`.
 
         Raises:
@@ -519,15 +523,17 @@ class Frame:
         stamp: float | None = None,
         source: str = "color",
     ) -> None:
-        """Add a color or gray picture: Tracker fits the body's contour to its regions, People tells persons apart by clothes.
+        """Add a color or gray image.
+
+        Tracker fits the body's contour to its color regions; People distinguishes persons by the colors of their clothes.
 
         Args:
             image: (height, width, 3) uint8, channels in any order that is the same in all frames, or (height, width) uint8.
-            camera: its calibration, a voodoo.Camera of the same size; Tracker refuses one with distortion: undistort first.
+            camera: its calibration, a voodoo.Camera of the same size; Tracker rejects one with distortion: undistort first.
             world_from_sensor: rigid (4, 4) pose of the optical frame (x right, y down, z forward); identity by default.
-            stamp: when the picture was taken [s], within 0.25 s of the frame's; the frame's by default.
-            source: name of the camera, the same in every frame: what is learned of colors goes by it, and the report in
-                `Estimate.sources`.
+            stamp: when the image was taken [s], within 0.25 s of the frame's stamp, which is the default.
+            source: name of the camera, the same in every frame: the learned colors are stored under it, and it names the
+                report in `Estimate.sources`.
 
         Raises:
             MeasurementError: wrong shape or dtype, no calibration, or no rigid transform.
@@ -546,9 +552,9 @@ class Frame:
         Args:
             site: one of `Body.site_names`.
             position: (3,) [m].
-            weight: above zero; 20 is that of a datum good to 2.2 cm, see voodoo.sensors.model.
-            bias: it may always be so far off [m]: within that distance of the site it says nothing, beyond, its force is that
-                of the rest of the distance.
+            weight: above zero; 20 corresponds to a standard deviation of 2.2 cm, see voodoo.sensors.model.
+            bias: greatest systematic error [m]. Within that distance of the site the measurement has no effect; beyond it, only
+                the excess distance counts as residual.
             source: name for the report in `Estimate.sources`.
 
         Raises:
@@ -564,12 +570,12 @@ class Frame:
         bias: float = 0.0,
         source: str = "rays",
     ) -> None:
-        """Add a ray in the world on which a named site was seen (2-D point-to-line relation).
+        """Add a ray in the world on which a named site was detected (2-D point-to-line relation).
 
         Args:
             site: one of `Body.site_names`.
             origin: (3,) [m] where it starts, the focal point of the camera.
-            direction: (3,) where it goes, of any length.
+            direction: (3,) its direction, of any length.
             weight, bias, source: as in `add_position`.
 
         Raises:
@@ -579,7 +585,7 @@ class Frame:
         self, rays: Sequence[SiteRay], *, reference_sigma: float, max_weight: float, min_trust: float
     ) -> int: ...
     def set_ground(self, *, normal: Sequence[float] | npt.NDArray[np.float64], offset: float = 0.0) -> None:
-        """Tell the floor: free points p with normal . p < offset + Config.ground_clearance are background.
+        """Set the ground plane: free points p with normal . p < offset + Config.ground_clearance are background.
 
         Args:
             normal: (3,) unit vector upwards, in the world.
@@ -591,40 +597,40 @@ class Frame:
     def exclude(
         self, low: Sequence[float] | npt.NDArray[np.float64], high: Sequence[float] | npt.NDArray[np.float64]
     ) -> None:
-        """Leave out a box of the world: nothing in it belongs to anybody (the robot's own arm, a coat stand).
+        """Exclude a box of the world that contains no person (the robot's own arm, a coat stand).
 
-        Free points and depth pixels in it are neither matched nor searched; named sites and points of a limb are not touched.
+        Free points and depth pixels in it are neither matched nor searched; named sites and points of a limb are not affected.
 
         Args:
             low: (3,) the corner with the least coordinates [m], in the world.
             high: (3,) the other corner [m].
 
         Raises:
-            MeasurementError: not three numbers; the step refuses corners that are not finite or in the wrong order.
+            MeasurementError: not three numbers; the step rejects corners that are not finite or in the wrong order.
         """
 
 @final
 class PersonCandidate:
-    """What may be a person in a depth image, with the picture of it that the network looks at. Camera frame, meters."""
+    """A person candidate in a depth image, with the crop that is the network's input. Camera frame, meters."""
 
     @property
     def crop(self) -> npt.NDArray[np.float32]:
-        """The picture (2, 96, 96): depth behind the middle by 1.2 m from -1 to 1, and the mask."""
+        """Input of the network (2, 96, 96): depth relative to the center, scaled so that +-1.2 m is +-1, and the mask."""
     @property
     def mask(self) -> npt.NDArray[np.bool_]:
-        """Its pixels (H, W)."""
+        """Its pixels (H, W) in the depth image."""
     @property
     def middle(self) -> tuple[float, float, float]:
-        """The picture's middle: (x/z, y/z) in the turned camera, and the depth [m]."""
+        """Center of the crop: (x/z, y/z) in the camera rotated by `roll`, and the depth [m]."""
     @property
     def roll(self) -> float:
-        """Angle by which the camera is turned about its optical axis for up to be up [rad]."""
+        """Rotation of the camera about its optical axis that makes the vertical point up in the image [rad]."""
     @property
     def area(self) -> float:
-        """Surface seen [m^2]."""
+        """Visible surface area [m^2]."""
     @property
     def floor(self) -> tuple[tuple[float, float, float], float] | None:
-        """Normal and offset of the floor, told or found."""
+        """Normal and offset of the ground plane, given or detected."""
 
 def person_candidates(
     depth: npt.NDArray[np.float32],
@@ -634,25 +640,25 @@ def person_candidates(
     floor: tuple[Sequence[float], float] | None = None,
     most: int = 8,
 ) -> list[PersonCandidate]:
-    """What may be a person in a depth image (H, W) [m]: what training cuts its pictures with.
+    """Person candidates in a depth image (H, W) [m]; training uses this function to crop its images.
 
     Args:
         depth: float32, 0 or NaN means no return.
         camera: its calibration.
         up: unit vector upwards in the camera's optical frame; None means upwards in the image.
-        floor: its unit normal and offset in that frame, normal . p = offset; None means that it is looked for.
-        most: so many are returned, those of a standing person's size first.
+        floor: unit normal and offset of the ground plane in that frame, normal . p = offset; None means that it is detected.
+        most: greatest number returned; candidates of a standing person's size come first.
 
     Raises:
-        MeasurementError: not such an array.
+        MeasurementError: an array of another type or shape.
     """
 
 @final
 class Detector:
-    """Finds people in depth images, with a small network that comes with the library.
+    """Detects people in depth images with a small network that ships with the library.
 
     Args:
-        weights: path of another network's weights, as training/ exports them; None means those that come with the library.
+        weights: path of another network's weights, as training/ exports them; None means those that ship with the library.
 
     Raises:
         MeasurementError: a file that holds no such weights.
@@ -660,13 +666,13 @@ class Detector:
 
     def __new__(cls, *, weights: str | os.PathLike[str] | None = None) -> Detector: ...
     def detect(self, frame: Frame, *, up: Sequence[float] | npt.NDArray[np.float64] | None = None) -> list[Detection]:
-        """The people in the depth images of a frame, the surest first.
+        """Returns the people in the depth images of a frame, in order of decreasing confidence.
 
-        Floor and boxes to leave out are those of the frame; what else it holds is not looked at. Releases the GIL.
+        Uses the ground plane and the excluded boxes of the frame and ignores its other measurements. Releases the GIL.
 
         Args:
             frame: with at least one depth image.
-            up: (3,) unit vector upwards in the world, where the frame tells no floor; None means upwards in the image.
+            up: (3,) unit vector upwards in the world, used if the frame has no ground plane; None means upwards in the image.
 
         Raises:
             MeasurementError: a measurement that cannot be used.
@@ -684,43 +690,43 @@ class Detection:
         """Joint name -> standard deviation along each axis [m]."""
     @property
     def visible(self) -> dict[str, float]:
-        """Joint name -> probability that it is in the image and not hidden."""
+        """Joint name -> probability that it is in the image and not occluded."""
     @property
     def lengths(self) -> dict[str, float]:
         """Upper arm, forearm, thigh, shank, shoulder and hip width, trunk, neck and stature [m]."""
     @property
     def length_sigma(self) -> dict[str, float]:
-        """The same names -> standard deviation [m]."""
+        """Names as in `lengths` -> standard deviation [m]."""
     @property
     def stature(self) -> float:
         """Height of the person when standing upright [m]."""
     @property
     def facing(self) -> float:
-        """Probability that the front of the trunk shows."""
+        """Probability that the front of the trunk faces the camera."""
     @property
     def confidence(self) -> float:
         """Probability that it is a person."""
     @property
     def source(self) -> str:
-        """The depth image it was found in."""
+        """Source name of the depth image in which it was detected."""
     @property
     def mask(self) -> npt.NDArray[np.bool_]:
-        """The pixels (H, W) of that image that show it."""
+        """The person's pixels (H, W) in that image."""
     @property
     def floor(self) -> tuple[tuple[float, float, float], float] | None:
-        """The floor as the image shows it, or as the frame gave it: unit normal (3,) upwards and height along it [m]; or None."""
+        """Ground plane, detected or given by the frame: unit normal (3,) upwards and height along it [m]; or None."""
 
 @final
 class Estimate:
-    """What a step found; immutable. World frame, meters, seconds."""
+    """The result of a step; immutable. World frame, meters, seconds."""
 
     @property
     def stamp(self) -> float:
         """Time of the frame [s]; NaN after a reset and before the first one."""
     @property
     def status(self) -> str:
-        """tracking, degraded (more than a quarter of the limbs not measured) or lost (hardly anything is measured,
-        or what is seen there is flat), or searching (there is no pose: nobody was found)."""
+        """One of four words: tracking; degraded (more than a quarter of the limbs are not measured); lost (hardly any limb is
+        measured, or the measured surface is flat); searching (there is no pose, because no person was detected)."""
     @property
     def steps(self) -> int:
         """ICP steps used."""
@@ -750,25 +756,25 @@ class Estimate:
         """Pose (4, 4) of every limb."""
     @property
     def limb_status(self) -> Mapping[str, str]:
-        """What the frame says about every limb: "measured", "inferred" (hidden, out of view, or nothing seen that another
-        limb would not explain as well: carried by joints and prediction) or "lost" (it should show where it is, and does
-        not)."""
+        """Status of every limb in the frame: "measured"; "inferred" (occluded, out of view, or without points that another limb
+        would not explain as well, so that its pose follows from joints and prediction); or "lost" (it should be visible at its
+        estimated pose, but is not)."""
     @property
     def covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame."""
     @property
     def joint_covariances(self) -> npt.NDArray[np.float64]:
-        """The same as an array (J, 3, 3) in the order of joint_names."""
+        """The covariances of `covariance` as an array (J, 3, 3) in the order of joint_names."""
     @property
     def joint_sigma(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Standard deviation (3,) [m] of every joint's and site's x, y and z in the world."""
     @property
     def limb_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
-        """Covariance (6, 6) of the pose of every limb: x, y, z [m], then turns about the world's x, y, z [rad] through the
-        origin of the limb's frame, as in geometry_msgs/PoseWithCovariance."""
+        """Covariance (6, 6) of the pose of every limb: x, y, z [m], then rotations about the world's x, y, z [rad] through the
+        origin of the limb frame, as in geometry_msgs/PoseWithCovariance."""
     @property
     def angle_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
-        """Covariance (3, 3) [rad^2] of the turn of every joint about the world's axes."""
+        """Covariance (3, 3) [rad^2] of the rotation of every joint about the world's axes."""
     @property
     def length_sigma(self) -> Mapping[str, float]:
         """Standard deviation of every limb's length [m]; NaN where lengths are not refined."""
@@ -786,7 +792,7 @@ class Estimate:
         """Distance between the two halves of every joint [m]."""
     @property
     def sources(self) -> Mapping[str, tuple[int, int, float]]:
-        """What each source gave: candidates, those that matched, root of their mean squared distance [m]."""
+        """For each source: number of candidates, number of matched ones, root of their mean squared distance [m]."""
 
 @final
 class Tracker:
@@ -825,7 +831,7 @@ class Tracker:
 
 @final
 class People:
-    """Several persons as the core follows them; use voodoo.People."""
+    """The multi-person tracker of the core; use voodoo.People."""
 
     def __new__(
         cls,
@@ -849,7 +855,7 @@ class People:
 
 @final
 class View:
-    """A silhouette as the core holds it; use voodoo.ik.Silhouette."""
+    """A silhouette of the core; use voodoo.ik.Silhouette."""
 
     def __new__(
         cls,
@@ -863,7 +869,7 @@ class View:
 
 @final
 class Chain:
-    """A kinematic chain as the core holds it; use voodoo.ik.Chain."""
+    """A kinematic chain of the core; use voodoo.ik.Chain."""
 
     def __new__(cls, body: Body, limbs: Sequence[str], free_root: bool) -> Chain: ...
     @property

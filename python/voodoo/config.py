@@ -66,7 +66,7 @@ class Config(ConfigFields, frozen=True):
 
     @classmethod
     def from_toml(cls, text: str, *, source: str = "configuration") -> Config:
-        """A configuration from TOML text; keys that are not there keep their defaults."""
+        """A configuration from TOML text; missing keys keep their defaults."""
         values = parse_toml(text, source=source, error=ConfigError)
         try:
             return cls(**values)
@@ -108,7 +108,7 @@ class Config(ConfigFields, frozen=True):
 
     @classmethod
     def words(cls, key: str) -> tuple[str, ...]:
-        """The words an entry can be; empty for one that is a number or a switch, or unknown."""
+        """The words that an entry can be; empty if it is a number, a switch, or unknown."""
         return tuple(_FIELDS[key][4]) if key in _FIELDS else ()
 
     def values(self) -> dict[str, float | int | bool | str]:

@@ -13,7 +13,7 @@ class VoodooError(ValueError):
 
 
 class CameraError(VoodooError):
-    """A camera model whose numbers cannot be meant: it names the field, what was expected and what was found."""
+    """A camera model with implausible numbers: it names the field, what was expected and what was found."""
 
 
 class BodyError(VoodooError):
@@ -25,38 +25,38 @@ class ConfigError(VoodooError):
 
 
 class MeasurementError(VoodooError):
-    """A measurement or an initial pose the tracker refuses; the tracker is unchanged."""
+    """A measurement or an initial pose that the tracker rejects; the tracker is unchanged."""
 
 
 class RecordingError(VoodooError):
     """A recording that cannot be read: it names the file, what was expected and what was found.
 
     Attributes:
-        reason: the kind of damage in a few words, to count what is left out.
-        hint: lines that help, e.g. a template of a missing file; "" without.
+        reason: the kind of damage in a few words, used to count left-out measurements.
+        hint: helpful lines, e.g. a template of a missing file; "" if there are none.
     """
 
     def __init__(self, message: str, *, reason: str = "that cannot be read", hint: str = "") -> None:
-        """Keep the words."""
+        """Store the message, reason and hint."""
         super().__init__(message)
         self.reason, self.hint = reason, hint
 
 
 class DetectorWarning(UserWarning):
-    """A detector failed: the tracker's step went on without it. It names the exception."""
+    """A detector failed, and the tracker's step continued without it. The warning names the exception."""
 
 
 @contextmanager
 def reading(source: object, expected: str, *, error: type[VoodooError] = RecordingError) -> Iterator[None]:
-    """Turn whatever a parser throws inside the block into one error: the one place where that is done.
+    """Convert any exception that a parser raises inside the block to one error. All parsers use this function.
 
-    Decoders of damaged files fail in many ways (struct.error, KeyError, zlib.error, AssertionError, MemoryError...);
-    the caller needs one. Errors that are already clear pass unchanged.
+    Decoders of damaged files raise many kinds of exceptions (struct.error, KeyError, zlib.error, AssertionError,
+    MemoryError...); the caller needs a single one. Errors of this package pass unchanged.
 
     Args:
         source: file, or file and topic, being read.
         expected: what should have been there, e.g. "a readable ROS 2 bag".
-        error: what to raise.
+        error: class of the error to raise.
 
     Raises:
         VoodooError: of the class `error`, for any other Exception raised in the block.
@@ -75,12 +75,12 @@ def reading(source: object, expected: str, *, error: type[VoodooError] = Recordi
 
 
 def shortened(text: str, *, most: int = 300) -> str:
-    """A text for a message: what a file holds may be megabytes."""
+    """Shortened text for a message, since content of a file may have megabytes."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Path:
-    """A path that a caller gave, `~` expanded.
+    """A path given by the caller, with `~` expanded.
 
     Args:
         path: what was given.
@@ -88,7 +88,7 @@ def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Pat
         name: of the argument.
 
     Raises:
-        VoodooError: of the class `error`: no path, a home of nobody, or a NUL within; it names the argument.
+        VoodooError: of the class `error`: not a path, the home of an unknown user, or a NUL inside; it names the argument.
     """
     if not isinstance(path, str | PathLike) or not isinstance(fspath(path), str):
         raise error(f"{name}: expected a file or folder, found {type(path).__name__}")
@@ -102,7 +102,7 @@ def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Pat
 
 
 def utf8_name(path: Path, *, error: type[VoodooError] = VoodooError) -> str:
-    """The name of a file for OpenCV, which dies of one that is not UTF-8.
+    """The name of a file for OpenCV, which crashes on a name that is not UTF-8.
 
     Raises:
         VoodooError: of the class `error`, for such a name.

@@ -1,4 +1,4 @@
-"""What the sensors of a recording measured, each with its own stamp and its pose in the root frame."""
+"""Measurements of the sensors of a recording, each with its own stamp and sensor pose in the root frame."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class LaserScan:
     def points(self) -> FloatArray:
         """Valid returns as (N, 3) points [m] in the laser's frame (z = 0), in the order of the rays."""
         ranges = self.ranges.astype(np.float64)
-        # What is not finite fails a comparison, or is beyond every range.
+        # Values that are not finite fail a comparison or exceed every range.
         valid = (ranges >= self.range_min) & (ranges <= min(self.range_max, _LARGEST))
         return ranges[valid, None] * _beams(self.angle_min, self.angle_increment, len(ranges))[valid]
 
@@ -100,12 +100,12 @@ def _beams(angle_min: float, angle_increment: float, count: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ColorImage:
-    """A color image, decoded when `image` is first asked for.
+    """A color image, decoded at the first access to `image`.
 
     Args:
         sensor: topic or folder it came from.
         stamp: time of measurement [s].
-        decode: gives the (H, W, 3) BGR uint8 image; called once at most.
+        decode: returns the (H, W, 3) BGR uint8 image; called at most once.
         camera: calibration.
         root_from_sensor: (4, 4) from the optical frame to the recording's root frame.
     """
@@ -121,7 +121,7 @@ class ColorImage:
         """The image, (H, W, 3) BGR uint8.
 
         Raises:
-            RecordingError: the stored picture is damaged or its size is not the camera's.
+            RecordingError: the stored image is damaged or its size differs from the camera's.
         """
         return self.decode()
 
@@ -132,13 +132,13 @@ class ColorImage:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class KeypointImage:
-    """What a 2-D keypoint network saw in one image.
+    """Detections of a 2-D keypoint network in one image.
 
     Args:
         sensor: name of the camera.
         stamp: time of measurement [s].
-        people: one (K, 3) array of (u, v, confidence) for each person found, in pixels of the distorted image.
-        layout: which keypoints these are, a name in voodoo.sensors.keypoints.LAYOUTS.
+        people: one (K, 3) array of (u, v, confidence) for each detected person, in pixels of the distorted image.
+        layout: name of the keypoint layout in voodoo.sensors.keypoints.LAYOUTS.
         camera: calibration.
         root_from_sensor: (4, 4) from the optical frame to the recording's root frame.
     """
@@ -177,7 +177,7 @@ class MarkerSet:
 
 
 class Measurement(Protocol):
-    """What every measurement has: all of the above, and those that other adapters bring, are frozen dataclasses with it."""
+    """Attributes of every measurement. The classes above and those of other adapters are frozen dataclasses with them."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -192,11 +192,11 @@ class Measurement(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RecordedFrame:
-    """One step of a recording: the measurement that gives the frame its stamp and what came since the previous one.
+    """One step of a recording: the measurement that defines the frame, and the others since the previous frame.
 
     Args:
-        stamp: [s], that of the measurement the frame was made for.
-        measurements: in the order of arrival, that one last.
+        stamp: [s], that of the measurement that defines the frame.
+        measurements: in the order of arrival; the defining one is last.
     """
 
     stamp: float

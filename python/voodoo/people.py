@@ -1,4 +1,4 @@
-"""Several persons at once, each with a number that lasts."""
+"""Tracking of several persons, each with a persistent number."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ __all__ = ["Followed", "People", "PeopleEstimate", "Person"]
 
 @dataclass(frozen=True)
 class Person:
-    """One of those who are there.
+    """A person who is present.
 
     Args:
-        id: their number, from 1; whoever comes back has the same.
-        estimate: their pose.
+        id: number from 1; a person who comes back has the same number.
+        estimate: pose of the person.
     """
 
     id: int
@@ -33,17 +33,17 @@ class Person:
 
     @property
     def status(self) -> str:
-        """That of the estimate: tracking, degraded, or lost (hidden, or about to be given up: the pose is carried)."""
+        """Status of the estimate: tracking, degraded, or lost (hidden, or about to be pruned: the pose is extrapolated)."""
         return self.estimate.status
 
 
 @dataclass(frozen=True)
 class PeopleEstimate:
-    """Everybody who is there.
+    """All persons who are present.
 
     Args:
         stamp: time of the frame [s].
-        persons: in the order in which they first came.
+        persons: in the order of their first appearance.
     """
 
     stamp: float
@@ -54,25 +54,25 @@ class PeopleEstimate:
         return iter(self.persons)
 
     def __len__(self) -> int:
-        """How many are there."""
+        """Number of persons."""
         return len(self.persons)
 
 
 class People:
-    """Follows everybody who comes, each with a number that lasts.
+    """Tracks all persons, each with a persistent number.
 
-    Nobody needs to say where they are: persons are found in depth images. A pixel belongs to the person whose surface explains
-    it. Who is hidden is carried, and who comes back has the same number where size, place, time and, with color pictures,
-    clothes agree.
+    No initial poses are needed: persons are detected in depth images. A pixel is assigned to the person whose surface explains
+    it. Hidden persons are extrapolated. A person who comes back gets the same number if size, position, time and, with color
+    images, clothes agree.
 
     Args:
-        body: what every new person gets a copy of; None: `Body.human(model="measured")`.
-        config: parameters; `threads` persons are followed side by side, with the same bits.
-        detector: finds persons in depth images, as for `Tracker`; with None only those are followed who are added.
-        limit: persons that are followed at the same time, at most; None: any number.
-        nearest: of more than `limit` those nearest to a depth camera are followed; else those who came first.
-        forget_after: who is away for longer is somebody new when they come back [s].
-        region: low and high corner [m] of a box of the world; who is outside is left out. None: everywhere.
+        body: body that is copied for every new person; None: `Body.human(model="measured")`.
+        config: parameters; `threads` persons are tracked in parallel, with bit-identical results.
+        detector: finds persons in depth images, as for `Tracker`; with None only persons passed to `add` are tracked.
+        limit: largest number of persons tracked at the same time; None: any number.
+        nearest: of more than `limit` persons those nearest to a depth camera are tracked; else those who came first.
+        forget_after: a person who was away for longer counts as new [s].
+        region: lower and upper corner [m] of a box in the world; persons outside are ignored. None: everywhere.
     """
 
     def __init__(
@@ -86,11 +86,11 @@ class People:
         forget_after: float = 60.0,
         region: tuple[Sequence[float], Sequence[float]] | None = None,
     ) -> None:
-        """Nobody is there yet.
+        """Start without persons.
 
         Raises:
             BodyError: `body` is not a Body.
-            ConfigError: a parameter that cannot be used, or no detector.
+            ConfigError: an invalid parameter, or `detector` is not a detector.
         """
         if body is not None and not isinstance(body, Body):
             raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
@@ -115,12 +115,12 @@ class People:
 
     @property
     def prototype(self) -> Body:
-        """What every new person gets a copy of."""
+        """Body that is copied for every new person."""
         return self._prototype
 
     @property
     def estimate(self) -> PeopleEstimate:
-        """The last one; at first with NaN as its stamp and nobody."""
+        """The last estimate; at first with NaN as its stamp and without persons."""
         return self._estimate
 
     @property
@@ -129,15 +129,16 @@ class People:
         return self._core.detector_failures
 
     def step(self, frame: Frame, *, own: Mapping[int, Frame] | None = None) -> PeopleEstimate:
-        """Everybody at the frame's time. Releases the GIL; after a refused frame all is as before.
+        """Estimate all persons at the time of the frame. Releases the GIL; a rejected frame leaves the state unchanged.
 
         Args:
-            frame: what all have in common: depth images, free points, color pictures, the floor. Whose it is, is found out.
-            own: number of a person -> points, positions and rays of this person alone, with the same stamp; their depth images
-                and color pictures are not looked at.
+            frame: shared measurements: depth images, free points, color images, the floor. They are assigned to persons by the
+                tracker.
+            own: person number -> frame with points, positions and rays of this person alone, with the same stamp; its depth
+                and color images are ignored.
 
         Raises:
-            MeasurementError: time not after the last frame, or a measurement that cannot be used.
+            MeasurementError: time not after the last frame, or an invalid measurement.
             BodyError: a frame names a limb or site that is not in the body.
         """
         wrong = sorted({other.stamp for other in (own or {}).values()} - {frame.stamp})
@@ -148,9 +149,9 @@ class People:
         return self._estimate
 
     def add(self, joints: Mapping[str, Sequence[float]], *, fit_sizes: bool = True) -> int:
-        """Follow somebody whose place is known; their number, which is that of who was lost or away and can have come there.
+        """Track a person at a known position. Returns its number: that of a matching lost or absent person, or a new one.
 
-        Who is seen in depth images need not be added.
+        Persons visible in depth images need not be added.
 
         Args:
             joints: site name -> (x, y, z) [m] in the world frame, as for `Tracker.reset`.
@@ -158,24 +159,24 @@ class People:
 
         Raises:
             BodyError: an unknown name, or an entry that is not three finite numbers.
-            MeasurementError: the positions do not fix the pose.
+            MeasurementError: the positions do not determine the pose.
         """
         return self._core.add(checked_joints(joints), fit_sizes)
 
     def only(self, *persons: int) -> None:
-        """Follow these numbers and nobody else from now on; without numbers, everybody again."""
+        """Track only these persons from now on; without numbers, track everybody again."""
         self._core.only(list(persons) or None)
 
     @property
     def needs_color(self) -> bool:
-        """Whether a color picture would tell something in the next frame; to decode it for nothing costs time."""
+        """Whether a color image would be used in the next frame, so that callers can avoid decoding it needlessly."""
         return self._core.needs_colors()
 
     def body(self, person: int) -> Body:
-        """The body of a person who is there, in their sizes.
+        """The body of a person who is present, with their sizes.
 
         Raises:
-            BodyError: nobody of this number is there.
+            BodyError: there is no person with this number.
         """
         core = self._core.body(person)
         if core is None:
@@ -185,26 +186,26 @@ class People:
 
 
 class Followed:
-    """One of those who are there, asked as a `Tracker` is; valid until the next step.
+    """One of the persons, with the query interface of a `Tracker`; valid until the next step.
 
     Args:
-        people: who follows them.
-        number: of the person.
+        people: the tracker of all persons.
+        number: number of the person.
     """
 
     def __init__(self, people: People, number: int) -> None:
-        """Ask `people` about somebody."""
+        """Store `people` and the number."""
         self._people = people
         self._number = number
 
     @property
     def _core(self) -> tuple[_core.People, int]:
-        """What the compiled core knows them by."""
+        """Identifier of the person in the compiled core."""
         return self._people._core, self._number
 
     @property
     def body(self) -> Body:
-        """The body in their sizes."""
+        """The body with the person's sizes."""
         return self._people.body(self._number)
 
     @property
@@ -212,7 +213,7 @@ class Followed:
         """The last estimate.
 
         Raises:
-            BodyError: they are not there.
+            BodyError: the person is not present.
         """
         found = self._people._core.estimate(self._number)
         if found is None:

@@ -1,4 +1,4 @@
-"""The tracker as Python holds it: names, defaults and validation around the compiled core."""
+"""Python interface of the tracker: names, defaults and validation around the compiled core."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from voodoo.model.joint import number_of
 
 
 class RegionLines(NamedTuple):
-    """Lines across the contours of limbs in one picture, and where their colors end; pixels.
+    """Search lines perpendicular to the contours of limbs in one image, and the color edges found on them; in pixels.
 
     Args:
         limbs: (N,) index in `Body.limb_names`.
-        places: (N, 2) where the contour of the posed body is seen.
+        places: (N, 2) pixels on the contour of the posed body.
         normals: (N, 2) unit vectors outward.
-        offsets: (N,) how far outward the edge of the colors lies.
-        sigmas: (N,) its standard deviation; infinite where the colors tell nothing.
+        offsets: (N,) outward distance from the contour to the color edge.
+        sigmas: (N,) its standard deviation; infinite if the colors give no evidence.
     """
 
     limbs: npt.NDArray[np.int64]
@@ -36,25 +36,26 @@ class RegionLines(NamedTuple):
 
 
 class Tracker:
-    """Follows one body through frames.
+    """Tracks one body through frames.
 
-    A tracker belongs to one thread at a time: while one steps, any other call to it raises RuntimeError. Different trackers
-    run side by side, since `step` releases the GIL. One with several threads of its own (`Config.threads`) is made in the
-    process that steps it: its threads do not survive a fork, and a step after one would wait for them for ever.
+    Use a tracker from one thread at a time: during a step, any other call to it raises RuntimeError. Different trackers can
+    run in parallel, since `step` releases the GIL. Create a tracker with several threads (`Config.threads`) in the process
+    that steps it: its threads do not survive a fork, and a step after a fork would wait for them forever.
 
     Args:
-        body: what to track, in its initial sizes.
-        config: parameters; the defaults are the measured ones.
-        detector: finds the body in depth images: without a pose, when it is lost, and when it is elsewhere than it is tracked.
-            "shipped" is the one that comes with the package and knows people, None is none; see `voodoo.detectors` for others.
+        body: body to track, with its initial sizes.
+        config: parameters; the defaults were tuned by measurements.
+        detector: finds the body in depth images: when there is no pose, when the body is lost, and when the tracked position is
+            wrong. "shipped" is the person detector that comes with the package; None disables detection. See
+            `voodoo.detectors` for others.
     """
 
     def __init__(self, body: Body, *, config: Config | None = None, detector: AnyDetector = "shipped") -> None:
-        """Make a tracker without a pose: `step` looks for somebody, `reset` puts the body where it is known to be.
+        """Make a tracker without a pose: `step` searches for a person, `reset` sets a known pose.
 
         Raises:
             BodyError: `body` is not a Body.
-            ConfigError: `config` is not a Config, or `detector` no detector.
+            ConfigError: `config` is not a Config, or `detector` is not a detector.
         """
         if not isinstance(body, Body):
             raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
@@ -78,7 +79,7 @@ class Tracker:
 
     @property
     def can_search(self) -> bool:
-        """Whether `step` looks for the body while there is no pose: there is a detector that knows it."""
+        """Whether `step` searches for the body while there is no pose, i.e. the detector supports this body."""
         return self._core.can_search
 
     @property
@@ -87,24 +88,24 @@ class Tracker:
         return self._core.detector_failures
 
     def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
-        """Set the pose, and the sizes, from positions of named joints and sites; time may start anew afterwards.
+        """Set the pose, and the sizes, from positions of named joints and sites; stamps may restart afterwards.
 
         Args:
-            joints: site name -> (x, y, z) [m] in the world frame. Any subset that fixes the pose: at least three
-                positions that do not lie on a line. Limbs the positions do not reach keep their rest orientation.
-            fit_sizes: also scale the body and stretch its limbs to the distances between the positions. What no body can be
-                is corrected: a limb far shorter than its pair, a knee or elbow far along a straight leg or arm, and with
-                the first depth image one arm or leg much longer than the other.
+            joints: site name -> (x, y, z) [m] in the world frame. Any subset that determines the pose: at least three
+                positions that are not collinear. Limbs without positions keep their rest orientation.
+            fit_sizes: also scale the body and stretch its limbs to the distances between the positions. Implausible
+                sizes are corrected: a limb much shorter than its counterpart, a knee or elbow too far along a straight leg
+                or arm, and with the first depth image one arm or leg much longer than the other.
 
         Raises:
             BodyError: an unknown name, or an entry that is not three finite numbers.
-            MeasurementError: the positions do not fix the pose, or with `fit_sizes` would make the body more than ten times
+            MeasurementError: the positions do not determine the pose, or with `fit_sizes` would make the body more than ten times
                 larger or smaller: they are not in meters. The tracker is unchanged.
         """
         return self._core._reset(checked_joints(joints), fit_sizes=fit_sizes)
 
     def search(self) -> None:
-        """Give up the pose and what was learned with it: from the next step on somebody is looked for, as in a new tracker."""
+        """Discard the pose and everything learned with it: the next step searches for a person, as in a new tracker."""
         self._core = _core.Tracker(self._initial.core, self.config.values(), self.detector)
         for source, images in self._backgrounds.items():
             self._core._set_background(source, images)
@@ -119,19 +120,19 @@ class Tracker:
         return self._core._reset_pose(ordered_poses(self.body, world_from_limb))
 
     def set_background(self, source: str, images: Sequence[npt.NDArray[np.uint8]]) -> None:
-        """Show the scene without anybody in it, as the color camera `source` sees it (`Frame.add_color`).
+        """Set images of the empty scene, as observed by the color camera `source` (`Frame.add_color`).
 
-        What a pixel shows then is compared with what it shows now; not needed, but it helps where clothes and scene have
-        one color. It stays over `reset` and `search`.
+        Each pixel is compared with its color in the empty scene. This is optional, but helps where clothes and scene have the
+        same color. The images are kept after `reset` and `search`.
 
         Args:
             source: name of the camera.
-            images: (height, width, 3) or (height, width) uint8 each, of the size and kind of the camera's pictures; none:
-                what was shown before is forgotten.
+            images: (height, width, 3) or (height, width) uint8 each, of the size and kind of the camera's images. An
+                empty sequence removes earlier images.
 
         Raises:
-            MeasurementError: pictures of another kind, or of different sizes. The next step refuses those of another size
-                than its own.
+            MeasurementError: images of another kind, or of different sizes. The next step rejects images whose size differs
+                from its own.
         """
         if not isinstance(source, str):
             raise MeasurementError(f"source: expected a name, found {type(source).__name__}")
@@ -140,49 +141,48 @@ class Tracker:
         self._backgrounds[source] = pictures
 
     def step(self, frame: Frame) -> Estimate:
-        """The pose at the frame's time. Releases the GIL; a refused frame leaves the tracker as it was.
+        """Estimate the pose at the time of the frame. Releases the GIL; a rejected frame leaves the tracker unchanged.
 
-        Without a pose a person is looked for in the frame's depth images. Where one is found the estimate is that of the body
-        in their sizes, else it has the status "searching" and no poses. A tracker that found the person itself goes back to
-        searching when they are gone for good.
+        Without a pose, the tracker searches for a person in the depth images of the frame. If one is found, the estimate is
+        that of the body with the person's sizes; else it has the status "searching" and no poses. A tracker that was
+        auto-initialized returns to searching when the person has left.
 
         Raises:
-            MeasurementError: time not after the last frame, a measurement that cannot be used, or no pose yet of a body that
-                is not looked for: `can_search` says so.
+            MeasurementError: time not after the last frame, an invalid measurement, or no pose yet and `can_search` is false.
             BodyError: the frame names a limb or site that is not in the body.
         """
         return self._core.step(_frame(frame))
 
     def region_lines(self, source: str) -> RegionLines:
-        """The lines of the last step in the picture of the color camera `source`; none where it gave no picture."""
+        """The search lines of the last step in the image of the color camera `source`; none if it had no image."""
         rows = self._core._region_lines(source).reshape(-1, 7)
         return RegionLines(rows[:, 0].astype(np.int64), rows[:, 1:3], rows[:, 3:5], rows[:, 5], rows[:, 6])
 
     def segment(
         self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None
     ) -> dict[str, npt.NDArray[np.float32]]:
-        """Which pixels of a frame's color pictures are the body, with a pose as the shape prior (R07 section 3.1).
+        """Segment the body in the color images of a frame, with a pose as the shape prior (R07 section 3.1).
 
-        Colors are those that were learned in steps, or by `learn_colors`; a camera that is new learns them at this pose first.
-        Nothing else changes.
+        Uses the colors learned in steps or by `learn_colors`; for a new camera they are first learned at this pose. Nothing else
+        changes.
 
         Args:
-            frame: with pictures; measurements of other kinds are not looked at.
-            world_from_limb: limb name -> rigid (4, 4); None: the pose of now.
+            frame: frame with images; measurements of other kinds are ignored.
+            world_from_limb: limb name -> rigid (4, 4); None: the current pose.
 
         Returns:
-            Name of the camera -> (height, width), how likely each pixel shows the body, 0 to 1.
+            Name of the camera -> (height, width), probability of each pixel to belong to the body, 0 to 1.
 
         Raises:
-            MeasurementError: no pose, or a picture that cannot be used.
+            MeasurementError: no pose, or an invalid image.
             BodyError: a limb is missing or unknown.
         """
         return self._core._segment(_frame(frame), self._ordered(world_from_limb))
 
     def learn_colors(self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None) -> None:
-        """Learn the colors of the body, and of what is around it, in a frame's pictures; steps do so by themselves.
+        """Learn the colors of the body and of its surroundings in the images of a frame; `step` does so by itself.
 
-        Args, Raises: as of `segment`.
+        Args, Raises: as for `segment`.
         """
         self._core._learn_colors(_frame(frame), self._ordered(world_from_limb))
 
@@ -190,9 +190,9 @@ class Tracker:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
 
     def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:
-        """Site name -> (3,) where it is expected at `stamp` [s], before or after the last frame [m].
+        """Site name -> predicted position (3,) [m] at `stamp` [s], before or after the last frame.
 
-        The last estimate moved on by the share of its motion that is expected to go on, `Config.prediction`.
+        Extrapolates the last estimate with the fraction `Config.prediction` of its motion.
 
         Raises:
             MeasurementError: no pose yet.
@@ -216,7 +216,8 @@ class Tracker:
         return self._core.limb_distances(points)
 
     def body_before(self, sites: npt.ArrayLike, camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Length of body (N,) [m] that lies between each of some places and a camera: a network guesses what the body hides.
+        """Length (N,) [m] of the body between each of some positions and a camera, to detect self-occluded keypoints, which a
+        network only guesses.
 
         Args:
             sites: (N, 3) in the world, inside the posed body.
@@ -232,7 +233,7 @@ class Tracker:
         """Scale the whole body by a factor above zero without losing the track.
 
         Raises:
-            BodyError: a factor that leaves no body.
+            BodyError: the factor gives no valid body.
         """
         self._core.scale(number_of("factor", factor))
 
@@ -264,7 +265,7 @@ class Tracker:
             sites: named points on it: name -> position [m] in the new limb's frame.
 
         Raises:
-            BodyError: a name that is taken, an unknown parent, or numbers that make no joint.
+            BodyError: a name that is taken, an unknown parent, or numbers that give no valid joint.
         """
         _check_parts(
             name=(name, str), parent=(parent, str), shape=(shape, TaperedEllipticCylinder), joint=(joint, Joint)
@@ -273,7 +274,7 @@ class Tracker:
         self._core._add_limb(name, parent, shape, joint.parts(), places)
 
     def remove_limb(self, name: str) -> None:
-        """Remove a limb, and all that hangs on it, without losing the track.
+        """Remove a limb and its descendants without losing the track.
 
         Raises:
             BodyError: an unknown limb, or the root.
@@ -282,7 +283,7 @@ class Tracker:
         self._core.remove_limb(name)
 
     def __copy__(self) -> Tracker:
-        """Refused: a copy that shares the state would be stepped along with this one."""
+        """Not supported: a copy that shares the state would be stepped along with this tracker."""
         raise TypeError("a tracker cannot be copied: make another with Tracker(tracker.body), and reset_pose")
 
     def __repr__(self) -> str:
@@ -291,7 +292,7 @@ class Tracker:
 
 
 def _check_parts(**parts: tuple[object, type]) -> None:
-    """Refuse arguments of another kind.
+    """Reject arguments of another type.
 
     Raises:
         BodyError: it names the argument.
@@ -303,7 +304,7 @@ def _check_parts(**parts: tuple[object, type]) -> None:
 
 
 def _frame(frame: object) -> Frame:
-    """The frame, if it is one."""
+    """The argument, checked to be a frame."""
     if not isinstance(frame, Frame):
         raise MeasurementError(f"frame: expected a voodoo.Frame, found {type(frame).__name__}")
     return frame

@@ -9,14 +9,14 @@ pub enum ConfigError {
     /// No such key.
     #[error("unknown configuration key {0:?}")]
     UnknownKey(String),
-    /// Wrong value.
+    /// An invalid value.
     #[error("{key}: expected {expected}, found {found:?}")]
     Value {
         /// The key.
         key: &'static str,
-        /// What would be right.
+        /// The expected value.
         expected: String,
-        /// What was given.
+        /// The value found.
         found: RawValue,
     },
 }
@@ -28,13 +28,13 @@ pub enum Value {
     Real(f64),
     /// A whole number.
     Whole(usize),
-    /// A switch.
+    /// A Boolean.
     Switch(bool),
-    /// One of several words.
+    /// One of several keywords.
     Word(&'static str),
 }
 
-/// What a configuration entry is.
+/// Description of a configuration entry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
     /// Its key.
@@ -45,9 +45,9 @@ pub struct Field {
     pub unit: &'static str,
     /// Its default.
     pub default: Value,
-    /// Least and greatest value of a number.
+    /// Minimum and maximum of a number.
     pub range: Option<(f64, f64)>,
-    /// The words to choose from.
+    /// The allowed keywords.
     pub words: &'static [&'static str],
 }
 
@@ -62,14 +62,14 @@ trait Entry: Sized + Clone {
     fn expected(range: Option<(f64, f64)>) -> String;
 }
 
-/// A value as it comes from outside.
+/// A value from outside, not yet validated.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RawValue {
     /// A number.
     Number(f64),
-    /// A switch.
+    /// A Boolean.
     Switch(bool),
-    /// A word.
+    /// A keyword.
     Word(String),
 }
 

@@ -1,4 +1,4 @@
-//! The errors of bodies and of tracking: each says what was expected and what was found.
+//! The errors of bodies and of tracking: each states what was expected and what was found.
 
 use crate::shape::ShapeError;
 
@@ -6,13 +6,13 @@ use crate::shape::ShapeError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
-    /// No limb at all.
+    /// The body has no limb.
     #[error("body: expected at least one limb, found none")]
     Empty,
     /// Two limbs or two sites share a name.
     #[error("{key}: the name {name:?} is already taken")]
     Duplicate {
-        /// Where the second one stands.
+        /// Key of the second one.
         key: String,
         /// The name.
         name: String,
@@ -24,51 +24,51 @@ pub enum BodyError {
         key: String,
         /// `limb` or `site`.
         what: &'static str,
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: Vec<String>,
     },
     /// A value outside its domain.
     #[error("{key}: expected {expected}, found {found}")]
     Value {
-        /// Where it stands.
+        /// Key of the entry.
         key: String,
-        /// What would be right.
+        /// The expected value.
         expected: &'static str,
-        /// What was there.
+        /// The value found.
         found: String,
     },
-    /// A limb, joint or site with a name of the human's that contradicts the others ([`crate::body::Roles`]).
+    /// A limb, joint or site whose human name contradicts the others ([`crate::body::Roles`]).
     #[error("{key}: expected {expected}, found {found}")]
     Role {
-        /// Where it stands.
+        /// Key of the entry.
         key: String,
-        /// What its name demands.
+        /// What its name requires.
         expected: &'static str,
-        /// What was there.
+        /// What was found.
         found: String,
     },
-    /// A shape that is no solid.
+    /// A shape that is not a valid solid.
     #[error("{key}: {source}")]
     Shape {
-        /// Where it stands.
+        /// Key of the entry.
         key: String,
-        /// What is wrong with it.
+        /// The error of the shape.
         source: ShapeError,
     },
 }
 
-/// A calibration that no camera can have.
+/// An invalid camera calibration.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[error("camera {what}: expected {expected}, found {found}")]
 pub struct CameraError {
-    /// Which of its numbers.
+    /// Name of the invalid number.
     pub what: &'static str,
-    /// What would be right.
+    /// The expected value.
     pub expected: &'static str,
-    /// What was there.
+    /// The value found.
     pub found: String,
 }
 
@@ -78,7 +78,7 @@ impl CameraError {
     }
 }
 
-/// Why the tracker refused a call. The tracker is unchanged afterwards.
+/// Why the tracker rejected a call. The tracker is unchanged afterwards.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {
@@ -93,23 +93,23 @@ pub enum TrackError {
     TimeBackwards {
         /// The last accepted stamp.
         previous: f64,
-        /// The refused one.
+        /// The rejected one.
         found: f64,
     },
     /// A measurement with a value that cannot be used.
     #[error("{what}: expected {expected}, found {found}")]
     Measurement {
-        /// Which argument.
+        /// Name of the argument.
         what: String,
-        /// What would be right.
+        /// The expected value.
         expected: &'static str,
-        /// What was there.
+        /// The value found.
         found: String,
     },
-    /// The given joint positions do not fix the pose.
+    /// The given joint positions do not determine the pose.
     #[error("joints: expected at least three positions that do not lie on a line, found {found} position(s)")]
     Underdetermined {
-        /// How many positions were given.
+        /// Number of given positions.
         found: usize,
     },
     /// A problem with the body.
@@ -118,7 +118,7 @@ pub enum TrackError {
 }
 
 impl TrackError {
-    /// A measurement that cannot be used: which argument, what would be right, what was there.
+    /// An invalid measurement: the argument, the expected value and the value found.
     pub fn measurement(what: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
         Self::Measurement { what: what.into(), expected, found: found.into() }
     }

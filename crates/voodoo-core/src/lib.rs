@@ -1,14 +1,18 @@
-//! Articulated body tracking: every measurement becomes a weighted pair of a body point and a target, and one step
-//! moves the body to fit all of them. No files, no Python, no drawing.
+//! Tracks articulated bodies in 3-D: people, or any other body, from depth images, points, positions and rays of named
+//! sites, and color images.
 //!
-//! A [`Body`] is what is tracked, a [`Frame`] what was measured at one instant, an [`Estimate`] what
-//! [`Tracker::step`] found:
+//! Every measurement becomes a weighted correspondence between a point of the body and a target, and each step moves the
+//! body to fit all of them (VooDoo, K06, K07). The crate reads no files, knows no Python and draws nothing. It brings no
+//! detector: one is handed in behind the trait [`Detect`], for example that of the crate `voodoo-detect`.
+//!
+//! # A first track
+//!
+//! A [`Body`] is what is tracked, a [`Frame`] what was measured at one instant, an [`Estimate`] what [`Tracker::step`]
+//! returns. Units are meters, seconds and radians. A transform `a_from_b` maps coordinates in `b` to coordinates in `a`.
 //!
 //! ```
-//! use voodoo_core::body::HumanModel;
 //! use voodoo_core::math::{Pose, Vec3};
-//! use voodoo_core::observation::frame::{Cloud, PointSlice, Scope};
-//! use voodoo_core::{Body, Config, Frame, Status, Tracker};
+//! use voodoo_core::{Body, Cloud, Config, Frame, HumanModel, PointSlice, Scope, Status, Tracker};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let body = Body::human(1.78, HumanModel::Full)?;
@@ -19,7 +23,7 @@
 //! let start: Vec<(usize, Vec3)> =
 //!     (0..body.sites().len()).map(|site| (site, body.site_position(&standing, site))).collect();
 //!
-//! // What a sensor measured, in meters: here points all over the limbs.
+//! // What a sensor measured: here points all over the limbs.
 //! let mut points = Vec::new();
 //! for (limb, world_from_limb) in body.limbs().iter().zip(&standing) {
 //!     let shape = &limb.shape;
@@ -48,10 +52,101 @@
 //! # }
 //! ```
 //!
-//! The method is VooDoo (K06: Knoop, Vacek, Dillmann, "Sensor Fusion for 3D Human Body Tracking with an Articulated 3D
-//! Body Model", ICRA 2006; K07: the same authors, "A Human Body Model for Articulated 3D Pose Tracking", in "Humanoid
-//! Robots, New Developments", 2007). [`Tracker::step`] reads like the list in K06 IV-B. The modules are its stages;
-//! the order in which they may use each other is in ARCHITECTURE.md.
+//! # Bodies
+//!
+//! [`Body::human`] makes a human of a given stature, [`Body::new`] any other tree of [`Limb`]s. A limb is a
+//! [`TaperedEllipticCylinder`]; a [`Joint`] connects it to its parent; a [`Site`] is a named point on it. Two semi-axes of
+//! a joint make it universal, a hinge, or elliptic ([`JointKind`]):
+//!
+//! ```
+//! use voodoo_core::math::{Pose, Vec3};
+//! use voodoo_core::{Body, Joint, JointKind, Limb, Site, TaperedEllipticCylinder};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let pole = TaperedEllipticCylinder::new(0.5, 0.03, 0.03, 0.02, 0.02)?;
+//! let hinge = Joint {
+//!     name: "elbow".into(),
+//!     parent_from_joint: Pose::from_translation(Vec3::new(0.0, 0.0, 0.5)),
+//!     limb_from_joint: Pose::IDENTITY,
+//!     semi_axes: [0.05, 0.0],
+//!     weight: 1.0,
+//!     limits: None,
+//!     motion: 0.02,
+//! };
+//! assert_eq!(hinge.kind(), JointKind::Hinge);
+//! let limbs = vec![
+//!     Limb { name: "lower".into(), shape: pole.clone(), parent: None, match_caps: [false; 2] },
+//!     Limb { name: "upper".into(), shape: pole, parent: Some((0, hinge)), match_caps: [false, true] },
+//! ];
+//! let tip = Site { name: "tip".into(), limb: 1, position: Vec3::new(0.0, 0.0, 0.5) };
+//! let lamp = Body::new("lamp", limbs, vec![tip])?;
+//! assert!((lamp.site_position(&lamp.rest_pose(Pose::IDENTITY), 0).z - 1.0).abs() < 1e-12);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Measurements
+//!
+//! A [`Frame`] borrows what was measured: [`DepthImage`]s and [`ColorImage`]s, each with its [`Camera`] and lens
+//! ([`Lens`]); [`Cloud`]s of points; a [`PositionRelation`] or [`RayRelation`] of a site; the [`Ground`]. Every weight is
+//! the precision of a position, 1 for a good depth pixel.
+//!
+//! ```
+//! use voodoo_core::math::{Pose, Vec3};
+//! use voodoo_core::{Camera, DepthImage, DepthPixels, Frame, Ground, Lens, PositionRelation};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let camera = Camera::new(320, 240, [260.0, 260.0, 159.5, 119.5], Lens::PlumbBob([-0.1, 0.02, 0.0, 0.0, 0.0]))?;
+//! let pixels = vec![2000_u16; 320 * 240]; // a wall at 2 m
+//! let image = DepthImage {
+//!     pixels: DepthPixels::U16(&pixels),
+//!     camera: &camera,
+//!     meters_per_unit: 0.001,
+//!     world_from_sensor: Pose::IDENTITY,
+//!     weight: 1.0,
+//!     source: 0,
+//! };
+//! let wrist = PositionRelation { site: 0, position: Vec3::new(0.1, 0.2, 1.5), weight: 20.0, bias: 0.0, source: 1 };
+//! let frame = Frame::empty(0.0)
+//!     .with_images(std::slice::from_ref(&image))
+//!     .with_positions(std::slice::from_ref(&wrist))
+//!     .with_ground(Ground { normal: -Vec3::Y, offset: -1.2 });
+//! assert_eq!(frame.images.len(), 1);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A frame that cannot be used is refused with a [`TrackError`] before anything changes.
+//!
+//! # Results
+//!
+//! An [`Estimate`] holds the pose of every limb, the position of every site, the [`Status`] of the body and the
+//! [`LimbStatus`] of every limb, what each source contributed ([`SourceReport`]), and [`Covariances`].
+//! [`Rendering`] predicts the depth image of a pose.
+//!
+//! # Several persons
+//!
+//! [`People`] spawns, associates and prunes a [`Tracker`] per person; it needs a detector.
+//!
+//! ```
+//! use voodoo_core::{Body, Config, HumanModel, People, PeopleOptions};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let people = People::new(Body::human(1.75, HumanModel::Full)?, Config::default(), PeopleOptions::default())?;
+//! assert_eq!(people.present().count(), 0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # References
+//!
+//! * K06: S. Knoop, S. Vacek, R. Dillmann, "Sensor Fusion for 3D Human Body Tracking with an Articulated 3D Body Model",
+//!   ICRA 2006. [`Tracker::step`] follows its section IV-B.
+//! * K07: the same authors, "A Human Body Model for Articulated 3D Pose Tracking", in "Humanoid Robots, New
+//!   Developments", 2007.
+//! * R07: B. Rosenhahn, T. Brox, D. Cremers, H.-P. Seidel, "Online Smoothing for Markerless Motion Capture", DAGM 2007.
+//!
+//! Runnable programs are in the crate's folder `examples`.
 
 mod association;
 mod body;

@@ -1,33 +1,34 @@
-//! What hangs together in a depth image, and which of it may be a person.
+//! Connected components of a depth image, and the combinations of them that may be a person.
 
 use crate::view::ThinnedImage;
 use nalgebra::{Matrix3, Vector3};
 use voodoo_core::math::{Vec3, widest};
 
-/// Neighboring pixels hang together when their depths differ by less than this, meters, and so much of the depth.
+/// Neighboring pixels are connected when their depths differ by less than this, meters, plus this fraction of the depth.
 const STEP: [f32; 2] = [0.04, 0.012];
-/// What is too large for a person is cut again with steps of this share of those before.
+/// Components that are too large for a person are split again with steps that are this fraction of the previous ones.
 const CUT_FINER: f32 = 0.5;
-/// How often.
+/// Maximum number of splits.
 const CUTS: usize = 2;
-/// Surface of a person that a camera sees, square meters: from a head and shoulders to a wide coat.
+/// Visible surface of a person, square meters: from a head and shoulders to a wide coat.
 const AREA: [f64; 2] = [0.08, 1.7];
-/// Length of a person's box along its longest edge, meters.
+/// Longest edge of a person's box, meters.
 const LENGTH: [f64; 2] = [0.45, 2.5];
-/// Parts smaller than this are noise, square meters.
+/// Components with less surface than this are noise, square meters.
 const LEAST_COMPONENT: f64 = 0.004;
-/// Parts of a person that something hides the link of are at most so far apart, meters.
+/// Maximum distance between components of one person whose connection is occluded, meters.
 const GAP: f64 = 0.28;
-/// Standard deviation of a flat part's points across it, meters: walls and table tops are no people.
+/// A component whose points have a smaller standard deviation from their plane than this, meters, is flat: walls and table tops
+/// are not people.
 const FLAT_COMPONENT: f64 = 0.022;
-/// Points of a part that distances are taken from.
+/// Number of points sampled from a component to compute distances.
 const COMPONENT_SAMPLES: usize = 48;
-/// Parts that are looked at, the largest first.
+/// Maximum number of components considered, the largest first.
 const MOST_COMPONENTS: usize = 40;
 /// No label.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// What hangs together; camera frame, meters.
+/// A connected component; camera frame, meters.
 #[derive(Clone, Copy, Debug)]
 struct Component {
     label: u32,
@@ -36,7 +37,7 @@ struct Component {
     high: Vec3,
     samples: [Vec3; COMPONENT_SAMPLES],
     sampled: usize,
-    /// Points so far, of which every so manyth was kept.
+    /// Number of points added so far; every `every`-th of them was kept.
     added: usize,
     every: usize,
     flat: bool,
@@ -58,14 +59,14 @@ impl Component {
         }
     }
 
-    /// Takes a point in; of many every so manyth is kept.
+    /// Adds a point; only every `every`-th is kept once there are many.
     fn add(&mut self, point: Vec3) {
         self.low = self.low.min(point);
         self.high = self.high.max(point);
-        // A power of two: no division for every pixel.
+        // `every` is a power of two, which avoids a division per pixel.
         if self.added & (self.every - 1) == 0 {
             if self.sampled == COMPONENT_SAMPLES {
-                // Half of those that are kept make room.
+                // Drops every second kept point to make room.
                 for number in 0..COMPONENT_SAMPLES / 2 {
                     self.samples[number] = self.samples[2 * number];
                 }
@@ -78,57 +79,57 @@ impl Component {
     }
 }
 
-/// Parts that together may be a person.
+/// Components that together may be a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PersonCandidate {
-    /// Labels of its parts.
+    /// Labels of its components.
     pub(crate) labels: Vec<u32>,
-    /// Surface seen, square meters.
+    /// Visible surface area, square meters.
     pub area: f64,
-    /// Corners of its box, camera frame.
+    /// Lower corner of its box, camera frame.
     pub low: Vec3,
-    /// The other corner.
+    /// Upper corner.
     pub high: Vec3,
 }
 
 impl PersonCandidate {
-    /// Distance of a point in the camera's frame to its box, and a little of that to the box's middle.
+    /// Distance of a point (camera frame) to its box, plus a small fraction of the distance to the box's center.
     pub(crate) fn distance(&self, point: Vec3) -> f64 {
-        /// A place within several boxes belongs to the one whose middle is nearest.
+        /// A point within several boxes belongs to the one with the nearest center.
         const TO_MIDDLE: f64 = 0.1;
         let outside = (self.low - point).max(point - self.high).max(Vec3::ZERO).length();
         outside + TO_MIDDLE * point.distance(self.middle())
     }
 
-    /// The middle of its box, camera frame.
+    /// Center of its box, camera frame.
     pub(crate) fn middle(&self) -> Vec3 {
         0.5 * (self.low + self.high)
     }
 
-    /// Whether both have a part in common.
+    /// Whether two candidates share a component.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
     }
 }
 
-/// Working memory, and what was found in the last image.
+/// Working memory, and the components of the last image.
 #[derive(Debug, Default)]
 pub(crate) struct Components {
-    /// The label of every pixel: the index of another of its part, or of itself.
+    /// The label of every pixel: the index of an earlier pixel of the same component, or of itself.
     pub(crate) labels: Vec<u32>,
     parts: Vec<Component>,
-    /// Every label once, ascending.
+    /// The distinct labels, ascending.
     distinct: Vec<u32>,
-    /// Surface of the part with a label, at the label's place; what stands elsewhere says nothing.
+    /// Surface area of each component, at the index of its label; other entries are meaningless.
     areas: Vec<f32>,
-    /// 1 for every pixel that is to be joined to its neighbors.
+    /// 1 for every pixel that is to be connected to its neighbors.
     again: Vec<u8>,
-    /// To which of its neighbors each pixel is joined, a bit for each.
+    /// Bit mask for each pixel: which of its neighbors it is connected to.
     linked: Vec<u8>,
 }
 
 impl Components {
-    /// What may be a person, the likeliest sizes first.
+    /// Finds candidates for persons, those with the most probable sizes first.
     pub(crate) fn find(&mut self, view: &ThinnedImage, candidates: &mut Vec<PersonCandidate>) {
         self.labels.clear();
         self.labels.extend(view.depth.iter().enumerate().map(|(index, z)| if *z > 0.0 { index as u32 } else { NONE }));
@@ -151,7 +152,7 @@ impl Components {
         self.propose(candidates);
     }
 
-    /// Takes too large parts apart and joins their pixels again by smaller steps.
+    /// Splits components that are too large: connects their pixels again with smaller steps.
     fn cut(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { labels, areas, again, .. } = self;
         again.clear();
@@ -165,14 +166,14 @@ impl Components {
         self.join(view, finer);
     }
 
-    /// Joins neighbors, and pixels with one between them, of those that are `again` to be joined.
+    /// Connects neighbors, and pixels at a distance of two, among the pixels marked in `again`.
     fn join(&mut self, view: &ThinnedImage, finer: f32) {
         self.link(view, finer);
         let width = view.width;
         let mut before = NONE;
         for index in 0..self.labels.len() {
             let linked = self.linked[index];
-            // No pixel that came before hangs on this one; the one to the left has just been followed to its root.
+            // No earlier pixel has this pixel as its root, and the root of the pixel to the left was resolved just before.
             let mut root = if linked & 1 != 0 { before } else { index as u32 };
             for (bit, back) in [(1, width), (2, 2), (3, 2 * width)] {
                 if linked & (1 << bit) == 0 || self.labels[index - back] == root {
@@ -191,7 +192,7 @@ impl Components {
         for index in 0..self.labels.len() {
             let label = self.labels[index];
             if label != NONE {
-                // It hangs on one that came before it and has its label.
+                // The pixel at this label came earlier and already has its final label.
                 self.labels[index] = self.labels[label as usize];
                 if label == index as u32 {
                     self.distinct.push(label);
@@ -200,7 +201,8 @@ impl Components {
         }
     }
 
-    /// Which of the pixels to the left, above, two to the left and two above each pixel is near it, a bit for each.
+    /// Computes a bit mask for each pixel: whether it is connected to the pixel on the left, above, two to the left and two
+    /// above.
     fn link(&mut self, view: &ThinnedImage, finer: f32) {
         let Self { linked, again, .. } = self;
         let width = view.width;
@@ -211,7 +213,7 @@ impl Components {
             || {
                 for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
                     let across = back < width;
-                    // Rows one by one: none has a neighbor in the one before it.
+                    // Row by row, so that the first pixels of a row are not connected to the end of the row before.
                     for start in (0..view.depth.len()).step_by(width.max(1)) {
                         let from = if across { start + back } else { start };
                         let to = start + width;
@@ -244,7 +246,7 @@ impl Components {
         }
     }
 
-    /// Surface of everything that hangs together.
+    /// Sums the surface area of every component.
     fn measure(&mut self, view: &ThinnedImage) {
         let Self { labels, areas, distinct, .. } = self;
         areas.resize(labels.len(), 0.0);
@@ -252,7 +254,7 @@ impl Components {
             areas[*label as usize] = 0.0;
         }
         let area = view.pixel_area() as f32;
-        // Neighbors mostly share their label: their sum need not be written for each.
+        // Neighbors mostly share their label, so a sum is written only when the label changes.
         let (mut last, mut sum) = (NONE, 0.0);
         for (label, z) in labels.iter().zip(&view.depth).filter(|(label, _)| **label != NONE) {
             if *label != last {
@@ -268,7 +270,7 @@ impl Components {
         }
     }
 
-    /// Sizes of the parts, the largest first.
+    /// Computes the sizes of the components, the largest first.
     fn sum_up(&mut self, view: &ThinnedImage) {
         let Self { labels, parts, areas, distinct, .. } = self;
         parts.clear();
@@ -280,7 +282,7 @@ impl Components {
         }
         parts.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.label.cmp(&b.label)));
         parts.truncate(MOST_COMPONENTS);
-        // From here on what stands at a label's place is one more than its part's number.
+        // From here on the entry at a label's index is its component's index plus one.
         for label in distinct {
             areas[*label as usize] = 0.0;
         }
@@ -297,7 +299,7 @@ impl Components {
         }
     }
 
-    /// Every part that may be a person by itself, and with the parts near it.
+    /// Proposes every component that may be a person, by itself and together with nearby components.
     fn propose(&self, candidates: &mut Vec<PersonCandidate>) {
         for (number, part) in self.parts.iter().enumerate() {
             if part.area > AREA[1] || part.area < 0.3 * AREA[0] || part.flat {
@@ -318,7 +320,7 @@ impl Components {
         candidates.sort_by(|a, b| unlikely(a).total_cmp(&unlikely(b)).then(a.labels.cmp(&b.labels)));
     }
 
-    /// A part and those that lie near it, as long as all of it is no larger than a person.
+    /// Combines a component with nearby ones as long as the result is no larger than a person.
     fn with_near_parts(&self, seed: usize) -> PersonCandidate {
         let mut taken = vec![seed];
         let part = &self.parts[seed];
@@ -345,7 +347,7 @@ impl Components {
     }
 }
 
-/// Whether two parts come nearer to each other than a person's parts may be apart.
+/// Whether two components are closer to each other than components of one person may be.
 fn near(a: &Component, b: &Component) -> bool {
     let gap = (a.low - b.high).max(b.low - a.high).max(Vec3::ZERO).length();
     if gap > GAP {
@@ -367,9 +369,9 @@ fn is_flat(points: &[Vec3]) -> bool {
     scatter.symmetric_eigenvalues().min() < FLAT_COMPONENT * FLAT_COMPONENT
 }
 
-/// How far the seen surface is from a standing person's, in powers of e.
+/// Absolute difference of the logarithms of the visible surface area and that of a standing person.
 fn unlikely(candidate: &PersonCandidate) -> f64 {
-    /// Surface of a standing person that a camera sees, square meters.
+    /// Visible surface area of a standing person, square meters.
     const STANDING: f64 = 0.55;
     (candidate.area / STANDING).ln().abs()
 }
@@ -380,7 +382,7 @@ mod tests {
     use crate::testing::{before_wall, image, put_board, standing};
     use voodoo_core::Surroundings;
 
-    /// What may be a person in an image of the unit tests' camera.
+    /// Candidates in an image of the unit tests' camera.
     fn candidates(pixels: &[u16]) -> Vec<PersonCandidate> {
         let (mut view, mut found) = (ThinnedImage::default(), Vec::new());
         view.read(&image(pixels), &Surroundings::default());

@@ -1,12 +1,12 @@
-//! Maps of features, and convolutions of them as products of matrices.
+//! Feature maps, and their convolutions as matrix products.
 //!
-//! Maps lie channel by channel for every pixel, row by row.
+//! A map is stored row by row; the channels of a pixel are adjacent.
 
 use crate::product::Panels;
 use crate::weights::{Weights, WeightsError};
 use crate::winograd::{KERNEL, Tiles, Winograd};
 
-/// A square map of features.
+/// A square feature map.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Map {
     pub(crate) edge: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Working {
     tiles: Tiles,
 }
 
-/// A convolution, with what happens to its edge.
+/// A convolution; maps are padded with zeros.
 #[derive(Debug)]
 pub(crate) struct Convolution {
     products: Products,
@@ -30,23 +30,23 @@ pub(crate) struct Convolution {
     padding: usize,
 }
 
-/// How it is computed.
+/// How the convolution is computed.
 #[derive(Debug)]
 enum Products {
-    /// One for what the kernel sees at every pixel.
+    /// As one matrix product over the kernel windows of all pixels.
     Whole(Panels),
-    /// By fewer multiplications.
+    /// With fewer multiplications, in transformed tiles.
     Tiled(Winograd),
 }
 
 impl Convolution {
-    /// One of a file; it looks at maps of this `edge`.
+    /// Takes a convolution from a weight file; its input maps have this `edge`.
     pub(crate) fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
         let layer = weights.layer(name, 4)?;
         Ok(Self::from_weights(&layer.weights, &layer.bias, layer.kernel, stride, edge))
     }
 
-    /// Of `weights` (out, ky, kx, in) and biases.
+    /// From `weights` (out, ky, kx, in) and biases.
     fn from_weights(weights: &[f32], bias: &[f32], kernel: usize, stride: usize, edge: usize) -> Self {
         let products = if kernel == KERNEL && stride == 1 && edge.is_multiple_of(2) {
             Products::Tiled(Winograd::from_weights(weights, bias))
@@ -70,7 +70,7 @@ impl Convolution {
         }
     }
 
-    /// The map after it.
+    /// Writes the output map.
     pub(crate) fn apply(&self, map: &Map, out: &mut Map, working: &mut Working, relu: bool) {
         out.edge = (map.edge + 2 * self.padding - self.kernel) / self.stride + 1;
         out.channels = self.outputs();
@@ -88,7 +88,7 @@ impl Convolution {
         }
     }
 
-    /// What the kernel sees at every pixel, one after the other; zeros outside of the map.
+    /// Gathers the kernel window of every pixel, one after the other; zeros outside of the map.
     fn gather(&self, map: &Map, edge: usize, columns: &mut Vec<f32>) {
         let row_of = self.kernel * map.channels;
         columns.clear();
@@ -120,7 +120,7 @@ pub(crate) fn rectify(values: &mut [f32]) {
 mod tests {
     use super::*;
 
-    /// Numbers that look random.
+    /// Deterministic numbers that look random.
     fn noise(count: usize, seed: f32) -> Vec<f32> {
         (0..count).map(|index| ((index as f32 + seed) * 12.9898).sin()).collect()
     }

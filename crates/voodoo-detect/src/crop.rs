@@ -1,4 +1,4 @@
-//! The picture that the network sees of a candidate: 96 x 96 pixels about its middle, turned so that up is up.
+//! The network's input for a candidate: 96 x 96 pixels around its center, rotated so that up in the world is up in the image.
 
 use crate::components::{Components, NONE, PersonCandidate};
 use crate::view::ThinnedImage;
@@ -6,24 +6,24 @@ use voodoo_core::math::Vec3;
 
 /// Pixels along an edge.
 pub const SIZE: usize = 96;
-/// Its width at the depth of the candidate's middle, meters.
+/// Its width at the depth of the candidate's center, meters.
 pub const WIDTH: f64 = 2.6;
-/// Depth before and behind the middle that is told apart, meters.
+/// Range of depth in front of and behind the center that is resolved, meters.
 pub const DEPTH: f64 = 1.2;
 
-/// A picture, and how to come back from it to the camera.
+/// An input image, and the transform from it back to the camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crop {
-    /// Row by row, for every pixel its depth behind the middle, by `DEPTH`, from -1 to 1, and 1 where the candidate is (else 0).
+    /// For every pixel, row by row: its depth behind the center divided by `DEPTH`, from -1 to 1; and 1 on the candidate, else 0.
     pub pixels: Vec<[f32; 2]>,
-    /// Its middle: `(x/z, y/z)` in the turned camera, and the depth in meters.
+    /// Its center: `(x/z, y/z)` in the rotated camera, and the depth in meters.
     pub middle: [f64; 3],
-    /// Angle by which the camera is turned about its optical axis for up to be up, radians.
+    /// Angle by which the camera is rotated about its optical axis so that up is up, radians.
     pub roll: f64,
 }
 
 impl Crop {
-    /// The picture of a candidate; `up` in the camera's frame. `None` if it has no pixels.
+    /// The input image of a candidate; `up` in the camera frame. `None` if the candidate has no pixels.
     pub(crate) fn from_candidate(
         view: &ThinnedImage,
         parts: &Components,
@@ -60,7 +60,7 @@ impl Crop {
         Some(Self { pixels, middle: middle.map(f64::from), roll })
     }
 
-    /// A place of the picture, meters from its middle to the right, down and behind, as a point in the camera's frame.
+    /// Converts a position relative to the center (meters right, down and behind) to a point in the camera frame.
     pub fn to_camera(&self, place: Vec3) -> Vec3 {
         let [x0, y0, z0] = self.middle;
         let z = z0 + place.z;
@@ -70,9 +70,10 @@ impl Crop {
     }
 }
 
-/// By how much the camera has to be turned about its axis for up to point upwards in the image; none where it looks along up.
+/// Rotation of the camera about its axis that makes up point upwards in the image; zero where the camera looks along the
+/// vertical.
 fn roll(up: Vec3) -> f64 {
-    /// Below this sine of the angle between up and the optical axis there is no up in the image.
+    /// Below this sine of the angle between up and the optical axis, up is not defined in the image.
     const LEAST: f64 = 0.3;
     if up.x.hypot(up.y) < LEAST { 0.0 } else { (-up.x).atan2(-up.y) }
 }
@@ -104,7 +105,7 @@ mod tests {
             let candidate = segmentation.find(&image, &around)[0].clone();
             let crop = segmentation.crop(&candidate).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
-            // Every pixel of the picture that shows the person, back in the camera, lies on a point that was seen.
+            // Every pixel on the person, transformed back to the camera frame, coincides with a measured point.
             let points: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
             let half = 0.5 * (SIZE as f64 - 1.0);
             let mut inside = 0;

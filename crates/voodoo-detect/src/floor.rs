@@ -1,28 +1,30 @@
-//! The floor in a depth image where nobody told it: the plane with the most points that has hardly any below it.
+//! Estimates the floor from a depth image when the ground plane is not given: the plane that contains the most points and has few
+//! points below it.
 
 use crate::view::ThinnedImage;
 use voodoo_core::Ground;
 use voodoo_core::math::{LANES, Vec3};
 
-/// Points that are looked at, about.
+/// Approximate number of sampled points.
 const FLOOR_SAMPLES: usize = 1200;
-/// Planes that are tried.
+/// Number of trial planes.
 const TRIALS: usize = 96;
-/// A point is on the floor up to this distance from it, meters, and so much more by the square of its depth, 1/m.
+/// A point lies on the floor within this distance, meters, plus this coefficient (1/m) times its squared depth.
 const NEAR: [f64; 2] = [0.025, 0.003];
-/// A floor holds at least this share of the points.
+/// A floor contains at least this fraction of the points.
 const LEAST_FRACTION: f64 = 0.03;
-/// A point below the floor speaks against it as much as so many on it speak for it: reflections are few.
+/// Each point below the plane counts against it as much as this many points on it count for it. Only few points lie below a real
+/// floor, caused by reflections.
 const BELOW: f64 = 4.0;
-/// The floor is tilted by at most this against the upwards direction that is assumed: cosine of 40 degrees.
+/// Minimum cosine between the floor's normal and the assumed upward direction: 40 degrees.
 const LEAST_UPRIGHT: f64 = 0.766;
 
-/// The surface about a point is looked at over so much of the image's width.
+/// Size of the neighborhood from which a point's surface normal is estimated, as a fraction of the image's width.
 const NEIGHBOR: f64 = 0.05;
-/// The plane is fitted again to the points within this share of the distance that the trials allowed.
+/// The plane is refitted to the points within these fractions of the trials' distance threshold.
 const NEARER: [f64; 2] = [0.7, 0.5];
 
-/// Points in single precision, coordinate by coordinate, with how far from the floor each may be seen.
+/// Single-precision points as a structure of arrays, with the tolerance of each point's distance from the floor.
 #[derive(Debug, Default)]
 struct PointLanes {
     x: Vec<f32>,
@@ -43,7 +45,7 @@ impl PointLanes {
         self.near.push((NEAR[0] + NEAR[1] * point.z * point.z) as f32);
     }
 
-    /// Sum of what `worth` says of heights above a plane, in units of how far from the floor points may be seen.
+    /// Sums `worth` over the heights of the points above a plane, in units of the points' tolerances.
     fn sum(&self, plane: &Ground, worth: impl Fn(f32) -> f32) -> f64 {
         let [a, b, c] = plane.normal.to_array().map(|value| value as f32);
         let offset = plane.offset as f32;
@@ -64,13 +66,13 @@ impl PointLanes {
 #[derive(Debug, Default)]
 pub(crate) struct FloorFinder {
     points: PointLanes,
-    /// Those on surfaces that face upwards.
+    /// Points on surfaces that face upwards.
     level: Vec<Vec3>,
     level_lanes: PointLanes,
 }
 
 impl FloorFinder {
-    /// The floor in the camera's frame; `up` is the direction upwards about as it is known there.
+    /// Returns the floor in the camera frame; `up` is the approximate upward direction in that frame.
     pub(crate) fn find(&mut self, view: &ThinnedImage, up: Vec3) -> Option<Ground> {
         self.sample(view, up);
         let count = self.points.x.len();
@@ -125,12 +127,12 @@ impl FloorFinder {
 
     fn score(&self, plane: &Ground) -> f64 {
         let below = |height: f32| if height < -2.0 { 1.0 } else { 0.0 };
-        // A squared distance, cut off: planes through the middle of what is level win over those beside it.
+        // A truncated squared distance: it prefers planes through the middle of horizontal points to planes beside them.
         let on = |height: f32| (1.0 - height * height).max(0.0);
         self.level_lanes.sum(plane, on) - BELOW * self.points.sum(plane, below)
     }
 
-    /// The plane through all level points near it, by least squares along its normal.
+    /// Refits the plane to all nearby points on horizontal surfaces, by least squares along its normal.
     fn refined(&self, plane: &Ground, fraction: f64) -> Ground {
         let near = |point: &Vec3| fraction * (NEAR[0] + NEAR[1] * point.z * point.z);
         let on = |point: &&Vec3| (plane.normal.dot(**point) - plane.offset).abs() < near(point);
@@ -162,7 +164,7 @@ impl FloorFinder {
     }
 }
 
-/// Numbers in an order that is the same on every run (Vigna's splitmix64).
+/// Pseudo-random numbers in a sequence that is the same on every run (Vigna's splitmix64).
 struct Draw(u64);
 
 impl Draw {
@@ -188,7 +190,7 @@ mod tests {
     const EDGE: usize = 120;
     const FOCAL: f64 = 100.0;
 
-    /// The floor found by a camera that looks down by `tilt` radians from 1.2 m above a floor, in a room that ends at 4.5 m.
+    /// The floor that is found for a camera tilted down by `tilt` radians, 1.2 m above the floor of a room that ends at 4.5 m.
     fn found(tilt: f64, is_visible: impl Fn(Vec3) -> bool) -> Option<Ground> {
         let (sin, cos) = tilt.sin_cos();
         let up = Vec3::new(0.0, -cos, -sin);

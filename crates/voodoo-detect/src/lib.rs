@@ -1,4 +1,5 @@
-//! Finds persons in depth images: what may be one, what a small network reports of it, and where its joints are.
+//! Finds persons in depth images: segments candidates, evaluates them with a small network, and reports joints in the world
+//! frame.
 //!
 //! ```
 //! use voodoo_core::HumanModel;
@@ -42,9 +43,9 @@ use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 use weights::WeightsError;
 
-/// Log odds from which on a candidate is taken for a person.
+/// Log odds above which a candidate counts as a person.
 const PERSON: f32 = 0.0;
-/// Candidates of an image that the network looks at where everybody is asked for: costs time in proportion.
+/// Maximum number of candidates that the network evaluates per image for [`DetectionQuery::All`]. Run time is proportional to it.
 const MAX_EVALUATIONS: usize = 12;
 /// The standard deviation of a Laplace distribution is this many times its scale.
 const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
@@ -52,18 +53,18 @@ const SIGMA_BY_SCALE: f64 = std::f64::consts::SQRT_2;
 /// Finds persons in depth images, with a network of 17 joints and 9 lengths.
 #[derive(Debug, Default)]
 pub struct Detector {
-    /// None: the one that comes with the library, which is read when it is needed.
+    /// `None`: the network that ships with the library, which is read at first use.
     network: Option<Arc<Network>>,
     memory: Memory,
     segmentation: Segmentation,
-    /// Numbers of the candidates of the last image's detections.
+    /// Candidate indices of the last image's detections.
     found: Vec<usize>,
-    /// Log odds that what was looked at first of the last image is a person, and its box in the world.
+    /// Log odds that the first evaluated candidate of the last image is a person, and its box in the world frame.
     nearest: Option<(f64, Aabb)>,
     rejections: Rejections,
 }
 
-/// The network that comes with the library, read once.
+/// The network that ships with the library, read once.
 fn shipped() -> Result<Arc<Network>, WeightsError> {
     static NETWORK: OnceLock<Result<Arc<Network>, WeightsError>> = OnceLock::new();
     let read = || Network::read(include_bytes!("../person.weights")).map(Arc::new);
@@ -71,16 +72,16 @@ fn shipped() -> Result<Arc<Network>, WeightsError> {
 }
 
 impl Detector {
-    /// A detector with the network that comes with the library. Its weights are read once a process, at the first image.
+    /// A detector with the network that ships with the library. Its weights are read once per process, at the first image.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A detector with a network of one's own.
+    /// A detector with a user-supplied network.
     ///
     /// # Errors
     ///
-    /// Bytes that are no weights of a network of this structure and these joints.
+    /// If the bytes are not weights of a network of this structure and with these joints.
     pub fn with_weights(bytes: &[u8]) -> Result<Self, WeightsError> {
         let network = Network::read(bytes)?;
         if network.joints() != JOINTS.len() {
@@ -89,7 +90,7 @@ impl Detector {
         Ok(Self { network: Some(Arc::new(network)), ..Self::default() })
     }
 
-    /// Numbers of the candidates of the last image that are to be looked at, in that order.
+    /// Indices of the last image's candidates that the query evaluates, in order of evaluation.
     fn order(&self, query: DetectionQuery, camera_from_world: &Pose) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.segmentation.candidates().len()).collect();
         let at = |number: usize| &self.segmentation.candidates()[number];
@@ -118,7 +119,7 @@ impl Detect for Detector {
         LENGTHS.map(String::from).to_vec()
     }
 
-    /// Bodies that have all of its joints: those of people.
+    /// Whether the body has all of its joints, as human bodies do.
     fn knows(&self, body: &Body) -> bool {
         JOINTS.iter().all(|joint| body.site_index(joint).is_ok())
     }
@@ -169,7 +170,7 @@ impl Detect for Detector {
         let mut kept = Vec::new();
         for (number, mut detection) in found {
             let candidate = &segmentation.candidates()[number];
-            // Of candidates that share parts the surest stays.
+            // Of candidates that share components only the most confident is kept.
             if numbers.iter().any(|other| segmentation.candidates()[*other].overlaps(candidate)) {
                 continue;
             }
@@ -193,7 +194,7 @@ impl Detect for Detector {
     }
 }
 
-/// The box about a candidate's box.
+/// World-frame box around a candidate's box.
 fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
     let corners = [candidate.low, candidate.high];
     let corner = |number: usize| {
@@ -203,7 +204,7 @@ fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
     Aabb::from_points((0..8).map(corner))
 }
 
-/// What the network reports, in the world.
+/// Converts the network's output to a detection in the world frame.
 fn detection(answer: &Answer, crop: &Crop, candidate: &PersonCandidate, world_from_camera: &Pose) -> Detection {
     let joint = |((place, log_scale), visible): ((&[f32; 3], &f32), &f32)| {
         Some(DetectedJoint {

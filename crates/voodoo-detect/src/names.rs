@@ -1,6 +1,6 @@
-//! What the network tells, in its order.
+//! The joints and lengths that the network reports, in its order.
 
-/// Joints that the network tells, in its order (H-Anim names; `l_` and `r_` are the person's own).
+/// Joints that the network reports, in its order (H-Anim names; `l_` and `r_` are the person's own sides).
 pub const JOINTS: [&str; 17] = [
     "head_center",
     "vc7",
@@ -20,6 +20,6 @@ pub const JOINTS: [&str; 17] = [
     "l_ankle",
     "r_ankle",
 ];
-/// Lengths that it tells, in its order: distances of joints, and the stature.
+/// Lengths that the network reports, in its order: distances between joints, and the stature.
 pub const LENGTHS: [&str; 9] =
     ["upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck", "stature"];

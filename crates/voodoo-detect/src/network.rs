@@ -1,17 +1,17 @@
-//! The network that looks at a picture.
+//! The network that evaluates a candidate.
 //!
 //! The structure is that of A2J (Xiong et al., "A2J: Anchor-to-Joint Regression Network", ICCV 2019) on a small residual network:
-//! every cell of a 12 x 12 grid says of every joint how much it counts and where the joint is from there.
+//! every cell of a 12 x 12 grid predicts, for every joint, its own weight and the joint's offset from the cell.
 
 use crate::convolution::{Convolution, Map, Working, rectify};
 use crate::crop::{SIZE, WIDTH};
 use crate::product::Panels;
 use crate::weights::{Weights, WeightsError};
 
-/// Numbers a cell gives for a joint: how much it counts, offset to the right, offset down, depth.
+/// Values per cell and joint: weight, offset to the right, offset down, depth.
 const A_JOINT: usize = 4;
 
-/// Two convolutions beside the identity.
+/// A residual block: two convolutions and an identity connection.
 #[derive(Debug)]
 struct Residual {
     first: Convolution,
@@ -32,7 +32,7 @@ impl Residual {
     }
 }
 
-/// A convolution that makes the map smaller, and residual blocks.
+/// A convolution that reduces the map, followed by residual blocks.
 #[derive(Debug)]
 struct Stage {
     reduce: Convolution,
@@ -40,7 +40,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// One that looks at maps of this `edge`.
+    /// Takes a stage whose input maps have this `edge`.
     fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
         let reduce = Convolution::take(weights, &format!("{name}.conv"), stride, edge)?;
         let mut blocks = Vec::new();
@@ -51,7 +51,7 @@ impl Stage {
     }
 }
 
-/// A matrix and a bias.
+/// A linear layer: a matrix and a bias.
 #[derive(Debug)]
 struct LinearLayer(Panels);
 
@@ -68,22 +68,22 @@ impl LinearLayer {
     }
 }
 
-/// What the network says of a picture.
+/// The network's output for an input image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answer {
-    /// Places of the joints: meters to the right, down and behind the picture's middle.
+    /// Positions of the joints: meters right of, below and behind the center of the input image.
     pub joints: Vec<[f32; 3]>,
-    /// Natural logarithm of the scale (meters) of their error (Laplace).
+    /// Natural logarithm of the scale of each position's error (Laplace distribution, meters).
     pub log_scale: Vec<f32>,
-    /// Log odds that they are in the image.
+    /// Log odds that each joint is inside the image and not occluded.
     pub visible: Vec<f32>,
     /// Log odds that the trunk faces the camera.
     pub facing: f32,
     /// Log odds that it is a person.
     pub person: f32,
-    /// Natural logarithms of lengths, meters.
+    /// Natural logarithms of the lengths, which are in meters.
     pub log_lengths: Vec<f32>,
-    /// Natural logarithms of the scale of their error.
+    /// Natural logarithms of the scales of the errors of `log_lengths`.
     pub log_length_scale: Vec<f32>,
 }
 
@@ -151,7 +151,7 @@ impl Network {
         Ok(network)
     }
 
-    /// Every layer takes what the one before gives.
+    /// Checks that the shape of every layer matches that of the layer before.
     fn check(&self) -> Result<(), WeightsError> {
         let mut channels = 2;
         let mut ends = Vec::new();
@@ -195,12 +195,12 @@ impl Network {
         Ok(())
     }
 
-    /// Number of joints it tells.
+    /// Number of joints that it reports.
     pub fn joints(&self) -> usize {
         self.head.outputs() / A_JOINT
     }
 
-    /// Looks at a picture, `SIZE * SIZE` pixels.
+    /// Evaluates an input image of `SIZE * SIZE` pixels.
     pub fn evaluate(&self, picture: &[[f32; 2]], memory: &mut Memory) -> Answer {
         let Memory { maps, between, top, working } = memory;
         top.edge = SIZE;
@@ -226,7 +226,7 @@ impl Network {
         answer
     }
 
-    /// What the whole picture says.
+    /// Computes the outputs that depend on the whole image.
     fn overall(&self, pooled: &[f32]) -> Answer {
         let mut values = pooled.to_vec();
         if let Some(hidden) = &self.hidden {
@@ -249,7 +249,7 @@ impl Network {
     }
 }
 
-/// Scale of a joint's error where a network does not tell it, meters.
+/// Scale of a joint's error if the network does not report it, meters.
 const UNKNOWN: f32 = 0.04;
 
 fn mean(map: &Map) -> Vec<f32> {
@@ -262,7 +262,7 @@ fn mean(map: &Map) -> Vec<f32> {
     sum
 }
 
-/// A map of twice the edge, every pixel repeated, with another added.
+/// Doubles the edge of a map by repeating every pixel, and adds another map.
 fn enlarge(map: &Map, skip: &Map, out: &mut Map) {
     out.clone_from(skip);
     for (pixel, values) in out.values.chunks_exact_mut(skip.channels).enumerate() {
@@ -272,7 +272,7 @@ fn enlarge(map: &Map, skip: &Map, out: &mut Map) {
     }
 }
 
-/// Where the cells together put a joint, meters from the picture's middle.
+/// Position of a joint, the weighted mean over all cells, meters from the image's center.
 fn place(map: &Map, joint: usize) -> [f32; 3] {
     let cell = (WIDTH / map.edge as f64) as f32;
     let half = 0.5 * (map.edge as f32 - 1.0);
@@ -300,7 +300,8 @@ mod tests {
     fn a_joint_is_where_the_cells_that_count_put_it() {
         let edge = 12;
         let mut map = Map { edge, channels: 2 * A_JOINT, values: vec![0.0; edge * edge * 2 * A_JOINT] };
-        // Of the second joint one cell counts, in row 2 and column 9: half a cell beside its middle, 0.4 m behind.
+        // For the second joint a single cell has all the weight, in row 2 and column 9: half a cell from its center, 0.4 m
+        // behind.
         let cell = WIDTH as f32 / edge as f32;
         let at = (2 * edge + 9) * map.channels + A_JOINT;
         map.values[at..at + A_JOINT].copy_from_slice(&[60.0, 0.5 * cell, -0.5 * cell, 0.4]);
@@ -309,7 +310,7 @@ mod tests {
             (x - 4.0 * cell).abs() < 1e-5 && (y + 4.0 * cell).abs() < 1e-5 && (z - 0.4).abs() < 1e-5,
             "{x} {y} {z}"
         );
-        // Of the first all count the same, and the middle is between them.
+        // For the first joint all cells have equal weight, so its position is the center.
         assert!(place(&map, 0).iter().all(|value| value.abs() < 1e-5));
     }
 
@@ -325,7 +326,7 @@ mod tests {
         let end = good.windows(2).position(|pair| pair == b"\n\n").unwrap_or(0);
         let header = String::from_utf8_lossy(&good[..end]).into_owned();
         let line = header.lines().find(|line| line.starts_with("top4.weight")).unwrap_or_default();
-        // The same number of values in another shape.
+        // The same number of values with a different shape.
         let [name, out, ky, kx, inputs] = line.split(' ').collect::<Vec<_>>()[..] else { panic!("{line}") };
         let changed = header.replace(line, &format!("{name} {inputs} {ky} {kx} {out}"));
         assert!(Network::read(&[changed.as_bytes(), &good[end..]].concat()).is_err());

@@ -1,17 +1,17 @@
-//! Products of matrices with trained weights, which are sorted once for the order they are read in.
+//! Matrix products with trained weights, which are reordered once to be read sequentially.
 //!
 //! No multiplication is fused with an addition: every processor gives the same bits.
 
 use voodoo_core::math::widest;
 
-/// Columns that are worked on together.
+/// Number of columns that are processed together.
 const TOGETHER: usize = 16;
-/// Rows that are: the network's maps have multiples of nine pixels, and the sums of nine rows fit the registers of AVX-512, those of
-/// six the registers of AVX2. What is left is worked on by threes.
+/// Number of rows that are processed together. The network's maps have multiples of nine pixels; the sums of nine rows fit into
+/// the registers of AVX-512, those of six rows into the registers of AVX2. The remaining rows are processed in groups of three.
 const ROWS: [usize; 2] = [9, 6];
 const FEW_ROWS: usize = 3;
 
-/// Trained weights and biases, columns in groups of `TOGETHER`; missing columns are zeros.
+/// Trained weights and biases in groups of `TOGETHER` columns; missing columns are zeros.
 #[derive(Debug)]
 pub(crate) struct Panels {
     pub(crate) inputs: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Panels {
 }
 
 impl Panels {
-    /// Of `weights` for every output, one output after the other, and its `bias`.
+    /// From the `weights` of all outputs, output by output, and their `bias`.
     pub(crate) fn from_weights(weights: &[f32], bias: &[f32]) -> Self {
         let outputs = bias.len();
         let inputs = weights.len().checked_div(outputs).unwrap_or(0);
@@ -39,7 +39,8 @@ impl Panels {
         Self { inputs, outputs, weights: sorted, bias: sorted_bias }
     }
 
-    /// For each row of `activations`, `inputs` values, its products with the weights, and the biases: a row of `out`, `outputs` values.
+    /// Multiplies each row of `activations` (`inputs` values) with the weights and adds the biases; writes rows of `outputs`
+    /// values to `out`.
     pub(crate) fn apply(&self, activations: &[f32], out: &mut [f32]) {
         if self.inputs == 0 || self.outputs == 0 {
             return;
@@ -59,7 +60,7 @@ impl Panels {
         );
     }
 
-    /// The products with the columns of a group, `MOST` rows together.
+    /// Computes the products with the columns of a group, up to `MOST` rows at a time.
     #[inline(always)]
     fn columns<const MOST: usize>(&self, group: usize, activations: &[f32], out: &mut [f32]) {
         let (activations, out) = self.rows::<MOST>(group, activations, out);
@@ -67,7 +68,7 @@ impl Panels {
         self.rows::<1>(group, activations, out);
     }
 
-    /// The same of so many rows together, as far as there are so many; what is left.
+    /// Processes full groups of this number of rows and returns the remaining rows.
     #[inline(always)]
     fn rows<'a, 'b, const COUNT: usize>(
         &self,
@@ -92,7 +93,7 @@ impl Panels {
     }
 }
 
-/// Copies the sums of the columns that there are, mostly all: their number is then known to the compiler.
+/// Copies the sums of the existing columns. Mostly all exist, and their number is then known to the compiler.
 #[inline(always)]
 fn store(to: &mut [f32], from: &[f32; TOGETHER]) {
     match to.first_chunk_mut() {
@@ -101,7 +102,7 @@ fn store(to: &mut [f32], from: &[f32; TOGETHER]) {
     }
 }
 
-/// Whether registers hold the sums of a whole group of columns.
+/// Whether registers are wide enough for the sums of a whole group of columns.
 fn wide_registers() -> bool {
     #[cfg(target_arch = "x86_64")]
     return voodoo_core::math::has_avx512();
@@ -109,7 +110,7 @@ fn wide_registers() -> bool {
     return false;
 }
 
-/// So many rows times the columns of a group.
+/// Multiplies this number of rows with the columns of a group.
 #[inline(always)]
 fn product<const COUNT: usize>(
     rows: &[f32],
@@ -117,7 +118,7 @@ fn product<const COUNT: usize>(
     bias: &[f32; TOGETHER],
 ) -> [[f32; TOGETHER]; COUNT] {
     let inputs = panel.len();
-    // Sliced one by one, their length is known to the compiler.
+    // Sliced separately, so that the compiler knows the length of each.
     let (mut own, mut rest): ([&[f32]; COUNT], _) = ([&[]; COUNT], rows);
     for row in &mut own {
         (*row, rest) = rest.split_at(inputs);

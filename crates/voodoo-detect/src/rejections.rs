@@ -1,17 +1,19 @@
-//! What was looked at lately and is nobody: furniture stands still, and somebody who comes in shall not wait for it.
+//! Candidates that were recently evaluated and rejected. Furniture stays in place; skipping it lets a new person be detected
+//! sooner.
 
 use crate::components::PersonCandidate;
 use voodoo_core::math::Vec3;
 
-/// What stands within this of a rejected place and shows as much surface, by this factor, is the same thing; meters.
+/// A candidate is the same object as a rejected one if it lies within this distance, meters, and their surface areas differ by
+/// less than the factor below.
 const SAME_PLACE: f64 = 0.15;
 const SAME_AREA: f64 = 1.3;
-/// Things that are remembered, the last ones.
+/// Maximum number of remembered rejections; the oldest are dropped.
 const MOST_REJECTED: usize = 16;
-/// What is nobody is no news for so many images.
+/// Number of images for which a rejected candidate is not reported as new.
 const REJECTED_IMAGES: usize = 5;
 
-/// Places in the camera's frame, the last one last.
+/// Rejected positions, camera frame, the latest last.
 #[derive(Debug, Default)]
 pub(crate) struct Rejections {
     evaluations: usize,
@@ -28,22 +30,22 @@ struct Rejected {
 }
 
 impl Rejections {
-    /// Another image comes.
+    /// Starts the next image.
     pub(crate) fn next_image(&mut self) {
         self.images += 1;
     }
 
-    /// Whether a candidate was found to be nobody not long ago.
+    /// Whether a candidate was rejected recently.
     pub(crate) fn is_rejected(&self, candidate: &PersonCandidate) -> bool {
         self.places.iter().any(|place| self.images - place.image < REJECTED_IMAGES && place.matches(candidate))
     }
 
-    /// Number of the look at which a candidate was last found to be nobody; 0 for a new one.
+    /// Number of the evaluation at which a candidate was last rejected; 0 for a new candidate.
     pub(crate) fn last_rejection(&self, candidate: &PersonCandidate) -> usize {
         self.places.iter().filter(|place| place.matches(candidate)).map(|place| place.evaluation).max().unwrap_or(0)
     }
 
-    /// Notes a look.
+    /// Records an evaluation.
     pub(crate) fn record(&mut self, candidate: &PersonCandidate, person: bool) {
         self.evaluations += 1;
         self.places.retain(|place| !place.matches(candidate));

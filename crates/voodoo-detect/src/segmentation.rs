@@ -1,4 +1,4 @@
-//! From a depth image to pictures of what may be a person.
+//! Segments a depth image into candidates and crops them for the network.
 
 use crate::components::{Components, NONE, PersonCandidate};
 use crate::crop::Crop;
@@ -8,7 +8,7 @@ use voodoo_core::Surroundings;
 use voodoo_core::math::Vec3;
 use voodoo_core::{DepthImage, Ground};
 
-/// Cuts depth images into candidates; keeps its memory between images.
+/// Segments depth images into candidates; keeps its memory between images.
 #[derive(Debug, Default)]
 pub struct Segmentation {
     view: ThinnedImage,
@@ -20,7 +20,7 @@ pub struct Segmentation {
 }
 
 impl Segmentation {
-    /// Looks through an image; the candidates, those of a standing person's size first.
+    /// Segments an image and returns its candidates, those of a standing person's size first.
     pub fn find(&mut self, image: &DepthImage, around: &Surroundings) -> &[PersonCandidate] {
         let camera_from_world = image.world_from_sensor.inverse();
         self.view.read(image, around);
@@ -28,7 +28,7 @@ impl Segmentation {
             let normal = camera_from_world.rotation * ground.normal;
             Ground { normal, ..ground.relative_to(image.world_from_sensor.translation) }
         });
-        // Where nobody told it, up is upwards in the image.
+        // If no upward direction is given, up is upwards in the image.
         let up = around.up.map_or(-Vec3::Y, |up| camera_from_world.rotation * up);
         self.floor = given.or_else(|| self.floor_finder.find(&self.view, up));
         self.up = self.floor.map_or(up, |floor| floor.normal);
@@ -44,22 +44,22 @@ impl Segmentation {
         &self.candidates
     }
 
-    /// The floor of the last image, told or found, camera frame.
+    /// The floor in the last image, given or estimated, camera frame.
     pub fn floor(&self) -> Option<Ground> {
         self.floor
     }
 
-    /// Direction upwards in the last image, camera frame.
+    /// Upward direction in the last image, camera frame.
     pub fn up_direction(&self) -> Vec3 {
         self.up
     }
 
-    /// What the network sees of a candidate of the last image.
+    /// The network's input for a candidate of the last image.
     pub fn crop(&self, candidate: &PersonCandidate) -> Option<Crop> {
         Crop::from_candidate(&self.view, &self.parts, candidate, self.up)
     }
 
-    /// Indices in the image of all pixels of a candidate, those between thinned ones, too.
+    /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.
     pub fn mask(&self, candidate: &PersonCandidate, into: &mut Vec<usize>) {
         into.clear();
         for (index, _) in self.pixels(candidate) {
@@ -67,7 +67,7 @@ impl Segmentation {
         }
     }
 
-    /// The pixels of a candidate: their indices in the image and points in the camera's frame. Large images are thinned out.
+    /// The pixels of a candidate: indices in the full image and points in the camera frame. Large images are subsampled.
     pub fn pixels<'a>(&'a self, candidate: &'a PersonCandidate) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let of = |label: &u32| *label != NONE && candidate.labels.binary_search(label).is_ok();
         let indices = self.parts.labels.iter().enumerate().filter(move |(_, label)| of(label)).map(|(index, _)| index);

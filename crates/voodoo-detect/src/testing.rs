@@ -1,4 +1,4 @@
-//! What unit tests share: a synthetic depth camera that stands in the world's origin and looks along z.
+//! Shared by unit tests: a synthetic depth camera at the world's origin that looks along z.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use std::sync::LazyLock;
@@ -14,17 +14,17 @@ static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::pinhole(160, 124, [14
 /// Depth of the wall behind the body, millimeters.
 const WALL: u16 = 4500;
 
-/// A human who stands 2.6 m before the camera and faces it.
+/// A human who stands 2.6 m in front of the camera and faces it.
 pub(crate) fn standing() -> (Body, Vec<Pose>) {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
-    // The body's x looks forward and z up; the camera's y points down.
+    // The body has x forward and z up; the camera has y down.
     let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
     let faces = Quat::from_axis_angle(Vec3::Z, -std::f64::consts::FRAC_PI_2);
     let poses = body.rest_pose(Pose::from_parts(Vec3::new(0.0, 0.1, 2.6), upright * faces));
     (body, poses)
 }
 
-/// Depth in millimeters, as the camera sees a posed body before a wall.
+/// Renders the depth of a posed body in front of a wall, millimeters.
 pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     let mut rendering = Rendering::default();
     let view = Viewpoint { camera: &CAMERA, world_from_sensor: Pose::IDENTITY };
@@ -32,7 +32,7 @@ pub(crate) fn before_wall(body: &Body, poses: &[Pose]) -> Vec<u16> {
     rendering.depth().iter().map(|depth| if *depth > 0.0 { (depth * 1000.0) as u16 } else { WALL }).collect()
 }
 
-/// Puts a board that faces the camera before what an image shows; half its width and height, meters.
+/// Renders a board that faces the camera into an image; half its width and height, meters.
 pub(crate) fn put_board(pixels: &mut [u16], center: Vec3, [width, height]: [f64; 2]) {
     for (index, pixel) in pixels.iter_mut().enumerate() {
         let [x, y] = CAMERA.pixel_ray(index % CAMERA.width(), index / CAMERA.width()).map(|ray| center.z * ray);
@@ -43,7 +43,7 @@ pub(crate) fn put_board(pixels: &mut [u16], center: Vec3, [width, height]: [f64;
     }
 }
 
-/// The camera's image of these pixels.
+/// A depth image of the camera from these pixels.
 pub(crate) fn image(pixels: &[u16]) -> DepthImage<'_> {
     DepthImage {
         pixels: DepthPixels::U16(pixels),

@@ -1,35 +1,36 @@
-//! A depth image as the detector looks at it: thinned out, in meters, without what cannot be a person.
+//! The depth image as the detector uses it: subsampled, in meters, without pixels that cannot belong to a person.
 
 use voodoo_core::Camera;
 use voodoo_core::Surroundings;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{DepthImage, Ground};
 
-/// Columns and rows are thinned out until an image has at most so many pixels: a person at 4 m then still is 30 wide and 80 high.
+/// Columns and rows are subsampled until an image has at most this many pixels. A person at 4 m is then still 30 pixels wide and
+/// 80 high.
 const MOST_PIXELS: usize = 26_000;
-/// What lies less than this above the floor is left out, meters: feet would join the person to the floor.
+/// Points less than this far above the floor are removed, meters: otherwise feet would connect a person to the floor.
 const FLOOR_CLEARANCE: f64 = 0.06;
-/// Depths between which persons are looked for, meters.
+/// Range of depths that is searched for persons, meters.
 const RANGE: [f32; 2] = [0.4, 12.0];
 
-/// The thinned image. Points are in the camera's optical frame.
+/// The subsampled image. Points are in the camera's optical frame.
 #[derive(Debug, Default)]
 pub(crate) struct ThinnedImage {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Every so manyth column and row of the image was kept.
+    /// Subsampling step: every `step`-th column and row of the image is kept.
     pub(crate) step: usize,
-    /// Depth, meters; 0: nothing, or nothing that may be a person.
+    /// Depth, meters; 0 where there is no return or where the pixel cannot belong to a person.
     pub(crate) depth: Vec<f32>,
     /// `(x/z, y/z)` of every pixel.
     pub(crate) slopes: Vec<[f32; 2]>,
-    /// The image's width, for its pixels' indices.
+    /// Width of the full image, to compute pixel indices.
     columns: usize,
     camera: Option<Camera>,
 }
 
 impl ThinnedImage {
-    /// Reads an image; what holds nobody is left out but for the floor.
+    /// Reads an image. Pixels that cannot belong to a person are removed, except for the floor.
     pub(crate) fn read(&mut self, image: &DepthImage, around: &Surroundings) {
         let mut step = 1;
         let [width, height] = [image.camera.width(), image.camera.height()];
@@ -74,7 +75,7 @@ impl ThinnedImage {
         Vec3::new(z * f64::from(x), z * f64::from(y), z)
     }
 
-    /// Leaves out what is on the floor or below it.
+    /// Removes points on the floor or below it.
     pub(crate) fn remove_floor(&mut self, floor: &Ground) {
         let normal = floor.normal.to_array().map(|value| value as f32);
         let least = (floor.offset + FLOOR_CLEARANCE) as f32;
@@ -85,7 +86,7 @@ impl ThinnedImage {
         }
     }
 
-    /// The pixel in whose direction `(x/z, y/z)` lies.
+    /// The pixel in the direction `(x/z, y/z)`.
     pub(crate) fn pixel_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let camera = self.camera.as_ref()?;
         if camera.distorts() {
@@ -103,13 +104,13 @@ impl ThinnedImage {
         inside.then(|| row as usize * self.width + column as usize)
     }
 
-    /// Surface that a pixel covers at a depth of 1 m, square meters.
+    /// Surface area that a pixel covers at a depth of 1 m, square meters.
     pub(crate) fn pixel_area(&self) -> f64 {
         let [fx, fy] = self.camera.as_ref().map_or([1.0; 2], Camera::focal);
         (self.step * self.step) as f64 / (fx * fy)
     }
 
-    /// The pixels of the image for which one with this index in the image stands.
+    /// Appends the pixels of the full image that the subsampled pixel with this full-image index stands for.
     pub(crate) fn block(&self, index: usize, into: &mut Vec<usize>) {
         let (row, column) = (index / self.columns, index % self.columns);
         for row in row..row + self.step {
@@ -117,7 +118,7 @@ impl ThinnedImage {
         }
     }
 
-    /// Index in the image of a pixel.
+    /// Index of a pixel in the full image.
     pub(crate) fn in_image(&self, index: usize) -> usize {
         (index / self.width) * self.step * self.columns + (index % self.width) * self.step
     }

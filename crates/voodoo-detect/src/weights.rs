@@ -25,7 +25,7 @@ impl WeightsError {
     }
 }
 
-/// A matrix, a row for every output and a column for every input, with its biases and the edge of its kernel.
+/// A matrix with a row for every output and a column for every input, its biases, and the edge of its kernel.
 #[derive(Debug)]
 pub(crate) struct Layer {
     pub(crate) weights: Vec<f32>,
@@ -40,7 +40,7 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Reads a file's bytes.
+    /// Parses the bytes of a file.
     pub(crate) fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
         let mut rest = bytes;
         let first = line(&mut rest)?;
@@ -81,7 +81,7 @@ impl Weights {
         self.tensors.contains_key(name)
     }
 
-    /// Shape and values of a tensor with so many edges.
+    /// Takes the shape and values of a tensor with `edges` dimensions.
     fn take(&mut self, name: &str, edges: usize) -> Result<(Vec<usize>, Vec<f32>), WeightsError> {
         let expected_text = || format!("{name} with {edges} edge(s)");
         let Some((shape, values)) = self.tensors.remove(name) else {
@@ -93,7 +93,7 @@ impl Weights {
         Ok((shape, values))
     }
 
-    /// A layer whose weights have so many edges.
+    /// Takes a layer whose weights have `edges` dimensions.
     pub(crate) fn layer(&mut self, name: &str, edges: usize) -> Result<Layer, WeightsError> {
         let (shape, weights) = self.take(&format!("{name}.weight"), edges)?;
         let (_, bias) = self.take(&format!("{name}.bias"), 1)?;
@@ -109,7 +109,7 @@ impl Weights {
     }
 }
 
-/// The next line, without its end.
+/// Returns the next line without its newline and removes it from `rest`.
 fn line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, WeightsError> {
     let wrong = || WeightsError::new("lines of ASCII", "something else");
     let end = rest.iter().take(200).position(|byte| *byte == b'\n').ok_or_else(wrong)?;
@@ -123,7 +123,7 @@ fn from_half(bytes: [u8; 2]) -> f32 {
     let half = u32::from(u16::from_le_bytes(bytes));
     let (sign, exponent, fraction) = ((half & 0x8000) << 16, (half >> 10) & 0x1f, half & 0x3ff);
     match exponent {
-        // Below the least normal number: the fraction counts in steps of 2^-24.
+        // Subnormal numbers: the fraction counts in steps of 2^-24.
         0 => f32::from_bits(sign | (fraction as f32 * 2.0_f32.powi(-24)).to_bits()),
         0x1f => f32::from_bits(sign | 0x7f80_0000 | (fraction << 13)),
         _ => f32::from_bits(sign | ((exponent + 112) << 23) | (fraction << 13)),

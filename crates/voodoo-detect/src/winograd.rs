@@ -1,21 +1,21 @@
-//! Convolutions with kernels of 3 x 3 by fewer multiplications: Winograd's minimal filtering F(2 x 2, 3 x 3), see Lavin and Gray, "Fast
-//! Algorithms for Convolutional Neural Networks", CVPR 2016.
+//! Convolutions with 3 x 3 kernels that need fewer multiplications: Winograd's minimal filtering F(2 x 2, 3 x 3), see Lavin and
+//! Gray, "Fast Algorithms for Convolutional Neural Networks", CVPR 2016.
 //!
-//! Every 4 x 4 pixels of the map give 2 x 2 pixels after it. Both are sums of transformed ones; there the convolution is a product
-//! for each of the 16 places, 16 multiplications instead of 36.
+//! A 4 x 4 tile of the input map gives 2 x 2 output pixels. Both are linear transforms of tiles in which the convolution is one
+//! product for each of the 16 positions: 16 multiplications instead of 36.
 
 use crate::product::Panels;
 use voodoo_core::math::widest;
 
 /// Edge of the kernel.
 pub(crate) const KERNEL: usize = 3;
-/// Edge of what is seen at once.
+/// Edge of an input tile.
 const TILE: usize = 4;
-/// Edge of what that gives.
+/// Edge of an output tile.
 const OUTPUT_TILE: usize = TILE + 1 - KERNEL;
-/// Places of a transformed tile.
+/// Number of positions in a transformed tile.
 const PLACES: usize = TILE * TILE;
-/// Of these the one that all pixels of a tile get with weight one: the bias is added there.
+/// The position that contributes to all output pixels of a tile with weight one: the bias is added there.
 const EVERYWHERE: usize = TILE + 1;
 
 /// A convolution with a kernel of 3 x 3 that keeps the map's even edge.
@@ -24,7 +24,7 @@ pub(crate) struct Winograd {
     places: Vec<Panels>,
 }
 
-/// Working memory: all tiles of the map, place by place, before and after the products.
+/// Working memory: all tiles of the map, position by position, before and after the products.
 #[derive(Debug, Default)]
 pub(crate) struct Tiles {
     input_tiles: Vec<f32>,
@@ -32,7 +32,7 @@ pub(crate) struct Tiles {
 }
 
 impl Winograd {
-    /// Of `weights` (out, ky, kx, in) and biases.
+    /// From `weights` (out, ky, kx, in) and biases.
     pub(crate) fn from_weights(weights: &[f32], bias: &[f32]) -> Self {
         let none = vec![0.0; bias.len()];
         let inputs = weights.len().checked_div(bias.len() * KERNEL * KERNEL).unwrap_or(0);
@@ -62,7 +62,7 @@ impl Winograd {
         self.places[0].outputs
     }
 
-    /// The map after it, of the same `edge`.
+    /// Writes the output map, which has the same `edge`.
     pub(crate) fn apply(&self, map: &[f32], edge: usize, tiles: &mut Tiles, out: &mut [f32]) {
         let (inputs, outputs) = (self.inputs(), self.outputs());
         let count = (edge / OUTPUT_TILE) * (edge / OUTPUT_TILE);
@@ -86,7 +86,7 @@ impl Winograd {
     }
 }
 
-/// Transforms a line of the kernel.
+/// Transforms one line of a kernel.
 fn of_kernel([a, b, c]: [f32; KERNEL]) -> [f32; TILE] {
     [a, 0.5 * (a + b + c), 0.5 * (a - b + c), c]
 }
@@ -96,7 +96,7 @@ const CHANNELS: usize = 16;
 /// The values of these channels.
 type Values = [f32; CHANNELS];
 
-/// All transformed tiles of a map, with zeros around it.
+/// Transforms all tiles of a map, with zeros around the map.
 #[inline(always)]
 fn transform_input(map: &[f32], edge: usize, channels: usize, input_tiles: &mut [f32]) {
     let across = edge / OUTPUT_TILE;
@@ -109,7 +109,7 @@ fn transform_input(map: &[f32], edge: usize, channels: usize, input_tiles: &mut 
             let here = CHANNELS.min(channels - first);
             for (row, line) in tile.iter_mut().enumerate() {
                 for (column, values) in line.iter_mut().enumerate() {
-                    // The tile begins a pixel before what it gives.
+                    // A tile starts one pixel before its output.
                     let [y, x] = [top + row, left + column];
                     if y == 0 || x == 0 || y > edge || x > edge {
                         *values = [0.0; CHANNELS];
@@ -143,7 +143,7 @@ fn transform_input(map: &[f32], edge: usize, channels: usize, input_tiles: &mut 
     }
 }
 
-/// The map from all its tiles.
+/// Assembles the output map from its tiles.
 #[inline(always)]
 fn transform_output(output_tiles: &[f32], edge: usize, channels: usize, out: &mut [f32]) {
     let across = edge / OUTPUT_TILE;
@@ -179,7 +179,7 @@ fn transform_output(output_tiles: &[f32], edge: usize, channels: usize, out: &mu
     }
 }
 
-/// Copies all channels, or those that there are.
+/// Copies all channels, or those that remain.
 #[inline(always)]
 fn load(to: &mut Values, from: &[f32]) {
     match from.first_chunk() {

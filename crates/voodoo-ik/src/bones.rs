@@ -1,4 +1,4 @@
-//! The segments that stand for a chain in the images, joint to joint (J10 eq. 6), and the trunk they cannot be in.
+//! The segments that represent a chain in the images, from joint to joint (J10 eq. 6), and the trunk, which they must not enter.
 
 use super::image::Bone;
 use super::model::ChainModel;
@@ -6,12 +6,13 @@ use super::trunk::{Carrier, Trunk};
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 
-/// A limb that the trunk carries starts in it: from this share of its length on it must lie outside.
+/// A limb attached to the trunk starts inside it; beyond this fraction of its length it must be outside.
 const FREE_OF_TRUNK: f64 = 0.5;
 
-/// One segment from the joint of every limb to each joint of its children in the chain, or to the end of a last limb: its
-/// farthest site, else its distal end. A root limb without a joint has none. Radius: the smaller semi-axes
-/// times `margin`, since a limb is at least as wide as they are, however it is turned about itself; with 0 the criterion is J10's.
+/// Returns one segment from the joint of every limb to each joint of its children in the chain. The segment of a last limb ends
+/// at its farthest site, else at its distal end. A root limb without a joint has none. The radius is the smaller semi-axes times
+/// `margin`, because a limb is at least that wide however it is rotated about its axis. With a margin of 0 the criterion is that
+/// of J10.
 pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
     let mut segments = Vec::new();
     for (index, link) in model.links().iter().enumerate() {
@@ -28,7 +29,7 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
             ends.push(farthest.filter(|end| (*end - start).length() > 1e-6).unwrap_or(Vec3::Z * shape.length()));
         }
         let parent = limb.parent.as_ref().map_or(0, |(parent, _)| *parent);
-        // Limbs start in the trunk that carries them; those of the trunk itself are in it.
+        // Limbs start inside the trunk that carries them; the trunk's own limbs lie in it.
         let apart = if branches(body, link.limb) {
             1.0
         } else if branches(body, parent) {
@@ -41,7 +42,7 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
     segments
 }
 
-/// The limbs of the chain, and its base, from which several others branch: the trunk.
+/// The trunk: limbs of the chain, and its base, from which several other limbs branch.
 pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
     let mut found = Vec::new();
     let base =

@@ -1,11 +1,11 @@
-//! What a site shall reach: a position, or a line of sight.
+//! Targets of sites: a position, or a line of sight.
 
 use std::ops::Range;
 
 use super::model::{ChainModel, Kinematics};
 use voodoo_core::math::Vec3;
 
-/// Where a point shall be.
+/// The target of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
     /// At a world position.
@@ -26,7 +26,8 @@ impl Aim {
         Self::Line { n, m: origin.cross(n) }
     }
 
-    /// The residual of a point at `x`: its offset, or `x x n - m` (R07 eq. 11), as long as its distance from the line.
+    /// The residual of a point at `x`: its offset from the position, or `x x n - m` (R07 eq. 11), whose length is its distance
+    /// from the line.
     pub fn residual(&self, x: Vec3) -> Vec3 {
         match self {
             Self::Position(p) => x - *p,
@@ -43,18 +44,18 @@ impl Aim {
     }
 }
 
-/// A point on a part and its aim.
+/// A point on a link and its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
-    /// Index of the part.
+    /// Index of the link.
     pub link: usize,
     /// The point in the limb's frame.
     pub point: Vec3,
-    /// Where it shall be.
+    /// Its target.
     pub aim: Aim,
-    /// Weight against the other goals of its level.
+    /// Weight relative to the other goals of its level.
     pub weight: f64,
-    /// Priority: a goal never disturbs one of a smaller level.
+    /// Priority: a goal never disturbs goals of smaller levels.
     pub level: usize,
 }
 
@@ -70,7 +71,7 @@ pub fn level_cost(goals: &[Goal], at: &Kinematics) -> f64 {
     goals.iter().map(|goal| goal.weight * goal.residual(at).length_squared()).sum()
 }
 
-/// Residuals and Jacobian (row-major, three rows a goal) of the goals, both times the roots of the weights.
+/// Residuals and Jacobian (row-major, three rows per goal) of the goals, both multiplied by the square roots of the weights.
 pub fn level_rows(
     model: &ChainModel,
     goals: &[Goal],
@@ -97,7 +98,7 @@ pub fn level_rows(
     }
 }
 
-/// The runs of equal levels in goals sorted by level.
+/// The ranges of equal levels in goals sorted by level.
 pub(super) fn level_ranges(goals: &[Goal], ranges: &mut Vec<Range<usize>>) {
     ranges.clear();
     let mut start = 0;

@@ -8,35 +8,39 @@ use voodoo_core::math::{Mat3, Vec3};
 /// Samples on a projected segment, in place of the sum over its pixels in J10 eq. 5.
 pub const SAMPLES: usize = 8;
 
-/// A bone that shall lie inside the silhouettes.
+/// A bone that is to lie inside the silhouettes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bone {
-    /// Part and point in its frame of both ends.
+    /// Both ends: a link and a point in its frame.
     pub ends: [(usize, Vec3); 2],
-    /// How deep inside it shall lie at both ends, and in proportion between: the limb's radius, meters; 0 is J10's criterion.
+    /// How deep inside the silhouette it must lie at both ends, interpolated between: the limb's radius, meters; 0 is J10's
+    /// criterion.
     pub radius: [f64; 2],
-    /// From which share of its length on it lies outside of the trunk; 1: it need not.
+    /// The fraction of its length beyond which it must lie outside the trunk; 1: it need not.
     pub apart: f64,
 }
 
-/// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5); depth: the projected radius less
-/// what the border is uncertain by or, where the silhouette is about as thin as the limb, half the silhouette's width less half
-/// of that. Views with depths add how far the bone's flesh lies before what they see, see [`SilhouetteView::depth`].
+/// `h`: mean over all samples of all views of `max(distance + depth, 0)`, pixels (J10 eq. 5). `depth` is the projected radius
+/// minus the uncertainty of the border. Where the silhouette is approximately as thin as the limb, it is half the silhouette's
+/// width minus half of that uncertainty. Views with depths add how far the bone's flesh lies in front of the measured depth, see
+/// [`SilhouetteView::depth`].
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
     pub views: &'a [SilhouetteView<'a>],
     /// The bones.
     pub segments: &'a [Bone],
-    /// Up to how many radii the silhouette is the limb itself, in whose middle the bone shall lie; 0: nowhere.
+    /// The silhouette counts as the limb itself where its half width is at most this many radii; the bone is then centered in it.
+    /// 0: nowhere.
     pub thin: f64,
-    /// What the bones cannot lie in: the trunk, and limbs beside the chain.
+    /// What the bones may not enter: the trunk, and limbs outside the chain.
     pub trunk: &'a [Trunk],
 }
 
 impl Criterion<'_> {
-    /// What `h` changes by at most per radian, about, if one of the views sees the bones outside: their mean projected length, pixels,
-    /// if they lay across the line of sight, over the number of views. So a view that is content changes no step.
+    /// Approximate upper bound of the change of `h` per radian if one view sees the bones outside: their mean projected length,
+    /// pixels, as if perpendicular to the line of sight, divided by the number of views. Thus a view without violations does not
+    /// change the step.
     pub fn reach(&self, at: &Kinematics) -> f64 {
         let mut sum = 0.0;
         for segment in self.segments {
@@ -50,7 +54,8 @@ impl Criterion<'_> {
         sum / (views * views * self.segments.len()).max(1) as f64
     }
 
-    /// The criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples no camera sees count zero.
+    /// Computes the criterion, and its gradient by all unknowns into `gradient` (J10 eq. 7, 8). Samples that no camera sees count
+    /// as zero.
     pub fn evaluate(&self, model: &ChainModel, at: &Kinematics, gradient: &mut [f64]) -> f64 {
         gradient.fill(0.0);
         let count = self.views.len() * self.segments.len() * SAMPLES;
@@ -61,7 +66,7 @@ impl Criterion<'_> {
         let mut h = 0.0;
         for segment in self.segments {
             let ends = segment.ends.map(|(link, point)| at.poses[link].transform_point(point));
-            // Derivatives of h by the world positions of both ends.
+            // Derivatives of `h` with respect to the world positions of both ends.
             let mut forces = [Vec3::ZERO; 2];
             h += self.within(model, at, segment, &ends, &mut forces, gradient);
             for view in self.views {
@@ -95,8 +100,8 @@ impl Criterion<'_> {
         fraction * h
     }
 
-    /// How deep the samples of a segment lie in the trunk, in pixels of every view, and the derivative by both ends; that by
-    /// the trunk's own motion goes into `gradient`.
+    /// How deep the samples of a segment lie in the trunk, in pixels of every view, and the derivative with respect to both ends.
+    /// The derivative due to the trunk's own motion is added to `gradient`.
     fn within(
         &self,
         model: &ChainModel,
@@ -142,7 +147,7 @@ impl Criterion<'_> {
     }
 }
 
-/// Adds the derivative by all unknowns that move a part: a force on it at a world position.
+/// Adds the derivative by all unknowns that move a link, given a force on it at a world position.
 fn add_force(model: &ChainModel, at: &Kinematics, link: usize, x: Vec3, force: Vec3, gradient: &mut [f64]) {
     let moment = x.cross(force);
     for &mover in model.movers(link) {
@@ -151,7 +156,7 @@ fn add_force(model: &ChainModel, at: &Kinematics, link: usize, x: Vec3, force: V
     }
 }
 
-/// Where on a segment the samples are, as shares of its length.
+/// Positions of the samples on a segment, as fractions of its length.
 fn places() -> impl Iterator<Item = f64> {
     (0..SAMPLES).map(|sample| (sample as f64 + 0.5) / SAMPLES as f64)
 }

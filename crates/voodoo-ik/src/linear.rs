@@ -1,11 +1,11 @@
-//! Row vectors: damped pseudo-inverse and null spaces, without heap after the first use.
+//! Row-vector linear algebra: damped pseudo-inverse and null spaces, without heap allocation after the first use.
 
 use voodoo_core::math::{dot, solve_in_place};
 
-/// A row that keeps less than this share of the longest one depends on those before it.
+/// A row whose remainder is below this fraction of the longest row depends linearly on the rows before it.
 const RANK: f64 = 1e-9;
 
-/// Orthonormal directions taken by higher levels and by limits: `I - Q^T Q` projects into the null space.
+/// Orthonormal directions used by higher levels and by limits: `I - Q^T Q` projects into the null space.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Taken {
     rows: Vec<f64>,
@@ -22,12 +22,12 @@ impl Taken {
         self.rows.is_empty()
     }
 
-    /// Leaves of `row` only what lies in the null space.
+    /// Projects `row` into the null space.
     pub(crate) fn project(&self, row: &mut [f64]) {
         orthogonalize(&self.rows, row);
     }
 
-    /// Takes the directions of the rows of a matrix.
+    /// Adds the row space of a matrix to the used directions.
     pub(crate) fn take(&mut self, rows: &[f64]) {
         let longest = rows.chunks_exact(self.n).map(|row| dot(row, row)).fold(0.0, f64::max).sqrt();
         for row in rows.chunks_exact(self.n) {
@@ -36,7 +36,7 @@ impl Taken {
         }
     }
 
-    /// Takes one unknown, which stands at its limit; false when it was taken before.
+    /// Adds one unknown that is at its limit; returns false if it was already used.
     pub(crate) fn pin(&mut self, unknown: usize) -> bool {
         let start = self.rows.len();
         self.rows.resize(start + self.n, 0.0);
@@ -44,7 +44,7 @@ impl Taken {
         self.close(1e-7)
     }
 
-    /// Makes the last row orthonormal to the others, or drops it when less than `least` is left.
+    /// Orthonormalizes the last row against the others, or drops it if less than `least` remains.
     fn close(&mut self, least: f64) -> bool {
         let start = self.rows.len() - self.n;
         let (taken, new) = self.rows.split_at_mut(start);
@@ -59,7 +59,7 @@ impl Taken {
     }
 }
 
-/// Gram-Schmidt, twice: once leaves an error of the size of the cancellation.
+/// Gram-Schmidt, applied twice: one pass leaves an error of the size of the cancellation.
 fn orthogonalize(basis: &[f64], row: &mut [f64]) {
     for _ in 0..2 {
         for q in basis.chunks_exact(row.len()) {
@@ -73,7 +73,7 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, value| most.max(value.abs()))
 }
 
-/// Memory of [`Damped::solve`].
+/// Working memory of [`Damped::solve`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Damped {
     h: Vec<f64>,
@@ -81,13 +81,14 @@ pub(super) struct Damped {
 }
 
 impl Damped {
-    /// `x = A^T (A A^T + damping I)^-1 b = (A^T A + damping I)^-1 A^T b`, whichever side is smaller; zero for a zero matrix.
+    /// Computes `x = A^T (A A^T + damping I)^-1 b = (A^T A + damping I)^-1 A^T b` with the smaller of the two systems; zero for a
+    /// zero matrix.
     pub(crate) fn solve(&mut self, a: &[f64], b: &[f64], damping: f64, x: &mut [f64]) {
         let (rows, n) = (b.len(), x.len());
         let size = rows.min(n);
         let mut damping = damping;
         x.fill(0.0);
-        // Rounding can make the matrix indefinite when it is all but singular: then more damping is the answer.
+        // Rounding can make a nearly singular matrix indefinite; more damping resolves that.
         for _ in 0..6 {
             self.h.clear();
             self.h.resize(size * size, 0.0);

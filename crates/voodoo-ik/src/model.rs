@@ -1,4 +1,4 @@
-//! A body, or a part of one, as a chain with exact joints; its unknowns are the vector of joint angles.
+//! A body, or a part of one, as a chain with exact joints. The unknowns are the vector of joint angles.
 
 use voodoo_core::BodyError;
 use voodoo_core::kinematics::hinge_axis;
@@ -12,16 +12,16 @@ use super::twist::turn;
 pub enum Root {
     /// Six unknowns: position and rotation vector of the root limb in the base frame.
     Free,
-    /// The base frame is the parent of the chain's first limb, or the root limb itself.
+    /// No unknowns: the base frame is the parent of the chain's first limb, or the root limb itself.
     Fixed,
 }
 
-/// How a part moves against its parent.
+/// How a link moves relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
     /// Not at all.
     Rigid,
-    /// Three shifts and a rotation vector.
+    /// Three translations and a rotation vector.
     Free,
     /// One angle about an axis of the joint frame.
     Hinge(Vec3),
@@ -34,51 +34,52 @@ pub enum Turn {
 pub struct Link {
     /// Index of the limb in the body.
     pub limb: usize,
-    /// Part it hangs on; `None`: the base.
+    /// The parent link; `None`: the base.
     pub parent: Option<usize>,
     /// Joint frame on the parent.
     pub parent_from_joint: Pose,
-    /// Joint frame on the limb, inverted.
+    /// Inverse of the joint frame on the limb.
     pub joint_from_limb: Pose,
-    /// The freedoms of its joint.
+    /// The degrees of freedom of its joint.
     pub turn: Turn,
     /// Its first unknown.
     pub start: usize,
 }
 
-/// The chain: what stays constant while it moves.
+/// The chain: everything that stays constant while it moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainModel {
     links: Vec<Link>,
     names: Vec<String>,
     limits: Vec<[f64; 2]>,
-    /// Of every part, the unknowns that move it, and where they start in that list.
+    /// For every link, the unknowns that move it; and where they start in that list.
     movers: Vec<Vec<usize>>,
 }
 
-/// Derivative of the world position of a point `x` on any limb beyond: `omega x x + v` for a unit rate of the unknown.
+/// Derivative of the world position of a point `x` on any limb distal to the joint: `omega x x + v` for a unit rate of the
+/// unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
     /// Angular velocity, world axes.
     pub omega: Vec3,
-    /// Velocity of the world's origin.
+    /// Velocity at the world's origin.
     pub v: Vec3,
 }
 
-/// Where everything is at one vector of angles; memory to be used again.
+/// Poses and derivatives at one vector of angles; memory to be reused.
 #[derive(Clone, Debug, Default)]
 pub struct Kinematics {
     /// World pose of the base.
     pub base: Pose,
-    /// World pose of every part.
+    /// World pose of every link.
     pub poses: Vec<Pose>,
-    /// One column an unknown.
+    /// One column per unknown.
     pub columns: Vec<Column>,
 }
 
 impl ChainModel {
-    /// The chain of the chosen limbs of a body (all when `limbs` is empty). They must hang together: each but the first on
-    /// another one.
+    /// Builds the chain of the chosen limbs of a body (all when `limbs` is empty). The limbs must be connected: each but the
+    /// first is the child of another one.
     pub fn new(body: &Body, limbs: &[usize], root: Root) -> Result<Self, BodyError> {
         let all: Vec<usize> = (0..body.limbs().len()).collect();
         let mut chosen = if limbs.is_empty() { all } else { limbs.to_vec() };
@@ -154,7 +155,7 @@ impl ChainModel {
         &self.links
     }
 
-    /// Names of the unknowns: `root_x` ... `root_rz`, `NAME_flexion` of a hinge, `NAME_rx`, `NAME_ry`, `NAME_rz` otherwise.
+    /// Names of the unknowns: `root_x` ... `root_rz`; `NAME_flexion` for a hinge; `NAME_rx`, `NAME_ry`, `NAME_rz` otherwise.
     pub fn names(&self) -> &[String] {
         &self.names
     }
@@ -169,17 +170,17 @@ impl ChainModel {
         self.names.len()
     }
 
-    /// The unknowns that move a part.
+    /// The unknowns that move a link.
     pub fn movers(&self, link: usize) -> &[usize] {
         &self.movers[link]
     }
 
-    /// The part that is a limb of the body.
+    /// The link of a limb of the body.
     pub fn link_of(&self, limb: usize) -> Option<usize> {
         self.links.iter().position(|link| link.limb == limb)
     }
 
-    /// Forward kinematics and its derivative (R07 eq. 10): poses of all parts and the screw of every unknown.
+    /// Forward kinematics and its derivative (R07 eq. 10): poses of all links and the screw of every unknown.
     pub fn place(&self, world_from_base: &Pose, angles: &[f64], at: &mut Kinematics) {
         let Kinematics { base, poses, columns } = at;
         *base = *world_from_base;

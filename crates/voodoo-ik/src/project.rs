@@ -1,4 +1,4 @@
-//! Poses of limbs that are not quite joined (K07's elastic joints) as angles of the chain.
+//! Projects the poses of loosely joined limbs (K07's elastic joints) to angles of the chain.
 
 use super::goal::{Aim, Goal};
 use super::model::{ChainModel, Turn};
@@ -8,10 +8,11 @@ use voodoo_core::kinematics::joint_turn;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Joint};
 
-/// Lever of a limb's turns about its axis against its position, meters: about the radius of an arm.
+/// Lever that weights a limb's rotation about its axis against its position, meters: approximately the radius of an arm.
 const GIRTH: f64 = 0.05;
 
-/// Angles as the joints of `poses` (one a limb of the body, world) stand; gaps are not looked at. Within the limits.
+/// Reads the joint angles from `poses` (one per limb of the body, world frame); gaps at the joints are ignored. The result is
+/// within the limits.
 pub fn read(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
     angles.clear();
     angles.resize(model.freedoms(), 0.0);
@@ -40,7 +41,7 @@ pub fn read(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Po
     }
 }
 
-/// The angles of the closed chain that is nearest to `poses`: least squares over both ends and the girth of every limb.
+/// Finds the angles of the closed chain nearest to `poses`: least squares over both ends and the girth of every limb.
 pub fn project(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
     read(body, model, world_from_base, poses, angles);
     let mut goals = Vec::with_capacity(4 * model.links().len());

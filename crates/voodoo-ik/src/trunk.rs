@@ -1,25 +1,26 @@
-//! The trunk and other limbs, in which no bone can lie: silhouettes cannot tell, since an arm in the trunk is content before and
-//! behind it, and a leg in the other one, too.
+//! The trunk and other limbs, which no bone may enter. Silhouettes do not detect this: an arm inside the trunk satisfies them as
+//! well as one in front of it or behind it, and so does a leg inside the other one.
 
 use super::model::Kinematics;
 use voodoo_core::TaperedEllipticCylinder;
 use voodoo_core::math::{Pose, Vec3};
 
-/// A bone keeps this share of its radius off the trunk: flesh gives way, and the model's limbs are stiffer than a back.
+/// A bone stays this fraction of its radius outside the trunk: flesh is compressible, and the model's limbs are stiffer than a
+/// back.
 const CLEARANCE: f64 = 0.5;
 
-/// What carries a limb that no bone can lie in.
+/// What carries a limb that no bone may enter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Carrier {
-    /// It is the base of the chain.
+    /// The base of the chain.
     Base,
-    /// It is a part of the chain.
+    /// A link of the chain.
     Link(usize),
-    /// It is no part of the chain and has this pose in the world.
+    /// It is not part of the chain and has this pose in the world.
     World(Pose),
 }
 
-/// A limb no bone can lie in: a tapered elliptic cylinder along z of its frame.
+/// A limb that no bone may enter: a tapered elliptic cylinder along z of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trunk {
     /// What carries it.
@@ -33,7 +34,7 @@ pub struct Trunk {
 }
 
 impl Trunk {
-    /// A limb's shape somewhere.
+    /// A limb's shape on a carrier.
     pub fn new(shape: &TaperedEllipticCylinder, carrier: Carrier) -> Self {
         Self { carrier, length: shape.length(), a: [shape.a0(), shape.a1()], b: [shape.b0(), shape.b1()] }
     }
@@ -47,8 +48,8 @@ impl Trunk {
         }
     }
 
-    /// How deep a point with flesh of a radius around it lies inside, meters (about: by the level of the ellipse), and the
-    /// derivative by the point, in the trunk's frame.
+    /// How deep a point with flesh of a radius around it lies inside, meters (approximate, from the ellipse's level function),
+    /// and the derivative with respect to the point, in the trunk's frame.
     pub(super) fn depth(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
         let t = x.z / self.length;
         if !(0.0..=1.0).contains(&t) {

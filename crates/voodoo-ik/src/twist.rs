@@ -7,8 +7,8 @@ use voodoo_core::math::{Pose, Quat, ShortestAxis, Vec3};
 /// The twist `(omega, v)`, `omega` at most pi long, with `exp(log(T)) = T` (R07 eq. 8, 9).
 ///
 /// R07 inverts `A = (I - exp(theta w^)) w^ + w w^T theta`. For a unit axis `w` and `theta v` instead of `v` that inverse is
-/// `I - [omega]/2 + k [omega]^2` with `k = (1 - (theta/2) cot(theta/2)) / theta^2`, which has no division by zero at 0 (a
-/// series takes over) and none at pi, where R07's formula for the axis, divided by `sin(theta)`, breaks down.
+/// `I - [omega]/2 + k [omega]^2` with `k = (1 - (theta/2) cot(theta/2)) / theta^2`. It has no division by zero at 0 (a series is
+/// used there) and none at pi, where R07's formula for the axis, which divides by `sin(theta)`, breaks down.
 pub fn log(pose: &Pose) -> Vector6<f64> {
     let omega = rotation_vector(pose.rotation);
     let t = pose.translation;
@@ -17,12 +17,12 @@ pub fn log(pose: &Pose) -> Vector6<f64> {
     Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)
 }
 
-/// Rotation vector of the shorter way round, at most pi long; exact to rounding at 0 and at pi.
+/// Rotation vector of the shorter rotation, at most pi long; exact to rounding at 0 and at pi.
 pub(super) fn rotation_vector(rotation: Quat) -> Vec3 {
     rotation.to_scaled_axis_shortest()
 }
 
-/// `(1 - (t/2) cot(t/2)) / t^2` of the squared angle.
+/// `(1 - (t/2) cot(t/2)) / t^2` as a function of the squared angle.
 fn inverse_factor(square: f64) -> f64 {
     if square < 1e-4 {
         1.0 / 12.0 + square / 720.0 + square * square / 30240.0

@@ -1,39 +1,40 @@
-//! One picture of the image criterion: how far a point lies outside of its silhouette, or before what it sees.
+//! One image of the image criterion: how far a point lies outside the silhouette, or in front of the measured depth.
 
 use voodoo_core::Camera;
 use voodoo_core::math::{Pose, Vec3};
 
-/// Points nearer to the camera plane than this, or behind it, are not seen; meters.
+/// Points nearer to the camera plane than this, or behind it, are ignored; meters.
 pub(super) const NEAREST: f64 = 0.05;
-/// Four depths that differ by more than this share do not belong to one surface.
+/// Four neighboring depths that differ by more than this fraction do not belong to one surface.
 const EDGE: f64 = 0.03;
-/// So many radii behind what is seen of a limb its bone is at least: one across the line of sight, less where the person is
-/// slimmer than the body.
+/// Minimum distance of a bone behind the measured surface of its limb, in radii. It is one for a limb perpendicular to the line
+/// of sight, and less where the person is slimmer than the body model.
 const LEAST_RADII: f64 = 0.5;
-/// And at most: more than one where the limb is seen along its axis.
+/// The maximum: more than one where the limb is observed along its axis.
 const MOST_RADII: f64 = 2.0;
 
-/// One calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
+/// A calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
 #[derive(Clone, Copy, Debug)]
 pub struct SilhouetteView<'a> {
-    /// Of every pixel, row by row, at least 2 x 2: its distance and, inside, the radius of the largest disc within the silhouette
-    /// that covers it, pixels: half its local width. Radii of zero: no bone is centerd. Together, since they are looked up together.
+    /// For every pixel, row by row, at least 2 x 2: the signed distance and, inside, the radius of the largest disc within the
+    /// silhouette that covers the pixel, in pixels. That radius is half the local width. If all radii are zero, no bone is
+    /// centered. The two values are stored together because they are read together.
     pub pixels: &'a [[f32; 2]],
-    /// Of every pixel the depth seen along the optical axis, meters, zero where there is none; or none at all. A bone lies its radius
-    /// behind what is seen, or farther; where the silhouette is the limb itself, no farther.
+    /// For every pixel, the measured depth along the optical axis, meters, zero where there is none; empty without depth. A bone
+    /// lies at least its radius behind the measured surface; where the silhouette is the limb itself, no farther.
     pub depth: &'a [f32],
-    /// How far its border may be from where it should be, pixels: that much less deep is deep enough. The middle between two
-    /// borders is known to half of that.
+    /// Uncertainty of the silhouette's border, pixels. The required depth inside the silhouette is reduced by it. The midline
+    /// between two borders is known to half of it.
     pub border: f64,
-    /// The camera, without distortion: take that out of masks and depths before.
+    /// The camera, without distortion: masks and depths must be undistorted before.
     pub camera: &'a Camera,
     /// Pose of the world in the optical frame.
     pub camera_from_world: Pose,
 }
 
 impl SilhouetteView<'_> {
-    /// `max(distance + depth, 0)` of a point in the optical frame and how far it lies before what is seen, both pixels, and the
-    /// derivative by that point.
+    /// Returns `max(distance + depth, 0)` of a point in the optical frame plus how far it lies in front of the measured depth,
+    /// both in pixels, and the derivative with respect to the point.
     pub(super) fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
         if x.z < NEAREST {
             return (0.0, Vec3::ZERO);
@@ -47,11 +48,11 @@ impl SilhouetteView<'_> {
         let [distance, mut du, mut dv] = distance.at(&at);
         let projected = fx * radius * inverse;
         let mut depth = (projected - self.border).max(0.0);
-        // The derivative of the depth by the distance from the camera plane.
+        // The derivative of the depth with respect to the distance from the camera plane.
         let mut closer = if depth > 0.0 { projected } else { 0.0 };
         let middle = 0.5 * self.border;
         let mut own_surface = false;
-        // No place is deeper than half the width: what is too deep to be thin need not be looked at.
+        // No pixel is deeper inside than half the width, so a pixel deeper than this cannot be in a thin part.
         if distance < 0.0 && -distance <= thin * projected {
             let [half, su, sv] = half.at(&at);
             own_surface = half > 0.0 && half <= thin * projected;
@@ -75,8 +76,8 @@ impl SilhouetteView<'_> {
         (value, slope)
     }
 
-    /// How far the flesh around a point lies before what is seen there, or behind it if what is seen is the limb itself, pixels
-    /// (meters as they would appear across the line of sight), and the derivative by the point.
+    /// How far the flesh around a point lies in front of the measured surface, or behind it if that surface is the limb itself,
+    /// in pixels (meters as projected perpendicular to the line of sight), and the derivative with respect to the point.
     fn depth_violation(&self, at: &PixelPlace, x: Vec3, radius: f64, own_surface: bool) -> (f64, Vec3) {
         let nothing = (0.0, Vec3::ZERO);
         let Some(corners) = at.corners(self.depth, self.camera.width()) else { return nothing };
@@ -102,7 +103,7 @@ impl SilhouetteView<'_> {
         (value, fx * inverse * (sign * slope - gap * inverse * Vec3::Z))
     }
 
-    /// The four pixels around a place; outside of the picture those of its border.
+    /// The four pixels around a position; outside of the image the nearest ones on its border.
     fn locate(&self, [u, v]: [f64; 2]) -> Option<PixelPlace> {
         let (width, height) = (self.camera.width(), self.camera.height());
         let (right, bottom) = ((width - 1) as f64, (height - 1) as f64);
@@ -115,7 +116,7 @@ impl SilhouetteView<'_> {
     }
 }
 
-/// A place between four pixels, and how far beyond the picture it lies.
+/// A position between four pixels, and its distance outside the image.
 struct PixelPlace {
     start: usize,
     s: f64,
@@ -133,7 +134,7 @@ impl PixelPlace {
         Some([upper[0], upper[1], lower[0], lower[1]])
     }
 
-    /// The corners of both images; none for images of another size.
+    /// The corner values of both channels; `None` for an image of another size.
     fn sample(&self, pixels: &[[f32; 2]], width: usize) -> Option<[Corners; 2]> {
         let corners = self.corners(pixels, width)?;
         Some([0, 1].map(|image| Corners(corners.map(|pixel| f64::from(pixel[image])))))
@@ -141,8 +142,8 @@ impl PixelPlace {
 }
 
 impl Corners {
-    /// Bilinear interpolation and its gradient; outside of the picture the distance to its border is added: what is not in the
-    /// picture is background.
+    /// Bilinear interpolation and its gradient. Outside of the image the distance to its border is added, because everything
+    /// outside counts as background.
     fn at(&self, place: &PixelPlace) -> [f64; 3] {
         let (s, t) = (place.s, place.t);
         let [d00, d01, d10, d11] = self.0;

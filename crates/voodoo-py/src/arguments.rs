@@ -1,6 +1,6 @@
-//! Numbers and words that callers pass: what they are not is an error that names the argument.
+//! Conversion of numbers and words from callers; an error names the argument.
 //!
-//! PyO3 converts arguments itself, but its TypeError is none of `voodoo.errors`.
+//! PyO3 converts arguments itself, but its TypeError is not an exception of `voodoo.errors`.
 
 use pyo3::prelude::*;
 

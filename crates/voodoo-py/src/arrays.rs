@@ -1,4 +1,4 @@
-//! NumPy arrays in and out.
+//! Conversion from and to NumPy arrays.
 
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -10,7 +10,7 @@ use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 
 use crate::errors::{exception, wrong_argument};
 
-/// Points as they came: single or double precision, contiguous.
+/// Points as passed by the caller: single or double precision, contiguous.
 pub(crate) enum PointArray {
     F32(Py<PyArray2<f32>>),
     F64(Py<PyArray2<f64>>),
@@ -69,7 +69,7 @@ impl PointView<'_> {
     }
 }
 
-/// Refuses NumPy's masked arrays: below the mask their entries are numbers like any other and would count as measured.
+/// Rejects NumPy's masked arrays: masked entries are ordinary numbers and would count as measured.
 pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
     if value.hasattr("mask")? {
         let text = format!("{name}: expected an array without a mask, found a masked one; {instead}");
@@ -78,7 +78,7 @@ pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> P
     Ok(())
 }
 
-/// The same array, C-contiguous and aligned.
+/// The array itself or a copy, C-contiguous and aligned.
 pub(crate) fn contiguous<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let array = value.cast::<PyUntypedArray>()?;
     if array.is_c_contiguous() && value.getattr("flags")?.getattr("aligned")?.is_truthy()? {
@@ -97,9 +97,10 @@ pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'
     Err(exception(array.py(), "MeasurementError", text))
 }
 
-/// The entries of an array of double precision, C-contiguous and of some shape; none of anything else, masked ones too.
+/// The entries of a C-contiguous array of double precision with the given shape; `None` for anything else, including masked
+/// arrays.
 ///
-/// What follows the protocol of sequences gives numbers one by one, which takes many times as long.
+/// Sequences are converted number by number, which takes many times as long.
 fn entries<const N: usize>(value: &Bound<'_, PyAny>, shape: &[usize]) -> Option<[f64; N]> {
     let array = value.cast::<PyArrayDyn<f64>>().ok()?;
     let plain = value.get_type().is(PyUntypedArray::type_object(value.py())) && array.shape() == shape;
@@ -137,14 +138,14 @@ pub(crate) fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pos
         .iter()
         .fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
     let translation = Vec3::new(rows[0][3], rows[1][3], rows[2][3]);
-    // A NaN fails every comparison, so each is written to be true for good values only.
+    // NaN fails every comparison, so each comparison is written to be true for valid values only.
     if !(error < 1e-4 && rotation.determinant() > 0.0 && translation.is_finite() && rows[3] == [0.0, 0.0, 0.0, 1.0]) {
         return Err(wrong());
     }
     Ok(Pose::from_parts(translation, Quat::from_mat3(&rotation).normalize()))
 }
 
-/// Poses of all limbs of a body, in their order; one that is not rigid is named by its limb.
+/// Poses of all limbs of a body, in their order; the error for a pose that is not rigid names its limb.
 pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<Vec<Pose>> {
     let named = |(index, value): (usize, &Bound<'_, PyAny>)| {
         let name = body.limbs().get(index).map_or("?", |limb: &Limb| limb.name.as_str());

@@ -1,4 +1,4 @@
-//! `Body`: made by `voodoo.model.body` from validated parts.
+//! `Body`: created by `voodoo.model.body` from validated parts.
 
 use pyo3::prelude::*;
 use voodoo_core::Body;
@@ -8,7 +8,7 @@ use voodoo_core::{HumanModel, Joint, Limb, Site};
 use crate::errors::{IntoPy, exception};
 use crate::shape::PyShape;
 
-/// A rotation as Python says it.
+/// A rotation as Python represents it.
 #[derive(FromPyObject, IntoPyObject)]
 pub(crate) enum Rotation {
     /// Radians.

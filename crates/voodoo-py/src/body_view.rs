@@ -1,4 +1,4 @@
-//! What a depth camera sees of the body in the picture of a color camera beside it.
+//! Registers the depth measurements near the body to the image of a color camera.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What a `Frame` holds, and what a step borrows of it: arrays of the caller, names looked up in the body.
+//! The content of a `Frame`, and what a step borrows from it: arrays of the caller, and names resolved in the body.
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ pub(crate) struct ImageData {
     pub source: u16,
 }
 
-/// A picture as it came: color or gray.
+/// An image as passed by the caller: color or gray.
 pub enum ColorArray {
     Color(Py<PyArray3<u8>>),
     Gray(Py<PyArray2<u8>>),
@@ -102,7 +102,7 @@ impl ColorData {
 }
 
 impl ColorView<'_, '_> {
-    /// The picture of the camera with this number.
+    /// The image as one of the camera with this index.
     pub fn image(&self, number: u16) -> PyResult<ColorImage<'_>> {
         let ColorData { ref camera, world_from_sensor, stamp, source, .. } = *self.data;
         Ok(ColorImage { pixels: self.pixels.pixels()?, camera, world_from_sensor, stamp, number, source })
@@ -168,7 +168,7 @@ impl Borrowed<'_> {
     }
 }
 
-/// What a `Frame` holds.
+/// The content of a `Frame`.
 #[derive(Clone, Copy)]
 pub(crate) struct Held<'a> {
     pub clouds: &'a [CloudData],

@@ -6,13 +6,13 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::Lens;
-use voodoo_core::math::Vec3;
 
 use crate::arrays::rows;
 use crate::errors::{IntoPy, exception};
 
 type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
+#[doc = stub!("Camera")]
 #[pyclass(name = "Camera", module = "voodoo._core", frozen)]
 pub struct PyCamera {
     pub camera: Arc<Camera>,
@@ -43,22 +43,22 @@ impl PyCamera {
         (width, height, [fx, fy, cx, cy], self.model.clone(), self.coefficients.clone())
     }
 
-    /// Pixels (N, 2) of points (N, 3) in the camera's frame; NaN where there is none.
+    #[doc = stub!("Camera.project")]
     fn project<'py>(&self, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let pixel = |point: &[f64; 3]| {
-            let point = Vec3::from_array(*point);
-            self.camera.project(point).filter(|_| point.is_finite()).unwrap_or([f64::NAN; 2])
+        let pixel = |[x, y, z]: &[f64; 3]| {
+            let before = x.is_finite() && y.is_finite() && z.is_finite() && *z > 0.0;
+            before.then(|| self.camera.pixel([x / z, y / z])).flatten().unwrap_or([f64::NAN; 2])
         };
         pairs(points.py(), rows("points", &points)?.iter().map(pixel))
     }
 
-    /// `(x/z, y/z)` (N, 2) of pixels (N, 2); NaN where the lens puts nothing.
+    #[doc = stub!("Camera.undistorted")]
     fn undistorted<'py>(&self, pixels: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let ray = |pixel: &[f64; 2]| self.camera.ray(*pixel).unwrap_or([f64::NAN; 2]);
         pairs(pixels.py(), rows("pixels", &pixels)?.iter().map(ray))
     }
 
-    /// `(x/z, y/z)` (H, W, 2) of all pixels; releases the GIL.
+    #[doc = stub!("Camera.rays")]
     fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let rays = py.detach(|| self.camera.rays());
         PyArray1::from_slice(py, rays.as_flattened()).reshape([self.camera.height(), self.camera.width(), 2])

@@ -1,4 +1,4 @@
-//! Finding people in depth images.
+//! Detection of people in depth images.
 
 use std::path::PathBuf;
 
@@ -88,7 +88,7 @@ pub struct PyDetection {
     source: String,
 }
 
-/// Probability of log odds.
+/// Converts log odds to a probability.
 fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }

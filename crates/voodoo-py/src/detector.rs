@@ -1,4 +1,4 @@
-//! Detectors that are handed in from Python.
+//! Detectors that are passed from Python.
 
 use std::collections::HashMap;
 use std::ffi::CString;
@@ -15,12 +15,12 @@ use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery,
 use crate::arrays::{contiguous, matrix, vector};
 use crate::errors::{exception, wrong_argument};
 
-/// Standard deviation of a joint that a detector does not give one for, meters.
+/// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
-/// Probabilities are this far from 0 and 1 at least: their log odds are finite.
+/// Probabilities are clipped to this distance from 0 and 1, so that their log odds are finite.
 const LEAST: f64 = 1e-7;
 
-/// What a caller wants as a detector: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
+/// The `detector` argument of a caller: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
 pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
     let py = given.py();
     if given.is_none() {
@@ -43,7 +43,7 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
     Err(exception(py, "ConfigError", text))
 }
 
-/// The detector that comes with the library, if this build has it.
+/// The detector that ships with the library, if this build contains it.
 fn shipped() -> Option<Box<dyn Detect>> {
     #[cfg(feature = "detect")]
     return Some(Box::new(voodoo_detect::Detector::new()));
@@ -51,7 +51,7 @@ fn shipped() -> Option<Box<dyn Detect>> {
     None
 }
 
-/// Says that a detector failed in a step, which went on without it: a warning, or what ends programs (KeyboardInterrupt) itself.
+/// Reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like unchanged.
 pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> PyResult<()> {
     let Some(error) = error else { return Ok(()) };
     let cause = error.downcast_ref::<PyErr>();
@@ -60,7 +60,7 @@ pub(crate) fn warn_of_detector(py: Python<'_>, error: Option<&DetectError>) -> P
     }
     let category = py.import("voodoo.errors")?.getattr("DetectorWarning")?;
     let text = format!("the detector failed, the step went on without it: {error}").replace('\0', "");
-    // Python's own wrapper of the step is one frame, whoever called it the next.
+    // Python's own wrapper of the step is one stack frame; its caller is the next.
     PyErr::warn(py, &category, &CString::new(text)?, 2).inspect_err(|raised| {
         raised.set_cause(py, cause.map(|cause| cause.clone_ref(py)));
     })
@@ -102,7 +102,7 @@ impl PythonDetector {
         Ok(persons)
     }
 
-    /// What an object with the attributes of `voodoo.detectors.DetectedPerson` says.
+    /// Converts an object with the attributes of `voodoo.detectors.DetectedPerson`.
     fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
         let py = person.py();
         if person.getattr("joints")?.is_none() {
@@ -130,7 +130,7 @@ impl PythonDetector {
         })
     }
 
-    /// All lengths that the detector names, or none.
+    /// All lengths that the detector names, or `None`.
     fn lengths_of(&self, person: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 2]>> {
         let lengths: HashMap<String, f64> = mapping(person, "lengths")?;
         if lengths.is_empty() {

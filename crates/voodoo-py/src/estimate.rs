@@ -1,4 +1,4 @@
-//! `Estimate`: a frozen copy of what a step found, with names.
+//! `Estimate`: a frozen copy of the result of a step, with names.
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ use voodoo_core::{Estimate, LimbStatus, SourceReport, Status};
 use crate::arrays::frozen;
 use crate::errors::exception;
 
-/// The names that the numbers of an estimate belong to; shared by all estimates of one body.
+/// The names for the numbers of an estimate; shared by all estimates of one body.
 pub struct Names {
     pub limbs: Vec<String>,
     pub sites: Vec<String>,
     /// Name of the joint of each limb; `None` for the root.
     pub joints: Vec<Option<String>>,
-    /// The sites as Python has them: every frame asks for them.
+    /// The sites as Python objects, since every frame reads them.
     site_tuple: PyOnceLock<Py<PyTuple>>,
 }
 
@@ -59,7 +59,7 @@ fn mapping<'py, 'a, T: IntoPyObject<'py>>(
     Ok(PyMappingProxy::new(py, dict.as_mapping()))
 }
 
-/// The rows of one array by name: views, which cost less than an array each.
+/// The rows of one array by name, as views, which are cheaper than separate arrays.
 fn rows<'py, 'a>(
     names: impl IntoIterator<Item = &'a String>,
     all: &Array<'py>,

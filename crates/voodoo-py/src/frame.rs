@@ -40,7 +40,7 @@ impl PyFrame {
         Held { clouds: &[], images: &self.images, sites: &[], ground: self.ground }.borrow_for(py, body)
     }
 
-    /// Borrows the color pictures.
+    /// Borrows the color images.
     pub fn color_views<'py>(&self, py: Python<'py>) -> Vec<ColorView<'py, '_>> {
         self.colors.iter().map(|data| data.view(py)).collect()
     }
@@ -212,7 +212,7 @@ impl PyFrame {
         Ok(())
     }
 
-    /// Rays with the weights of their standard deviations, those that are trusted; how many.
+    /// Adds the rays with sufficient trust, weighted by their standard deviations; returns their number.
     #[pyo3(signature = (rays, *, reference_sigma, max_weight, min_trust))]
     fn _add_site_rays(
         &mut self,

@@ -1,4 +1,4 @@
-//! `Chain` of inverse kinematics; voodoo.ik validates and names what goes in and out.
+//! `Chain` of inverse kinematics; `voodoo.ik` validates and names inputs and outputs.
 
 use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -31,7 +31,7 @@ pub struct PyChain {
     model: ChainModel,
 }
 
-/// A solver that draws the angles of these indices to these values, below all else.
+/// A solver that pulls the angles of these indices towards these values, with the lowest priority.
 fn resting(rest: &[(usize, f64)]) -> IkSolver {
     IkSolver::with_rest(rest.iter().map(|&(unknown, angle)| Rest { unknown, angle }).collect())
 }
@@ -270,7 +270,8 @@ impl PyChain {
     }
 
     /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
-    /// postures tried and those compared with images `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`. Releases the GIL.
+    /// postures tried and those compared with images `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`.
+    /// Releases the GIL.
     #[allow(clippy::too_many_arguments, clippy::type_complexity, reason = "called by voodoo.ik only")]
     fn solve_many<'py>(
         &self,

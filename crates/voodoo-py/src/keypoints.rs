@@ -1,4 +1,4 @@
-//! 2-D keypoints, and points that go on with the limbs.
+//! 2-D keypoints, and points that are extrapolated with the limbs.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -15,7 +15,7 @@ use crate::sites::{PySiteGate, PySiteRay, places_of};
 use crate::skin::before;
 
 type PixelRow = ((f64, f64), f64);
-/// Site, number and share of each keypoint, spread, and how far it lies behind the surface.
+/// Site, indices and weights of its keypoints, spread, and distance behind the surface.
 type KeypointRow = (String, Vec<(usize, f64)>, f64, f64);
 type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
 
@@ -26,19 +26,19 @@ pub struct PyKeypointLayout(Vec<SiteKeypoints>);
 #[pymethods]
 impl PyKeypointLayout {
     #[new]
-    fn new(layout: Vec<KeypointRow>) -> Self {
+    fn new(parts: Vec<KeypointRow>) -> Self {
         let part = |(site, weights, spread, behind)| SiteKeypoints { site, weights, spread, behind };
-        Self(layout.into_iter().map(part).collect())
+        Self(parts.into_iter().map(part).collect())
     }
 
-    /// Pixel and confidence of each part; none where it is not seen.
+    /// Pixel and confidence of each part; `None` where it is not detected.
     fn pixels(&self, keypoints: PyReadonlyArray2<'_, f64>, least: f64) -> PyResult<Vec<Option<PixelRow>>> {
         let keypoints = rows("keypoints", &keypoints)?;
         let found = self.0.iter().map(|part| part.pixel(keypoints, least));
         Ok(found.map(|found| found.map(|found| ((found.pixel[0], found.pixel[1]), found.confidence))).collect())
     }
 
-    /// Number of the person nearest to where the parts are expected.
+    /// Index of the person nearest to the predicted positions of the parts.
     #[pyo3(signature = (people, predicted, *, world_from_sensor, camera, least))]
     fn nearest<'py>(
         &self,
@@ -56,7 +56,7 @@ impl PyKeypointLayout {
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }
 
-    /// Rays; sites with places and their standard deviations; names of those not seen, and of those that were dropped.
+    /// Rays; sites with positions and their standard deviations; names of those not detected, and of those rejected.
     #[pyo3(signature = (keypoints, predicted, *, stamp, source, world_from_sensor, camera, noise, place_sigma, least, only, gate, surface, before))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
@@ -116,7 +116,7 @@ impl PyKeypointLayout {
 }
 
 impl PyKeypointLayout {
-    /// Where the sites are, in a mapping of names to places.
+    /// Predicted positions of the sites in a mapping of names to positions.
     fn places(&self, places: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Vec3>>> {
         places_of(places, self.0.iter().map(|part| &*part.site))
     }

@@ -23,11 +23,11 @@ use crate::tracker::{PyTracker, site_positions};
 pub struct PyPeople {
     people: People,
     names: Arc<Names>,
-    /// Steps in which a detector failed.
+    /// Number of steps in which a detector failed.
     detector_failures: usize,
 }
 
-/// A tracker, or one of several persons by number.
+/// A tracker, or one of several persons by id.
 #[derive(FromPyObject)]
 pub(crate) enum TrackedBody<'py> {
     Alone(PyRef<'py, PyTracker>),
@@ -35,7 +35,7 @@ pub(crate) enum TrackedBody<'py> {
 }
 
 impl TrackedBody<'_> {
-    /// Who follows the body.
+    /// The tracker of the body.
     pub(crate) fn tracker(&self) -> PyResult<&Tracker> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
@@ -76,7 +76,8 @@ impl PyPeople {
         Ok(Self { people, names, detector_failures: 0 })
     }
 
-    /// One frame, and what was measured of some persons alone; releases the GIL. Number and estimate of everybody who is there.
+    /// Processes one frame, and the measurements of individual persons; releases the GIL. Returns id and estimate of all present
+    /// persons.
     fn step(
         &mut self,
         py: Python<'_>,
@@ -97,7 +98,7 @@ impl PyPeople {
             .with_rays(&all.rays)
             .with_ground(all.ground)
             .with_excluded(&frame.excluded);
-        // A person's own measurements come after what all have in common; their sources are numbered on.
+        // A person's own measurements follow the common ones; their sources are numbered consecutively.
         let owned = own.iter().map(|(_, frame)| frame.borrow_for(py, body)).collect::<PyResult<Vec<_>>>()?;
         let parts = owned
             .iter()
@@ -123,35 +124,35 @@ impl PyPeople {
         self.detector_failures
     }
 
-    /// Somebody is where these positions say; their number.
+    /// Adds a person at these positions; returns their id.
     fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
         let positions = site_positions(self.people.prototype(), joints)?;
         self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
     }
 
-    /// Whether color pictures would tell something in the next frame.
+    /// Whether color images would be used in the next frame.
     fn needs_colors(&self) -> bool {
         self.people.needs_colors()
     }
 
-    /// Follows these numbers alone; None: everybody.
+    /// Tracks only the persons with these ids; `None`: all.
     fn only(&mut self, ids: Option<Vec<usize>>) {
         self.people.restrict_to(ids);
     }
 
-    /// The last estimate of a person who is there.
+    /// The last estimate of a present person.
     fn estimate(&self, id: usize) -> Option<PyEstimate> {
         let (_, tracker) = self.people.present().find(|(there, _)| *there == id)?;
         Some(PyEstimate { estimate: tracker.estimate().clone(), names: self.names.clone(), sources: Vec::new() })
     }
 
-    /// The body of a person who is there, in their sizes.
+    /// The body of a present person, in their sizes.
     fn body(&self, id: usize) -> Option<PyBody> {
         self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| PyBody(tracker.body().clone()))
     }
 }
 
-/// What was measured of a person, with what all have in common.
+/// The measurements of a person, together with the common ones.
 struct Parts<'a> {
     clouds: Vec<Cloud<'a>>,
     positions: Vec<PositionRelation>,
@@ -159,7 +160,7 @@ struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// `first` is the number of the first source of the person's own.
+    /// `first` is the index of the first source of the person's own measurements.
     fn new(all: &Frame<'a>, own: &'a Borrowed<'_>, first: u16) -> PyResult<Self> {
         let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
         let positions =

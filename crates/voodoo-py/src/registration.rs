@@ -1,4 +1,4 @@
-//! What a depth camera measured in the picture of another camera.
+//! Depth measurements registered to the image of another camera.
 
 use numpy::{PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

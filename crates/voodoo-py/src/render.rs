@@ -1,4 +1,4 @@
-//! Depth images that a camera should see of a posed body.
+//! Renders depth images of a posed body.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -29,7 +29,7 @@ pub(crate) fn render_depth<'py>(
     py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(|error| error.into_py(py))?;
     let size = [camera.height(), camera.width()];
     let depth = PyArray1::from_slice(py, image.depth()).reshape(size)?;
-    // The mark of no limb, all ones, is -1; no body has 32768 limbs.
+    // The mark of no limb, all ones, becomes -1; no body has 32768 limbs.
     let limb: Vec<i16> = image.limb().iter().map(|limb| *limb as i16).collect();
     Ok((depth, PyArray1::from_vec(py, limb).reshape(size)?))
 }

@@ -1,4 +1,4 @@
-//! Named sites: where they are expected, gates around them, and rays on which they were seen.
+//! Named sites: predicted positions, gates around them, and rays on which they were detected.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -16,7 +16,7 @@ fn row(py: Python<'_>, place: Vec3) -> Row<'_> {
     PyArray1::from_slice(py, &place.to_array())
 }
 
-/// Where some sites are, in a mapping of their names to places; none of those that it lacks.
+/// Predicted positions of some sites, from a mapping of names to positions; `None` for missing ones.
 pub(crate) fn places_of<'a>(
     places: &Bound<'_, PyAny>,
     sites: impl Iterator<Item = &'a str>,

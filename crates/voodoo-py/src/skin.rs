@@ -1,4 +1,4 @@
-//! The skin cue of one camera: what is learned, and what is followed.
+//! The skin cue of one camera: learned models and tracked regions.
 
 use std::sync::Arc;
 
@@ -29,10 +29,11 @@ fn row_of(candidate: &SkinCandidate) -> CandidatePlace {
     ((u, v), candidate.region, candidate.area, candidate.hand)
 }
 
-/// Places before a camera, and their pixels.
+/// Positions in front of a camera, and their pixels.
 type PlacesInFront = (Vec<[f64; 3]>, Vec<[f64; 2]>);
 
-/// Places of the world before a camera, meters, and their columns and rows; NaN behind it, and where its lens shows nothing.
+/// World positions in front of a camera, meters, and their columns and rows; NaN behind it, and where the lens model has no
+/// pixel.
 pub(crate) fn before(eye: &Eye, places: impl Iterator<Item = Vec3>) -> PlacesInFront {
     let inside: Vec<[f64; 3]> = places.map(|place| eye.in_sensor(place).to_array()).collect();
     let pixels = inside.iter().map(|place| eye.pixel(Vec3::from_array(*place))).collect();
@@ -71,7 +72,7 @@ impl PySkinTeacher {
         Ok(PyArray1::from_slice(py, &self.0.colors.skin).reshape(shape)?.into_any())
     }
 
-    /// Learns colors and background from a picture.
+    /// Learns colors and background from an image.
     #[pyo3(signature = (cue, image, places, *, world_from_sensor, camera, half_life, every, settled))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn learn<'py>(
@@ -163,7 +164,7 @@ impl PySkinCue {
         self.cue.assigned.clone()
     }
 
-    /// Of all regions that are followed: site, pictures, stamp, velocity, how far from each site and how long in doubt.
+    /// For all tracked regions: site, images, stamp, velocity, distance from each site, and time for which each was contradicted.
     #[getter]
     fn followed(&self) -> Vec<BlobRow> {
         let blobs = self.cue.blobs.items.iter();
@@ -175,8 +176,8 @@ impl PySkinCue {
             .collect()
     }
 
-    /// Finds regions of skin in a picture, follows and names them: of each site that was found its number, a point and the direction
-    /// of its ray, its place, and its expected depth.
+    /// Detects, tracks and assigns skin regions of an image. Returns for each detected site its index, a point and the direction
+    /// of its ray, its position, and its predicted depth.
     #[pyo3(signature = (teacher, image, predicted, *, stamp, world_from_sensor, camera, body, settled, arm_lost, upper_arm_visible, tracker, others))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(

@@ -27,9 +27,9 @@ pub struct PyTracker {
     pub tracker: Tracker,
     names: Arc<Names>,
     sources: Vec<String>,
-    /// Names of the cameras of color pictures, in the order of their numbers.
+    /// Names of the cameras of color images, in the order of their indices.
     cameras: Vec<String>,
-    /// Steps in which the detector failed.
+    /// Number of steps in which the detector failed.
     detector_failures: usize,
 }
 
@@ -43,7 +43,7 @@ pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResul
     joints.iter().map(place).collect()
 }
 
-/// Length of body between each of some places (N, 3) and a camera's focal point, meters.
+#[doc = stub!("body_before")]
 #[pyfunction]
 pub(crate) fn body_before<'py>(
     tracker: TrackedBody<'py>,
@@ -65,7 +65,7 @@ impl PyTracker {
         }
     }
 
-    /// Number of the camera of color pictures with this name.
+    /// Index of the color camera with this name.
     fn camera(&mut self, name: &str) -> u16 {
         let known = self.cameras.iter().position(|known| known == name);
         let number = known.unwrap_or_else(|| {
@@ -75,7 +75,7 @@ impl PyTracker {
         number as u16
     }
 
-    /// The pictures of a frame, whose cameras are known by their names.
+    /// The color images of a frame, whose cameras are identified by name.
     fn pictures<'a>(
         &mut self,
         py: Python<'_>,
@@ -137,7 +137,7 @@ impl PyTracker {
         Ok(self.snapshot())
     }
 
-    /// Whether somebody is looked for while there is no pose.
+    /// Whether the tracker searches for a person while there is no pose.
     #[getter]
     fn can_search(&self) -> bool {
         self.tracker.can_search()
@@ -148,7 +148,7 @@ impl PyTracker {
         self.detector_failures
     }
 
-    /// One frame; releases the GIL.
+    /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = frame.borrow_for(py, self.tracker.body())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
@@ -170,7 +170,7 @@ impl PyTracker {
         Ok(self.snapshot())
     }
 
-    /// Pictures of the scene without anybody, as the camera with this name sees it; none: forgets them.
+    /// Sets images of the empty scene of the camera with this name; an empty list discards them.
     fn _set_background(&mut self, py: Python<'_>, source: &str, images: Vec<Bound<'_, PyAny>>) -> PyResult<()> {
         let mut pictures = Vec::with_capacity(images.len());
         for (index, image) in images.iter().enumerate() {
@@ -184,7 +184,7 @@ impl PyTracker {
         self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
     }
 
-    /// How likely each pixel of a frame's pictures shows the body at some poses: name of the camera -> (height, width).
+    /// Probability of each pixel of a frame's images to show the body at given poses: name of the camera -> (height, width).
     #[pyo3(signature = (frame, poses=None))]
     fn _segment<'py>(
         &mut self,
@@ -209,7 +209,7 @@ impl PyTracker {
         Ok(likely)
     }
 
-    /// Learns the body's colors in a frame's pictures at some poses.
+    /// Learns the body's colors from a frame's images at given poses.
     #[pyo3(signature = (frame, poses=None))]
     fn _learn_colors<'py>(
         &mut self,
@@ -225,7 +225,8 @@ impl PyTracker {
         py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(|error| error.into_py(py))
     }
 
-    /// The lines of the last step in the pictures of a camera: limb, place (2), outward normal (2), offset, sigma, row by row.
+    /// The contour lines of the last step in the images of a camera: limb, pixel (2), outward normal (2), offset, sigma, row by
+    /// row.
     fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let camera = self.cameras.iter().position(|known| known == source);
         let rows: Vec<Vec<f32>> = camera.map_or_else(Vec::new, |camera| {

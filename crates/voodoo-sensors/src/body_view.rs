@@ -1,4 +1,4 @@
-//! What a depth camera sees of the body, in the picture of a color camera beside it; and what may be the still scene.
+//! Registers the depth measurements near the body to the image of a color camera, and finds the still scene.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -12,77 +12,78 @@ use voodoo_core::DepthPixels;
 use voodoo_core::TrackError;
 use voodoo_core::math::Vec3;
 
-/// A pose whose entries change by less is that of a camera that stands.
+/// A camera whose pose entries change by less than this is static.
 const CAMERA_STANDS: f64 = 1e-3;
-/// Over so many pictures the depth of a still surface hardly changes.
+/// Number of images over which the depth of a still surface hardly changes.
 const STAYS_PICTURES: usize = 6;
 /// A 4x4 transform, row by row.
 pub type Matrix = [[f64; 4]; 4];
 
-/// What a depth camera saw of the body, in the picture of a color camera beside it.
+/// Depth measurements near the body, registered to the image of a color camera beside the depth camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BodyView {
-    /// Rows and columns of the picture.
+    /// Height and width of the image.
     pub size: [usize; 2],
-    /// Of every pixel of the picture whether something near the body was seen there, or the depth camera does not look.
+    /// For each pixel of the image, whether a point near the body was measured there, or it is outside the depth camera's field
+    /// of view.
     pub mask: Vec<bool>,
-    /// Columns and rows of the points in the picture.
+    /// Columns and rows of the points in the image.
     pub pixels: Vec<[f64; 2]>,
-    /// Theirs along the color camera's optical axis, meters.
+    /// Depths of the points along the color camera's optical axis, meters.
     pub depths: Vec<f64>,
-    /// Of every point whether nothing behind it was ever seen there: it may be the scene. None: not known.
+    /// For each point, whether no surface behind it was ever observed, so that it may be the scene. `None`: not known.
     pub still: Option<Vec<bool>>,
-    /// Of every pixel whether something is before what was seen there once. None: not known.
+    /// For each pixel, whether a surface lies in front of one observed earlier. `None`: not known.
     pub before: Option<Vec<bool>>,
 }
 
 impl BodyView {
-    /// What was measured.
+    /// Creates a view from measured values.
     pub fn measured(&self) -> MeasuredPixels<'_> {
         MeasuredPixels { places: &self.pixels, depths: &self.depths, still: self.still.as_deref() }
     }
 }
 
-/// Of every pixel that is looked at whether it shows what may be the scene, and whether something before what was seen there once.
+/// Two flags for each evaluated pixel: whether it may be the scene, and whether a surface lies in front of one observed earlier.
 pub type StillMasks = (Vec<bool>, Vec<bool>);
 
-/// What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind which
-/// nothing was ever seen. A table's edge does not become a hand.
+/// Finds candidates for the still scene of a static depth camera: pixels whose depth has not changed over some images and behind
+/// which no surface was ever observed. So a table's edge does not become a hand.
 ///
-/// The surface of a person who has not moved yet looks the same, so this only tells what has moved.
+/// A person who has not moved yet is a candidate too, so only a negative answer is certain: that pixel has changed.
 #[derive(Clone, Debug, Default)]
 pub struct StillDepth {
     size: [usize; 2],
     pose: Matrix,
-    /// Images are never changed in place: copies share them.
+    /// Images are never changed in place, so that copies share them.
     farthest: Arc<Vec<f32>>,
     last: VecDeque<Arc<Vec<f32>>>,
-    /// Images that are needed no more, once no copy has them.
+    /// Images for reuse, once no copy refers to them.
     spare: VecDeque<Arc<Vec<f32>>>,
 }
 
 impl StillDepth {
-    /// The same, without memory that it would reuse.
+    /// Copies everything but the buffers for reuse.
     pub fn twin(&self) -> Self {
         let mut twin = self.clone();
         twin.spare.clear();
         twin
     }
 
-    /// Memory for an image.
+    /// Returns a buffer for an image.
     fn image(&mut self) -> Vec<f32> {
         let mut image = self.spare.pop_front().and_then(|spare| Arc::try_unwrap(spare).ok()).unwrap_or_default();
         image.clear();
         image
     }
 
-    /// Takes up an image, meters, 0 = no return, of so many rows and columns; a camera that has moved starts anew.
+    /// Updates with an image of this size, meters, 0 = no return; a camera that has moved resets the scene.
     ///
-    /// Of every pixel whether it shows what may be the scene, and whether something before what was seen there once; none as long
-    /// as too little was seen. Nothing is told of pixels outside some rows and columns.
+    /// Returns for each pixel whether it may be the scene, and whether a surface lies in front of one observed earlier; `None` as
+    /// long as too few images were observed. Only pixels within the given rows and columns are evaluated.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when the image is not of that size.
+    /// [`TrackError::Measurement`] when the image does not have that size.
     pub fn update(
         &mut self,
         z: Vec<f32>,
@@ -97,7 +98,7 @@ impl StillDepth {
             self.farthest = Arc::new(z.clone());
             self.last.clear();
         } else {
-            // A NaN stays one.
+            // NaN is kept.
             let farther = |(far, z): (&f32, &f32)| if *far > *z || far.is_nan() { *far } else { *z };
             let mut farthest = self.image();
             farthest.extend(self.farthest.iter().zip(&z).map(farther));
@@ -115,38 +116,38 @@ impl StillDepth {
     }
 }
 
-/// A depth camera beside a color camera, and where the body is expected.
+/// A depth image with its camera, and the region in which the body is expected.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthBesideColor<'a> {
-    /// Depths, row by row.
+    /// Depth image, row by row.
     pub image: DepthPixels<'a>,
-    /// Meters each of their units is.
+    /// Meters per unit of the image.
     pub meters_per_unit: f64,
-    /// The depth camera.
+    /// Calibration of the depth camera.
     pub camera: &'a Camera,
-    /// Its pose.
+    /// Pose of the depth camera.
     pub world_from_depth: Matrix,
-    /// From its frame to the color camera's.
+    /// Transform `color_from_depth`.
     pub color_from_depth: Matrix,
     /// Every step-th row and column is used.
     pub step: usize,
     /// Enlargement of the box around the body, meters.
     pub margin: f64,
-    /// Places of the body in the world, meters.
+    /// Positions of the body, world frame, meters.
     pub joints: &'a [[f64; 3]],
 }
 
-/// The points of a depth image near the body, in the frame of a color camera.
+/// The points of a depth image near the body, in the color camera frame.
 #[derive(Clone, Debug)]
 pub struct Nearby {
-    /// Meters.
+    /// Points, meters.
     pub points: Vec<[f64; 3]>,
     still: Option<Vec<bool>>,
     moved: Option<Vec<bool>>,
 }
 
 impl DepthBesideColor<'_> {
-    /// How far the body is along the depth camera's optical axis, meters: the median of its places.
+    /// Depth of the body along the depth camera's optical axis, meters: the median over its positions.
     pub fn body_depth(&self) -> f64 {
         let mut depths: Vec<f64> = self.joints.iter().map(|place| self.in_depth(*place)[2]).collect();
         depths.sort_unstable_by(f64::total_cmp);
@@ -158,10 +159,10 @@ impl DepthBesideColor<'_> {
         }
     }
 
-    /// The points near the body; `scene` takes up the image.
+    /// Returns the points near the body; `scene` is updated with the image.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when sizes do not fit together.
+    /// [`TrackError::Measurement`] when array sizes do not match.
     pub fn points_near_body(&self, scene: Option<&mut StillDepth>) -> Result<Nearby, TrackError> {
         let (whole, step) = ([self.camera.height(), self.camera.width()], self.step.max(1));
         let size = whole.map(|size| size.div_ceil(step));
@@ -185,7 +186,7 @@ impl DepthBesideColor<'_> {
         Ok(Nearby { points, still, moved })
     }
 
-    /// Every step-th row and column, meters, into memory.
+    /// Copies every step-th row and column, in meters, into a buffer.
     fn meters(&self, mut meters: Vec<f32>) -> Vec<f32> {
         let (scale, width, step) = (self.meters_per_unit as f32, self.camera.width(), self.step.max(1));
         fn every<T: Copy>(pixels: &[T], width: usize, step: usize) -> impl Iterator<Item = T> {
@@ -208,14 +209,14 @@ impl DepthBesideColor<'_> {
         [0, 1, 2].map(|axis| (0..3).map(|row| offset[row] * pose[row][axis]).sum())
     }
 
-    /// Low and high corner of the box around the body, world.
+    /// Lower and upper corner of the box around the body, world frame.
     fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let least = |axis: usize| self.joints.iter().fold(f64::INFINITY, |least, place| least.min(place[axis]));
         let most = |axis: usize| self.joints.iter().fold(f64::NEG_INFINITY, |most, place| most.max(place[axis]));
         ([0, 1, 2].map(|axis| least(axis) - self.margin), [0, 1, 2].map(|axis| most(axis) + self.margin))
     }
 
-    /// Rows and columns of the depth image that can show the box between two corners.
+    /// Rows and columns of the depth image that may show the box between two corners.
     fn window(&self, low: [f64; 3], high: [f64; 3]) -> [Range<usize>; 2] {
         let corner = |index: usize| {
             let place = [0, 1, 2].map(|axis| if index >> axis & 1 == 1 { high[axis] } else { low[axis] });
@@ -227,17 +228,17 @@ impl DepthBesideColor<'_> {
 }
 
 impl Nearby {
-    /// Columns and rows of the points in the picture of the color camera; NaN where it does not see them.
+    /// Columns and rows of the points in the color image; NaN where a point is not visible.
     pub fn projected(&self, camera: &Camera) -> Vec<[f64; 2]> {
         let in_camera = |point: &[f64; 3]| camera.project(Vec3::from_array(*point)).unwrap_or([f64::NAN; 2]);
         self.points.iter().map(in_camera).collect()
     }
 
-    /// Where the points are in a picture of `[height, width]`, at some places (column, row); the gaps between the depth pixels are
-    /// closed within `reach` pixels, and where the depth camera does not look (`beyond`) nothing is ruled out.
+    /// Registers the points, at these pixels (column, row), to an image of `[height, width]`. Gaps between depth pixels are
+    /// closed within `reach` pixels. Pixels outside the depth camera's field of view (`beyond`) are included in the mask.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when sizes do not fit together.
+    /// [`TrackError::Measurement`] when array sizes do not match.
     pub fn view(
         self,
         pixels: Vec<[f64; 2]>,
@@ -289,7 +290,7 @@ mod tests {
             ([60, 80], |index: usize| (20..30).contains(&(index / 80)) && (30..40).contains(&(index % 80)));
         let mut found = None;
         for step in 0..20_u32 {
-            // Of three hundredths of a meter to either side, another in every pixel and picture.
+            // Noise of up to 3 cm to either side, different for each pixel and image.
             let noise =
                 |index: usize| (step * 4800 + index as u32).wrapping_mul(2_654_435_761) as f32 / u32::MAX as f32;
             let depth = |index: usize| {

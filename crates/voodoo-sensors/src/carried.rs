@@ -1,4 +1,4 @@
-//! Where points that were measured some time before the frame are at its time: each goes on with the limb that it lies on.
+//! Extrapolates points that were measured before the frame to its time: each moves with the limb that it lies on.
 
 use crate::body_view::Matrix;
 use voodoo_core::PointSlice;
@@ -6,19 +6,20 @@ use voodoo_core::TrackError;
 use voodoo_core::Tracker;
 use voodoo_core::math::matrix;
 
-/// Points farther than this from every limb are the scene's and stay, meters.
+/// Points farther than this from every limb belong to the scene and are not moved, meters.
 const NEAR: f64 = 0.20;
-/// A limb that is faster has jumped, meters a second; its points stay.
+/// A limb with a greater speed has jumped, meters per second; its points are not moved.
 const FASTEST_LIMB: f64 = 8.0;
-/// Points go on for so long at most, seconds...
+/// Longest time of extrapolation, seconds...
 const LONGEST: f64 = 0.1;
-/// ... and those of no longer ago than this stay.
+/// ... and shortest one; for shorter times points are not moved.
 const SAME_TIME: f64 = 1e-3;
-/// No limb is longer, meters: what is farther from all their origins is on none.
+/// Upper bound of a limb's length, meters: a point farther from all limb origins is on no limb.
 const LONGEST_LIMB: f64 = 1.0;
 
-/// Where points that a sensor measured `elapsed` seconds before the tracker's next frame are at its time, in the sensor's frame (without
-/// its pose: the world), meters: those on a limb go on with it, the others stay. None where nothing moves.
+/// Extrapolates points that a sensor measured `elapsed` seconds before the tracker's next frame to that frame's time, in the
+/// sensor frame (without its pose: in the world frame), meters. Points on a limb move with it, the others stay. Returns `None` if
+/// no point moves.
 ///
 /// # Errors
 /// [`TrackError`] when points near the body are not finite.
@@ -51,7 +52,7 @@ pub fn carried(
     Ok(Some(moved))
 }
 
-/// Places of the world of points in a sensor's frame, meters.
+/// World positions of points in a sensor frame, meters.
 fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
     for point in points {
         let [x, y, z] = *point;
@@ -59,31 +60,31 @@ fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
     }
 }
 
-/// The other way round.
+/// Inverse of the transform to the world frame.
 fn in_sensor(points: &mut [[f64; 3]], pose: &Matrix) {
     for point in points {
         let offset = [0, 1, 2].map(|axis| point[axis] - pose[axis][3]);
-        // Of a rigid pose the inverse turns back.
+        // The inverse of a rigid pose.
         *point = [0, 1, 2].map(|axis| (0..3).map(|row| offset[row] * pose[row][axis]).sum());
     }
 }
 
-/// How limbs moved, and how far points may go on with them.
+/// Motion of the limbs, and the parameters of the extrapolation.
 #[derive(Clone, Copy, Debug)]
 struct Carrying<'a> {
     /// Poses of all limbs.
     poses: &'a [Matrix],
-    /// Those of an estimate before.
+    /// Poses of all limbs in an earlier estimate.
     before: &'a [Matrix],
-    /// Time between the two, seconds.
+    /// Time between the two estimates, seconds.
     interval: f64,
-    /// For so long points go on, seconds.
+    /// Time of extrapolation, seconds.
     elapsed: f64,
-    /// Points farther than this from every limb are the scene's and stay, meters.
+    /// Points farther than this from every limb belong to the scene and are not moved, meters.
     near: f64,
-    /// Of the limbs' velocity that is believed.
+    /// Factor applied to the limbs' velocity.
     fraction: f64,
-    /// A limb that is faster has jumped, meters a second; its points stay.
+    /// A limb with a greater speed has jumped, meters per second; its points are not moved.
     max_speed: f64,
 }
 
@@ -100,7 +101,7 @@ impl Carrying<'_> {
         points.iter().enumerate().filter(|(_, place)| within(place)).map(|(index, _)| index).collect()
     }
 
-    /// Moves those points that may be on a limb, by their distances from each limb, limb by limb, meters.
+    /// Moves the points that may be on a limb, given their distances from each limb, limb by limb, meters.
     fn carry(&self, points: &mut [[f64; 3]], around: &[usize], away: &[f32]) {
         let count = around.len();
         if self.poses.len() != self.before.len() || away.len() != count * self.poses.len() {
@@ -130,10 +131,10 @@ impl Carrying<'_> {
         }
     }
 
-    /// What the last interval did to a place on a limb, a second.
+    /// Rate of change of a limb's transform over the last interval (world from world), per second.
     fn change(&self, limb: usize) -> Matrix {
         let (now, then) = (&self.poses[limb], &self.before[limb]);
-        // Of a rigid pose the inverse turns back.
+        // The inverse of a rigid pose.
         let turn = |row: usize, column: usize| (0..3).map(|axis| now[row][axis] * then[column][axis]).sum::<f64>();
         let mut change = [[0.0; 4]; 4];
         for row in 0..3 {

@@ -1,29 +1,29 @@
-//! Colors of a picture as numbers of histogram bins, chroma and coarse luma: what skin is told by.
+//! Quantizes the colors of an image to histogram bins of chroma and coarse luma, from which skin is classified.
 
 use crate::masks::PIXEL_BLOCK;
 use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
-/// Bins of either axis of chroma, Cr and Cb, and of luma: coarse, to part a face from a dark poster of the same hue.
+/// Bins of either axis of chroma, Cr and Cb. Coarse luma is added to distinguish a face from a dark poster of the same hue.
 pub const CHROMA_BINS: usize = 64;
-/// Of luma.
+/// Bins of luma.
 pub const LUMA_BINS: usize = 8;
-/// Of a histogram, Cr by Cb by luma.
+/// Bins of a histogram, Cr by Cb by luma.
 pub const BINS: usize = CHROMA_BINS * CHROMA_BINS * LUMA_BINS;
-/// A pixel with less luma has no reliable chroma.
+/// Pixels with less luma have no reliable chroma.
 const DARKEST: i32 = 30;
-/// Marks such a pixel, beside its bin.
+/// Flag of such a pixel, stored beside its bin.
 const DARK: u16 = 1 << 15;
 
-/// The bin of every pixel (blue, green, red), and a mark of dark ones: luma and chroma as ITU-R BT.601 has them, rounded to whole
-/// numbers of eight bits.
+/// The bin of every pixel (blue, green, red) and a flag for dark ones. Luma and chroma follow ITU-R BT.601, rounded to eight-bit
+/// integers.
 pub fn bins(image: &[[u8; 3]]) -> Vec<u16> {
     let mut found = Vec::new();
     find_bins(image, &mut found);
     found
 }
 
-/// The same, into `found`.
+/// Writes the bins, as [`bins`] does, into `found`.
 pub fn find_bins(image: &[[u8; 3]], found: &mut Vec<u16>) {
     found.resize(image.len(), 0);
     widest(
@@ -38,9 +38,9 @@ pub fn find_bins(image: &[[u8; 3]], found: &mut Vec<u16>) {
 
 #[inline(always)]
 fn bin_of([b, g, r]: [i32; 3]) -> u16 {
-    // Shares of 2^14.
+    // Coefficients in units of 2^-14.
     let rounded = |sum: i32| (sum + (1 << 13)) >> 14;
-    // Of eight bits as it is: for a compiler that knows it a product of two short numbers, which is faster, will do.
+    // The input has eight bits; a compiler that knows this uses a faster product of two short integers.
     let luma = rounded(1868 * b + 9617 * g + 4899 * r) & 255;
     let chroma = |difference: i32, weight: i32| rounded(difference * weight + (128 << 14)).clamp(0, 255);
     let (cr, cb) = (chroma(r - luma, 11682), chroma(b - luma, 9241));
@@ -48,13 +48,13 @@ fn bin_of([b, g, r]: [i32; 3]) -> u16 {
     if luma < DARKEST { bin | DARK } else { bin }
 }
 
-/// Whether a pixel is light enough to have a color and its bin is one of a `table`'s.
+/// Whether a pixel is light enough to have a color and its bin is in the `table`.
 #[inline(always)]
 pub fn is_among(bin: u16, table: &[bool; BINS]) -> bool {
     table[usize::from(bin & !DARK)] & (bin & DARK == 0)
 }
 
-/// 1 where a pixel is light enough and its bin is one of a `table`'s, which has [`BINS`]; into `found`.
+/// Writes 1 into `found` where a pixel is light enough and its bin is in the `table`, which has [`BINS`] entries.
 ///
 /// # Errors
 /// [`TrackError::Measurement`] when the table has another size.
@@ -79,7 +79,7 @@ pub fn find_among(bins: &[u16], table: &[bool], found: &mut Vec<u8>) -> Result<(
     Ok(())
 }
 
-/// Least and greatest Cr and Cb of a table's bins.
+/// Least and greatest Cr and Cb of the bins in a table.
 struct Chroma {
     cr: [u16; 2],
     cb: [u16; 2],
@@ -98,29 +98,30 @@ impl Chroma {
         found
     }
 
-    /// Whether some of these bins are in between.
+    /// Whether any of these bins lies within the bounds.
     #[inline(always)]
     fn any(&self, bins: &[u16]) -> bool {
         let width = |[low, high]: [u16; 2]| high.wrapping_sub(low);
         let (cr_width, cb_width) = (width(self.cr), width(self.cb));
         let inside = |bin: &u16| {
             let (cr, cb) = (bin >> 9, bin >> 3 & 63);
-            // Below the least the difference is large.
+            // The unsigned difference wraps to a large value below the lower bound.
             (cr.wrapping_sub(self.cr[0]) <= cr_width) & (cb.wrapping_sub(self.cb[0]) <= cb_width)
         };
         self.cr[0] <= self.cr[1] && bins.iter().fold(false, |any, bin| any | inside(bin))
     }
 }
 
-/// Counts pixels of two kinds by their bins; its memory is kept.
+/// Counts the pixels of two classes by bin; its memory is reused.
 #[derive(Clone, Debug, Default)]
 pub struct Counter {
-    /// Of the one kind and of the other; neighbors are alike: two tables of each in turns, so that no count waits for the last.
+    /// Counts of the two classes. Two tables of each are used in turn, since neighboring pixels often share a bin and one count
+    /// would wait for the last.
     tables: [Vec<[u32; 2]>; 2],
 }
 
 impl Counter {
-    /// Counts pixels that are marked, of which some are of the other kind: bin, mark and kind of each.
+    /// Counts the pixels that are marked; each has a bin, a mark and a class.
     pub fn count(&mut self, pixels: impl Iterator<Item = (u16, bool, bool)>) {
         let [even, odd] = &mut self.tables;
         even.resize(BINS, [0; 2]);
@@ -131,7 +132,7 @@ impl Counter {
         }
     }
 
-    /// Tells of each bin how many pixels of the one kind and of the other it has, and forgets them.
+    /// Returns the counts of both classes for each bin and resets them.
     pub fn take(&mut self, mut visit: impl FnMut(usize, [u32; 2])) {
         let [even, odd] = &mut self.tables;
         for (bin, (even, odd)) in even.iter_mut().zip(odd).enumerate() {
@@ -147,7 +148,7 @@ mod tests {
 
     #[test]
     fn bins_are_those_of_opencv() {
-        // (blue, green, red), and what cvtColor(COLOR_BGR2YCrCb) of OpenCV 5.0 makes of it: luma, Cr, Cb.
+        // Pixels (blue, green, red) and the result of cvtColor(COLOR_BGR2YCrCb) of OpenCV 5.0: luma, Cr, Cb.
         let known = [
             ([17, 9, 28], [16, 137, 129]),
             ([30, 21, 8], [18, 121, 135]),

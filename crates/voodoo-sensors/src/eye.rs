@@ -1,4 +1,4 @@
-//! A camera of pictures and where it stands.
+//! A color camera and its pose.
 
 use crate::body_view::Matrix;
 use voodoo_core::Camera;
@@ -7,7 +7,7 @@ use voodoo_core::math::Vec3;
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
 pub struct Eye<'a> {
-    /// Its pose.
+    /// Pose of the camera.
     pub world_from_sensor: Matrix,
     /// Its calibration.
     pub camera: &'a Camera,
@@ -34,18 +34,18 @@ impl Eye<'_> {
         Vec3::from_array([0, 1, 2].map(|row| self.world_from_sensor[row][column]))
     }
 
-    /// A place of the world in the camera's frame, meters.
+    /// A world position in the camera frame, meters.
     pub fn in_sensor(&self, place: Vec3) -> Vec3 {
         let offset = place - self.origin();
         Vec3::from_array([0, 1, 2].map(|column| offset.dot(self.column(column))))
     }
 
-    /// Column and row of a place in the camera's frame; NaN where it is not seen.
+    /// Column and row of a position in the camera frame; NaN where it is not visible.
     pub fn pixel(&self, place: Vec3) -> [f64; 2] {
         self.camera.project(place).unwrap_or([f64::NAN; 2])
     }
 
-    /// `(x/z, y/z)` of a pixel; NaN where the lens puts nothing.
+    /// `(x/z, y/z)` of a pixel; NaN where the lens model has no ray for it.
     pub fn undistorted(&self, pixel: [f64; 2]) -> [f64; 2] {
         self.camera.ray(pixel).unwrap_or([f64::NAN; 2])
     }

@@ -1,31 +1,32 @@
-//! Where a nearer surface ends before a farther one, in a picture of which only some pixels were measured.
+//! Finds the far side of depth edges in a sparsely measured depth image.
 
 use std::ops::Range;
 
 use voodoo_core::math::widest;
 
-/// Distances from a pixel to its neighbors, and to those a knight's move away, shares of 2^16; by chamfers of 1, 1.4 and 2.1969
-/// (Borgefors, "Distance transformations in digital images", 1986), as OpenCV has them.
+/// Chamfer distances from a pixel to its neighbors, to its diagonal neighbors and to those a knight's move away: 1, 1.4 and
+/// 2.1969 in units of 2^-16 (Borgefors, "Distance transformations in digital images", 1986), as in OpenCV.
 const CHAMFERS: [i32; 3] = [65_536, 91_750, 143_976];
-/// No measured pixel is so far.
+/// Greater than any distance to a measured pixel.
 const NOTHING: i32 = i32::MAX >> 2;
-/// Columns and rows around a picture that neighbors of its pixels may be in.
+/// Margin of columns and rows around an image for the neighbors of its pixels.
 const BORDER: usize = 2;
-/// Neighbors of a pixel in rows before it, in the order that decides between equals: rows back, columns on, and which step.
+/// Neighbors of a pixel in the rows before it, in the order that resolves ties: rows back, columns forward, and index of the
+/// distance.
 const NEIGHBORS_BEFORE: [(usize, usize, usize); 7] =
     [(2, 1, 2), (2, 3, 2), (1, 0, 2), (1, 1, 1), (1, 2, 0), (1, 3, 1), (1, 4, 2)];
 
-/// Rows of distances to the nearest measured pixel, and of its depth, with a margin of [`BORDER`] pixels on all sides.
+/// Distances to the nearest measured pixel, and its depth, row by row with a margin of [`BORDER`] pixels on all sides.
 struct NearestPixel {
     stride: usize,
     away: Vec<i32>,
     depth: Vec<f32>,
 }
 
-/// True in a line of pixels on the far side of edges between surfaces, which differ by more than `apart` in depth.
+/// Marks a line of pixels on the far side of edges between surfaces whose depths differ by more than `apart`.
 ///
-/// `depth` has so many columns, meters, and is infinite where nothing was measured: the nearest measured one counts there. What is
-/// told of pixels with nothing measured within `reach` rows and columns means nothing.
+/// `depth` has so many columns, meters, and is infinite where nothing was measured: such a pixel gets the depth of the nearest
+/// measured one. The result is undefined for pixels without a measurement within `reach` rows and columns.
 pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -> Vec<bool> {
     let mut edges = vec![false; depth.len()];
     if depth.is_empty() || width == 0 {
@@ -35,8 +36,8 @@ pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -
     let stride = width + 2 * BORDER;
     let cells = (rows + 2 * BORDER) * stride;
     let mut filled = NearestPixel { stride, away: vec![NOTHING; cells], depth: vec![0.0; cells] };
-    // What matters to these pixels, and their neighbors, is on the way from the nearest measured one: no farther than seven fifths
-    // of the rows or columns between, by the chamfers.
+    // A pixel and its neighbors depend only on the path from the nearest measured pixel, whose chamfer distance is at most 7/5 of
+    // the distance in rows or columns.
     let far = (7 * (reach + 1)).div_ceil(5);
     let spans = spans(depth, width, far);
     let mut copy = (vec![0; width], vec![0.0; width]);
@@ -57,7 +58,7 @@ pub(crate) fn far_edges(depth: &[f32], width: usize, apart: f32, reach: usize) -
     edges
 }
 
-/// In each row the columns with something measured within `far` rows and columns, and those between.
+/// For each row, the range of columns from the first to the last one with a measurement within `far` rows and columns.
 fn spans(depth: &[f32], width: usize, far: usize) -> Vec<Range<usize>> {
     let own: Vec<Range<usize>> = depth
         .chunks_exact(width)
@@ -75,10 +76,10 @@ fn spans(depth: &[f32], width: usize, far: usize) -> Vec<Range<usize>> {
     (0..own.len()).map(around).collect()
 }
 
-/// Pixels of a row that are looked at together.
+/// Number of pixels of a row that are processed together.
 const BLOCK: usize = 16;
 
-/// Rows that were filled already, from the first column of a span on.
+/// Rows that are already filled, from the first column of a span on.
 struct Rows<'a> {
     away: &'a [i32],
     depth: &'a [f32],
@@ -86,10 +87,11 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// What `COUNT` pixels have from neighbors in these rows, which start at places and are a step away; measured pixels, where some are
-    /// given, are their own.
+    /// Updates `COUNT` pixels from their neighbors in these rows, given start indices and a step distance; measured pixels, where
+    /// given, keep their own depth.
     ///
-    /// All is read and then chosen by bits: of two places in memory the compiler would choose the address, one by one.
+    /// All values are read and then selected by bit masks; for a choice between two addresses the compiler would process one
+    /// pixel at a time.
     #[inline(always)]
     fn nearer<const COUNT: usize>(
         &self,
@@ -128,14 +130,15 @@ impl Rows<'_> {
     }
 }
 
-/// All ones or all zeros.
+/// Mask of all ones or all zeros.
 #[inline(always)]
 fn bits(condition: bool) -> u32 {
     u32::from(condition).wrapping_neg()
 }
 
 impl NearestPixel {
-    /// What a row's pixels have from the two rows above, or below, with all columns the other way round; and what was measured in them.
+    /// Propagates to a row from the two rows above it, or from those below with reversed columns; measured pixels keep their own
+    /// depth.
     #[inline(always)]
     fn propagate_rows<const BACK: bool>(&mut self, row: usize, span: &Range<usize>, measured: Option<&[f32]>) {
         let stride = self.stride;
@@ -149,7 +152,7 @@ impl NearestPixel {
             (&mut below[..stride], &mut depths_below[..stride], &*above, &*depths_above)
         };
         let (away, depth) = (&mut away[BORDER..][span.clone()], &mut depth[BORDER..][span.clone()]);
-        // Blocks of neighbors stay in registers; the last one begins among those that are done, which changes nothing.
+        // Blocks of neighbors stay in registers; the last block overlaps the one before, which does not change the result.
         let rows = Rows { away: others, depth: other_depths, first: span.start };
         let starts = NEIGHBORS_BEFORE.map(|(back, on, step)| {
             let start = if BACK { (back - 1) * stride + 2 * BORDER - on } else { (row - back) * stride + on };
@@ -165,8 +168,8 @@ impl NearestPixel {
         }
     }
 
-    /// A row's pixels may be nearer to what those `far` before them have, or behind: first the next one, then two together, and
-    /// so on, of which the nearer ones count where both are as far.
+    /// Propagates within a row from pixels up to `far` before, or behind: first by one pixel, then by two, and so on. The nearer
+    /// pixel wins a tie.
     #[inline(always)]
     fn propagate_columns<const BACK: bool>(
         &mut self,
@@ -180,7 +183,7 @@ impl NearestPixel {
         let (mut done, mut shift) = (0, 1);
         while done < far && shift < span.len() {
             let rest = span.len() - shift;
-            // Written where nothing is read: in place the compiler would write under a mask, which takes long.
+            // The result goes to another buffer; in place, the compiler would use slow masked writes.
             let (others, depths) = (&mut copy.0[..span.len()], &mut copy.1[..span.len()]);
             others.copy_from_slice(away);
             depths.copy_from_slice(depth);

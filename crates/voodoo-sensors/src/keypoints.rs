@@ -1,38 +1,41 @@
-//! What the 2-D keypoints of a network say about the sites of a body.
+//! Converts the 2-D keypoints of a network into measurements of body sites.
 
 use crate::eye::Eye;
 use voodoo_core::math::Vec3;
 use voodoo_core::{SiteGate, SiteRay};
 
-/// Standard deviation along a ray of a place on it, where none is told, meters.
+/// Standard deviation of a 3-D site position along its ray where none is given, meters.
 const ALONG_SIGMA: f64 = 0.04;
-/// Standard deviation of a site behind so many meters of the person's own body, beyond half a limb: the network guesses it.
+/// Standard deviation added for each meter of the person's own body before the site, beyond half a limb: the network guesses such
+/// a site.
+/// site.
 const GUESSED: f64 = 0.4;
 
-/// A site, and the keypoints that it is made of.
+/// A site and the keypoints that define it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteKeypoints {
     /// Its name.
     pub site: String,
-    /// Number and share of each.
+    /// Index and weight of each keypoint.
     pub weights: Vec<(usize, f64)>,
-    /// How far the network's idea of the site lies from ours, meters.
+    /// Standard deviation between the network's and this library's definition of the site, meters.
     pub spread: f64,
-    /// How far behind the visible surface it lies, meters.
+    /// Distance of the site behind the visible surface, meters.
     pub behind: f64,
 }
 
-/// A site seen in a picture.
+/// A site detected in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SitePixel {
     /// Column and row.
     pub pixel: [f64; 2],
-    /// The least of its keypoints' confidences, at most 1.
+    /// The least confidence of its keypoints, at most 1.
     pub confidence: f64,
 }
 
 impl SiteKeypoints {
-    /// Where a site is by keypoints (column, row, confidence); none where one of them is missing, or believed less than `least`.
+    /// Pixel of a site from keypoints (column, row, confidence); `None` if one of them is missing or has a confidence below
+    /// `least`.
     pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
         let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
         for (index, weight) in &self.weights {
@@ -41,55 +44,55 @@ impl SiteKeypoints {
             total += reliability;
             confidence = if reliability < confidence { reliability } else { confidence };
         }
-        // What is not finite anywhere is not in the sums.
+        // Missing keypoints are not finite, which makes the sums not finite.
         let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
         known.then_some(SitePixel { pixel, confidence })
     }
 }
 
-/// The camera of a picture, and how its keypoints become measurements.
+/// The camera of an image, and how its keypoints become measurements.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensor<'a> {
-    /// Where it stands.
+    /// Calibration and pose of the camera.
     pub eye: Eye<'a>,
-    /// Its name.
+    /// Name of the source.
     pub source: &'a str,
-    /// Standard deviation of a keypoint that is believed, pixels.
+    /// Standard deviation of a keypoint with confidence 1, pixels.
     pub noise: f64,
-    /// Least standard deviation of a place by a depth camera, meters: how well it is known how far behind a surface a site lies.
+    /// Least standard deviation of a 3-D position from depth, meters: the uncertainty of the site's distance behind the surface.
     pub place_sigma: f64,
     /// Time of the frame, seconds.
     pub stamp: f64,
 }
 
-/// A site that was seen, and what else is known of it.
+/// A detected site and its context.
 #[derive(Clone, Copy, Debug)]
 pub struct SiteObservation {
-    /// Where in the picture.
+    /// Its pixel and confidence.
     pub pixel: SitePixel,
-    /// The pixel without the lens: `x/z` and `y/z`, NaN where that is not known.
+    /// The undistorted pixel `(x/z, y/z)`; NaN where it is not known.
     pub flat: [f64; 2],
-    /// Where the site is expected, world, meters.
+    /// Predicted position, world frame, meters.
     pub expected: Vec3,
-    /// How much of the person's own body lies before it, meters.
+    /// Length of the person's own body in front of the site, meters.
     pub hidden: f64,
-    /// What a depth camera sees there, along the optical axis, meters.
+    /// Measured depth at the pixel along the optical axis, meters.
     pub surface: Option<f64>,
 }
 
-/// What a site that was seen becomes.
+/// The measurement that a detected site becomes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SiteMeasurement {
     /// A ray.
     Ray(SiteRay),
-    /// A place in the world, and its standard deviation, meters.
+    /// A 3-D position in the world frame and its standard deviation, meters.
     Place(Vec3, f64),
-    /// Nothing: it is too far from where the site is expected, or the lens shows nothing there.
+    /// Rejected: it is too far from the prediction, or the lens model has no ray for the pixel.
     Dropped,
 }
 
 impl SiteKeypoints {
-    /// What a sighting becomes: a place where a depth camera sees a surface that is near enough, else a ray that passes near enough.
+    /// Returns a 3-D position where the measured surface passes the gate, else a ray where that passes the gate.
     pub fn measurement(
         &self,
         observation: &SiteObservation,
@@ -133,8 +136,8 @@ impl SiteKeypoints {
     }
 }
 
-/// Number of the person whose sites lie nearest to where they are expected in the picture (column, row; NaN: nowhere), by the median
-/// distance; none without any site that both have.
+/// Index of the person whose sites have the least median distance from their predicted pixels (column, row; NaN if unknown);
+/// `None` if no person shares a site with the prediction.
 pub fn nearest_person<'a>(
     people: impl Iterator<Item = &'a [[f64; 3]]>,
     layout: &[SiteKeypoints],

@@ -1,5 +1,5 @@
-//! Measurements for [`voodoo_core`] from what sensors deliver: keypoints of 2-D networks, depth registered to another
-//! camera's picture, skin color, masks.
+//! Converts sensor data to measurements for [`voodoo_core`]: keypoints of 2-D networks, depth registered to another camera's
+//! image, skin color, masks.
 
 pub mod body_view;
 pub mod carried;

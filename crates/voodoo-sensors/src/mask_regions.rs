@@ -1,19 +1,19 @@
-//! What hangs together in a mask of a picture, and skin's regions.
+//! Connected components of masks, and the segmentation of skin.
 
 use crate::chroma;
 use crate::masks::{PIXEL_BLOCK, bounds, closed, cut, is_empty, opened, smooth};
 use voodoo_core::TrackError;
 
-/// A region of a mask: pixels that touch, at corners too.
+/// A connected component of a mask (8-connectivity).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MaskRegion {
-    /// First row and column, and one beyond the last.
+    /// First row, and one past the last row.
     pub rows: (usize, usize),
-    /// Columns likewise.
+    /// First column, and one past the last column.
     pub columns: (usize, usize),
-    /// Pixels.
+    /// Number of pixels.
     pub area: usize,
-    /// Sum of their columns, and of their rows.
+    /// Sum of the pixels' columns, and of their rows.
     pub sums: [usize; 2],
 }
 
@@ -38,12 +38,12 @@ struct Run {
     row: usize,
     start: usize,
     end: usize,
-    /// Another run of the same region with a smaller index, or itself.
+    /// Index of another run of the same component, smaller than this run's, or its own.
     parent: usize,
 }
 
-/// The regions of a mask of so many columns, and the number of its region, from 1, in each pixel; they are numbered by the first
-/// two by two pixels that hold something of them.
+/// Returns the components of a mask of so many columns, and the label of each pixel, from 1. Labels are ordered by the first
+/// block of two by two pixels that contains a pixel of the component.
 pub(crate) fn regions(mask: &[u8], width: usize) -> (Vec<MaskRegion>, Vec<i32>) {
     let mut runs = joined_runs(mask, width);
     for index in 0..runs.len() {
@@ -73,7 +73,7 @@ pub(crate) fn regions(mask: &[u8], width: usize) -> (Vec<MaskRegion>, Vec<i32>) 
     (found.into_iter().map(|(_, _, region)| region).collect(), labels)
 }
 
-/// Stretches of pixels in rows, each pointing to one before it that it touches.
+/// Runs of set pixels in rows, each linked to an earlier one that it touches.
 fn joined_runs(mask: &[u8], width: usize) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let mut above = 0..0;
@@ -110,7 +110,7 @@ fn first(runs: &[Run], mut index: usize) -> usize {
     index
 }
 
-/// A mask of so many columns with gaps of two pixels closed between regions whose boxes' diagonals are no longer than `longest`.
+/// Closes gaps of two pixels between the regions of a mask whose bounding-box diagonals are no longer than `longest`.
 pub(crate) fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
     let mut result = mask.to_vec();
     let [rows, columns] = bounds(mask, width);
@@ -129,29 +129,30 @@ pub(crate) fn joined(mask: &[u8], width: usize, longest: f64) -> Vec<u8> {
     result
 }
 
-/// What skin is looked for in: a picture, and where it may be.
+/// The input of the skin segmentation: an image, and where skin may be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SkinPicture<'a> {
-    /// Of each pixel's color, see [`chroma::bins`].
+    /// Bin of each pixel's color, see [`chroma::bins`].
     pub bins: &'a [u16],
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Which bins are skin's.
+    /// Which bins count as skin.
     pub table: &'a [bool],
     /// Where the body may be.
     pub body: Option<&'a [bool]>,
-    /// How much of the time a pixel shows skin where no skin is; half or more is the scene.
+    /// For each pixel the fraction of time in which it shows background of skin color; pixels with one half or more are
+    /// background.
     pub always: Option<&'a [f32]>,
-    /// Where something is before the scene.
+    /// Where a surface lies in front of the scene.
     pub before: Option<&'a [bool]>,
 }
 
 impl SkinPicture<'_> {
-    /// Pixels of skin's color, single ones removed, into `colored`; and of those the ones that may be the body's, in regions at least
-    /// three pixels wide, with gaps closed between regions no longer than `longest`, into `skin`.
+    /// Writes the pixels of skin color, without isolated ones, into `colored`. Writes those that may belong to the body into
+    /// `skin`: regions at least three pixels wide, with gaps closed between regions no longer than `longest`.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when sizes do not fit together.
+    /// [`TrackError::Measurement`] when array sizes do not match.
     pub(crate) fn find(&self, longest: f64, colored: &mut Vec<u8>, skin: &mut Vec<u8>) -> Result<(), TrackError> {
         let count = self.bins.len();
         let whole = if self.width > 0 { count.is_multiple_of(self.width) } else { count == 0 };
@@ -165,7 +166,7 @@ impl SkinPicture<'_> {
         skin.copy_from_slice(colored);
         self.rule_out(skin);
         let [rows, columns] = bounds(skin, self.width);
-        // Single pixels around all of it, where the picture has them, are none.
+        // The crop is extended by one pixel within the image, and its outer pixels are not set.
         let around = |span: std::ops::Range<usize>, size: usize| span.start.saturating_sub(1)..(span.end + 1).min(size);
         let (rows, columns) = (around(rows, count / self.width.max(1)), around(columns, self.width));
         let part = cut(skin, self.width, &rows, &columns);
@@ -180,7 +181,7 @@ impl SkinPicture<'_> {
         Ok(())
     }
 
-    /// Takes away what cannot be the body's.
+    /// Removes pixels that cannot belong to the body.
     fn rule_out(&self, skin: &mut [u8]) {
         for (block, pixels) in skin.chunks_mut(PIXEL_BLOCK).enumerate().filter(|(_, pixels)| !is_empty(pixels)) {
             let here = block * PIXEL_BLOCK..block * PIXEL_BLOCK + pixels.len();
@@ -215,7 +216,7 @@ mod tests {
         assert!(regions(&[], 0).0.is_empty() && regions(&[0; 6], 3).0.is_empty());
     }
 
-    /// Numbers of the regions in each pixel, by filling one after the other.
+    /// Labels of all pixels by flood fill, one region after the other.
     fn flooded(mask: &[u8], width: usize) -> Vec<i32> {
         let mut labels = vec![0; mask.len()];
         let mut count = 0;
@@ -322,7 +323,7 @@ mod tests {
         }
     }
 
-    /// Pixels of a mask around one of them, itself included, within the picture.
+    /// Pixels of a mask around a pixel, including itself, within the image.
     fn around(index: usize, [height, width]: [usize; 2]) -> impl Iterator<Item = usize> {
         let (row, column) = (index / width, index % width);
         let span = |place: usize, size: usize| place.saturating_sub(1)..(place + 2).min(size);
@@ -337,7 +338,7 @@ mod tests {
             .collect()
     }
 
-    /// Regions by filling them pixel by pixel.
+    /// Regions by flood fill.
     fn filled(mask: &[u8], size: [usize; 2]) -> (Vec<MaskRegion>, Vec<i32>) {
         let (mut owner, mut found) = (vec![usize::MAX; mask.len()], Vec::new());
         for start in 0..mask.len() {
@@ -375,7 +376,7 @@ mod tests {
             let mut number = numbers(seed);
             let size = [1 + (59.0 * number()) as usize, 1 + (89.0 * number()) as usize];
             let count = size[0] * size[1];
-            // Noise that hangs together: the mean of what is around each pixel.
+            // Correlated noise: the mean of the surroundings of each pixel.
             let noise: Vec<f64> = (0..count).map(|_| number()).collect();
             let limit = 0.4 + 0.2 * number();
             let mean = |index: usize| {
@@ -392,7 +393,7 @@ mod tests {
                     let region = usize::try_from(label - 1).ok().map(|place| regions[place]);
                     u8::from(region.is_some_and(|region| length(region.rows).hypot(length(region.columns)) <= longest))
                 };
-                // The part of the picture with something in it is all there is: beyond it nothing counts.
+                // The bounding box of the set pixels contains everything: nothing outside it counts.
                 let [rows, columns] = bounds(mask, size[1]);
                 let short = cut(&labels.iter().map(short).collect::<Vec<_>>(), size[1], &rows, &columns);
                 let part = [rows.len(), columns.len()];
@@ -407,7 +408,7 @@ mod tests {
             assert_eq!(regions(&mask, size[1]), filled(&mask, size), "{seed}");
             assert_eq!(joined(&mask, size[1], longest), gaps_closed(&mask), "{seed}");
 
-            // The same of a picture, with all that may rule skin out.
+            // Repeats the test with an image and all exclusion masks.
             let fraction = 0.3 + 0.5 * number();
             let mut table: Vec<bool> = (0..chroma::BINS).map(|_| number() < fraction).collect();
             table[5] = true;
@@ -427,7 +428,7 @@ mod tests {
             let (mut colored, mut skin) = (Vec::new(), Vec::new());
             picture.find(longest, &mut colored, &mut skin).unwrap();
             let light: Vec<bool> = bins.iter().map(|bin| *bin < 32_768 && table[usize::from(*bin)]).collect();
-            // Most of nine, of which the border's go on beyond it.
+            // Majority of nine, with the border replicated.
             let most = |index: usize| {
                 let near = |place: usize, offset: usize, size: usize| (place + offset).saturating_sub(1).min(size - 1);
                 let (row, column) = (index / size[1], index % size[1]);

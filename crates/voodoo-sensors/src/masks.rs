@@ -1,23 +1,23 @@
-//! Masks of pictures, row by row, 1 where something is and 0 elsewhere: grown, opened, closed, smoothed.
+//! Binary image morphology: masks, row by row with 1 for set pixels, are dilated, opened, closed and smoothed.
 
 use voodoo_core::math::widest;
 
-/// 1 wherever a mask of so many columns has something within `reach` rows and columns.
+/// Dilates a mask of so many columns by a square of `reach` rows and columns to each side.
 pub(crate) fn grown(mask: &[u8], width: usize, reach: usize) -> Vec<u8> {
     around(mask, width, reach, |a, b| a | b)
 }
 
-/// A mask without what is narrower than three pixels.
+/// Opens a mask: removes what is narrower than three pixels.
 pub(crate) fn opened(mask: &[u8], width: usize) -> Vec<u8> {
     around(&around(mask, width, 1, |a, b| a & b), width, 1, |a, b| a | b)
 }
 
-/// A mask with gaps of up to two pixels filled.
+/// Closes a mask: fills gaps of up to two pixels.
 pub(crate) fn closed(mask: &[u8], width: usize) -> Vec<u8> {
     around(&around(mask, width, 1, |a, b| a | b), width, 1, |a, b| a & b)
 }
 
-/// Joins every pixel with all those within `reach` rows and columns; what is outside the picture does not count.
+/// Combines every pixel with all those within `reach` rows and columns; pixels outside the image do not count.
 fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) -> Vec<u8> {
     by_rows(
         mask,
@@ -38,7 +38,7 @@ fn around(mask: &[u8], width: usize, reach: usize, join: impl Fn(u8, u8) -> u8) 
     )
 }
 
-/// What most of each pixel and its eight neighbors are, into `found`; beyond the border a picture goes on as it ends.
+/// Writes the majority of each pixel and its eight neighbors into `found`; the border is replicated.
 pub(crate) fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
     found.resize(mask.len(), 0);
     fill_rows(
@@ -61,7 +61,7 @@ pub(crate) fn smooth(mask: &[u8], width: usize, found: &mut Vec<u8>) {
     )
 }
 
-/// A mask made row by row: `make` gets the number of a row, working memory for one, and the row to fill.
+/// Builds a mask row by row: `make` gets the index of a row, working memory for one row, and the row to fill.
 fn by_rows(mask: &[u8], width: usize, make: impl FnMut(usize, &mut [u8], &mut [u8])) -> Vec<u8> {
     let mut found = vec![0; mask.len()];
     fill_rows(&mut found, width, make);
@@ -80,10 +80,10 @@ fn fill_rows(found: &mut [u8], width: usize, mut make: impl FnMut(usize, &mut [u
     );
 }
 
-/// Pixels that are passed over together where none of them holds anything: two registers of AVX2.
+/// Number of pixels that are skipped together if none of them is set: two registers of AVX2.
 pub(crate) const PIXEL_BLOCK: usize = 64;
 
-/// A part of a mask of so many columns.
+/// A part of a mask with this many columns.
 pub(crate) fn cut(
     mask: &[u8],
     width: usize,
@@ -97,12 +97,12 @@ pub(crate) fn cut(
     part
 }
 
-/// Whether a row of a mask holds nothing; all of it is read at once, which is faster than to look for the first pixel.
+/// Whether a row of a mask is empty. Reading all of it at once is faster than searching for the first set pixel.
 pub(crate) fn is_empty(row: &[u8]) -> bool {
     row.iter().fold(0, |any, pixel| any | pixel) == 0
 }
 
-/// Smallest range of rows and of columns that holds all of a mask.
+/// Smallest range of rows and of columns that contains all set pixels of a mask.
 pub(crate) fn bounds(mask: &[u8], width: usize) -> [std::ops::Range<usize>; 2] {
     let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
     for (index, row) in mask.chunks_exact(width.max(1)).enumerate().filter(|(_, row)| !is_empty(row)) {

@@ -1,4 +1,4 @@
-//! What a depth camera sees of the body, in the picture of a color camera beside it.
+//! Registers depth points near the body to the image of a color camera.
 
 use std::ops::Range;
 
@@ -6,37 +6,37 @@ use crate::far_edges::far_edges;
 use crate::masks::grown;
 use voodoo_core::TrackError;
 
-/// Sums with numbers of a picture's size have no digits left for fractions of them: three times 2^51.
+/// A sum of this number (three times 2^51) and one of an image's size has no digits for fractions.
 const NO_FRACTION: f64 = (1_u64 << 52) as f64 + (1_u64 << 51) as f64;
 
-/// A number rounded to the nearest whole one, of two the even one, by the digits that a large sum has no room for; numbers beyond
+/// Rounds to the nearest integer, ties to even, by adding a number so large that the sum has no fractional digits; values beyond
 /// 2^51 stay large.
 #[inline(always)]
 fn nearest_whole(value: f64) -> f64 {
     (value + NO_FRACTION) - NO_FRACTION
 }
 
-/// Points in a picture of so many rows and columns.
+/// Points in an image of so many rows and columns.
 #[derive(Clone, Debug)]
 pub struct ProjectedPoints {
-    /// Indices of the points that lie in the picture.
+    /// Indices of the points within the image.
     pub inside: Vec<isize>,
-    /// Rows that hold them.
+    /// Rows of the bounding box of these points.
     pub rows: Range<usize>,
-    /// And columns.
+    /// Columns of that bounding box.
     pub columns: Range<usize>,
-    /// Depth of the nearest point in each pixel of those, infinite where none is.
+    /// Depth of the nearest point in each pixel of the box, infinite where there is none.
     pub nearest: Vec<f32>,
-    /// 1 in each pixel of those where a marked point is; none without marks.
+    /// 1 in each pixel of the box that contains a marked point; `None` without marks.
     pub marked: Option<Vec<u8>>,
 }
 
 impl ProjectedPoints {
-    /// Puts points into the pixels that are nearest to their places (column, row) in a picture of `[height, width]`; NaN,
-    /// where the camera cannot see, is in none.
+    /// Assigns points to the pixels nearest to their projections (column, row) in an image of `[height, width]`; NaN, for points
+    /// that are not visible, is in no pixel.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
+    /// [`TrackError::Measurement`] when the number of depths or marks differs from that of the projections.
     pub fn new(
         places: &[[f64; 2]],
         points: &[[f64; 3]],
@@ -76,15 +76,16 @@ impl ProjectedPoints {
     }
 }
 
-/// Surfaces that differ by more than this in depth, meters, do not touch.
+/// Surfaces whose depths differ by more than this, meters, are separate.
 const SURFACES_APART: f32 = 0.1;
 
 impl ProjectedPoints {
-    /// Where something was seen within `reach` pixels, or a camera does not look (`beyond`, 1 there), and of the marked points the
-    /// first; without the lines behind edges between surfaces, in a picture of `[height, width]`.
+    /// Returns two masks of an image of `[height, width]`: the pixels within `reach` of a point or outside the depth camera's
+    /// field of view (`beyond`, true there), and the pixels within `reach` of a marked point (`None` without marks). The far
+    /// side of edges between surfaces is removed from both.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when `beyond` is no picture of that size.
+    /// [`TrackError::Measurement`] when `beyond` does not have that size.
     pub fn visible_mask(
         &self,
         beyond: &[bool],
@@ -101,7 +102,7 @@ impl ProjectedPoints {
         if count == 0 {
             return Ok((mask, before));
         }
-        // All that is seen, and what is within reach of it.
+        // The bounding box of the points, extended by `reach`.
         let wider = |span: &Range<usize>, size: usize| span.start.saturating_sub(reach)..(span.end + reach).min(size);
         let (rows, columns) = (wider(&self.rows, height), wider(&self.columns, width));
         let stride = columns.len();
@@ -145,37 +146,37 @@ impl ProjectedPoints {
     }
 }
 
-/// Places of a picture, and what was measured there.
+/// Points registered to an image.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasuredPixels<'a> {
-    /// Columns and rows.
+    /// Columns and rows in the image.
     pub places: &'a [[f64; 2]],
     /// Depths, meters.
     pub depths: &'a [f64],
-    /// Which may be the still scene.
+    /// Which of them may be the still scene.
     pub still: Option<&'a [bool]>,
 }
 
-/// Depths within this of the nearest fifth, meters, belong to one surface: a limb is no deeper.
+/// Depths within this of the nearest 20 % quantile, meters, belong to one surface: a limb is no deeper.
 const ONE_SURFACE: f64 = 0.1;
-/// Fewer points around a place than this are no surface: one or two may be stray returns.
+/// Fewer points than this around a pixel are no surface, since one or two may be stray returns.
 const FEWEST_POINTS: usize = 3;
-/// Points of a list whose bounds are looked at together.
+/// Number of consecutive points whose common bounds are tested together.
 const POINTS_TOGETHER: usize = 64;
 
-/// Numbers of regions in a part of a picture, row by row.
+/// Region labels in a part of an image, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RegionLabels {
     /// First row and column.
     pub first: [usize; 2],
     /// Rows and columns.
     pub size: [usize; 2],
-    /// A number for each pixel.
+    /// Label of each pixel.
     pub values: Vec<i32>,
 }
 
 impl RegionLabels {
-    /// That of the pixel around a place (column, row); -1 outside.
+    /// Label of the pixel at (column, row); -1 outside.
     fn at(&self, place: &[f64; 2]) -> i32 {
         let [u, v] = place.map(nearest_whole);
         let [row, column] = [(v, 0), (u, 1)].map(|(value, axis)| value - self.first[axis] as f64);
@@ -185,11 +186,11 @@ impl RegionLabels {
 }
 
 impl MeasuredPixels<'_> {
-    /// [`Self::nearest_surface`] of each of some places of a picture, by the points in its region, as `labels` number it, if there are
-    /// enough.
+    /// Evaluates [`Self::nearest_surface`] at several pixels, using only the points in each pixel's own region of `labels` if
+    /// there are enough.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when arrays do not belong together.
+    /// [`TrackError::Measurement`] when array sizes do not match.
     pub fn nearest_surfaces(
         &self,
         labels: &RegionLabels,
@@ -202,7 +203,7 @@ impl MeasuredPixels<'_> {
             return Err(TrackError::measurement("labels", "one for every pixel", found));
         }
         self.check()?;
-        // Neighbors in the list are near each other: most stretches of it are nowhere near a place.
+        // Consecutive points are near each other, so most blocks of the list are far from the pixel and are skipped.
         let stretches: Vec<[[f64; 2]; 2]> = self.places.chunks(POINTS_TOGETHER).map(bounds_of).collect();
         let surface = |(place, region): &([f64; 2], i32)| {
             let (mut near, mut chosen) = (Vec::new(), Vec::new());
@@ -226,11 +227,11 @@ impl MeasuredPixels<'_> {
         Ok(places.iter().map(surface).collect())
     }
 
-    /// Depth of the nearest surface within `radius` of a place, meters, and whether most of it is still; none with less than
-    /// three points there.
+    /// Returns the depth of the nearest surface within `radius` of a pixel, meters, and whether most of it is still; `None` with
+    /// fewer than three points there.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when there are not as many depths, or marks, as places.
+    /// [`TrackError::Measurement`] when the number of depths or marks differs from that of the points.
     pub fn nearest_surface(&self, place: [f64; 2], radius: f64) -> Result<Option<(f64, bool)>, TrackError> {
         self.check()?;
         let near = self.places.iter().enumerate().filter(|(_, other)| is_near(other, &place, radius));
@@ -246,7 +247,7 @@ impl MeasuredPixels<'_> {
         Err(TrackError::measurement("depths", "as many depths, and marks, as pixels", found))
     }
 
-    /// The nearest surface of points that are near, or of those of them that are chosen, if there are enough.
+    /// Nearest surface of the points nearby, or of the chosen ones among them if there are enough.
     fn surface_of(&self, mut near: Vec<usize>, chosen: Vec<usize>) -> Option<(f64, bool)> {
         if chosen.len() >= FEWEST_POINTS {
             near = chosen;
@@ -267,7 +268,7 @@ fn is_near(other: &[f64; 2], place: &[f64; 2], radius: f64) -> bool {
     u * u + v * v < radius * radius
 }
 
-/// Least and greatest columns and rows; NaN counts nowhere.
+/// Least and greatest columns and rows; NaN is ignored.
 fn bounds_of(places: &[[f64; 2]]) -> [[f64; 2]; 2] {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for place in places {
@@ -292,7 +293,7 @@ mod tests {
         }
     }
 
-    /// 600 points in a picture 41 pixels wide and high: a surface at 2 m on its left half, one at 3 m on its right half.
+    /// 600 points in an image 41 pixels wide and high: a surface at 2 m in its left half, one at 3 m in its right half.
     fn two_surfaces() -> (Vec<[f64; 2]>, Vec<f64>) {
         let mut number = numbers(5);
         let places: Vec<[f64; 2]> = (0..600).map(|_| [40.0 * number(), 40.0 * number()]).collect();
@@ -361,7 +362,7 @@ mod tests {
         let points = [3.0, 2.0, 1.0, 1.0, 4.0, 3.0].map(|depth| [0.0, 0.0, depth]);
         let marks = [false, true, true, true, false, true];
         let found = ProjectedPoints::new(&places, &points, Some(&marks), [4, 5]).unwrap();
-        // Halves go to the even pixel: column 5.5 is outside, -0.5 is not.
+        // Halves are rounded to even: column 5.5 is outside, -0.5 is not.
         assert_eq!(found.inside, [0, 1, 4, 5]);
         let mut beyond = [false; 20];
         beyond[19] = true;

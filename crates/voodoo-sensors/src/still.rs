@@ -1,22 +1,23 @@
-//! What may be the still scene of a depth camera that stands: what has been at its place for some pictures, and behind which
-//! nothing was ever seen.
+//! Finds the pixels of a static depth camera that may be the still scene: their depth has not changed over some images, and no
+//! surface behind them was ever observed.
 
 use std::ops::Range;
 
 use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
-/// What lies so far behind is another surface: meters, and share of the depth.
+/// Least distance behind a surface at which another surface begins: meters, and a fraction of the depth.
 const FARTHER: [f32; 2] = [0.05, 0.02];
-/// The depth of a still surface changes by less than this: meters, and share of the depth.
+/// Greatest change of depth of a still surface: meters, and a fraction of the depth.
 const STAYS: [f32; 2] = [0.02, 0.015];
 
-/// Of every pixel of a depth image `now` (meters, 0 = no return) whether it shows what may be the scene, and whether something
-/// before what was seen there once: `farthest`, of the pixel and its neighbors, since at the edges of things every camera sees now
-/// the one, now the other. `then` is an image some pictures ago. Nothing is told of pixels outside some rows and columns.
+/// For each pixel of a depth image `now` (meters, 0 = no return): whether it may be the scene, and whether a surface lies in
+/// front of one observed earlier. `farthest` is the farthest depth observed so far; the neighbors of a pixel are included, since
+/// at edges a camera measures one or the other surface. `then` is an image some frames ago. Only pixels within the given rows and
+/// columns are evaluated.
 ///
 /// # Errors
-/// [`TrackError::Measurement`] when the images are not of one size, or have not these rows and columns.
+/// [`TrackError::Measurement`] when the images differ in size, or do not have these rows and columns.
 pub(crate) fn still(
     now: &[f32],
     farthest: &[f32],
@@ -36,7 +37,7 @@ pub(crate) fn still(
         return Err(TrackError::measurement("depth", "images of one size", found));
     }
     let (mut stays, mut before) = (vec![false; now.len()], vec![false; now.len()]);
-    // Columns with a neighbor on either side, where there is one.
+    // Columns including a neighbor on either side, where there is one.
     let around = columns.start.saturating_sub(1)..(columns.end + 1).min(width);
     let (mut behind, mut line) = (vec![0.0; around.len()], vec![0.0; around.len()]);
     widest(
@@ -58,8 +59,8 @@ pub(crate) fn still(
     Ok((stays, before))
 }
 
-/// The least of every pixel and its eight neighbors, in some columns of a row of an image; of the outermost columns, of those alone.
-/// `line` is working memory.
+/// Minimum of every pixel and its eight neighbors in some columns of a row of an image; neighbors outside these columns do not
+/// count. `line` is working memory.
 #[inline(always)]
 fn least_around(
     image: &[f32],
@@ -91,7 +92,7 @@ mod tests {
 
     #[test]
     fn the_scene_is_what_stays_and_has_nothing_behind_it() {
-        // A wall at 3 m; before it at 2 m a pole that stands, and a hand that came.
+        // A wall at 3 m; in front of it at 2 m a static pole, and a hand that has appeared.
         let farthest = [[3.0, 3.0, 3.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0]; 3].concat();
         let now = [[3.0, 3.01, 3.2, 2.0, 3.0, 3.0, 3.0, 2.0, 3.0]; 3].concat();
         let then = [[3.0, 3.0, 3.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0]; 3].concat();

@@ -1,4 +1,4 @@
-//! The part of a depth image in which the body is expected, and what of it lies in a box.
+//! Selects the points of a depth image that lie in a box around the body.
 
 use std::ops::Range;
 
@@ -6,20 +6,20 @@ use voodoo_core::Camera;
 use voodoo_core::TrackError;
 use voodoo_core::math::widest;
 
-/// Part of a depth image (meters, along the optical axis) in which the body is expected.
+/// The part of a depth image (meters, along the optical axis) in which the body is expected.
 #[derive(Clone, Debug)]
 pub(crate) struct Window<'a> {
-    /// Depths, row by row; what is not finite and above zero is no return.
+    /// Depth image, row by row; values that are not finite and positive are no returns.
     pub depth: &'a [f32],
-    /// Rows and columns of that image.
+    /// Rows and columns of the image.
     pub size: [usize; 2],
-    /// The camera.
+    /// Calibration of the camera.
     pub camera: &'a Camera,
-    /// The image has every so-many-th row and column of the camera.
+    /// The image contains every n-th row and column of the camera.
     pub step: usize,
-    /// Rows of the image that are looked at.
+    /// Rows of the image that are evaluated.
     pub rows: Range<usize>,
-    /// And columns.
+    /// Columns of the image that are evaluated.
     pub columns: Range<usize>,
 }
 
@@ -48,11 +48,11 @@ impl Window<'_> {
         ))
     }
 
-    /// The points within the box from `low` to `high` (world, meters), in the frame of another camera, meters; and the index
-    /// of each one's pixel in the image.
+    /// Returns the points within the box from `low` to `high` (world frame, meters), in the frame of another camera, meters, and
+    /// the index of each point's pixel in the image.
     ///
     /// # Errors
-    /// [`TrackError::Measurement`] when sizes do not fit together.
+    /// [`TrackError::Measurement`] when array sizes do not match.
     pub(crate) fn within(
         &self,
         low: [f64; 3],
@@ -62,7 +62,7 @@ impl Window<'_> {
     ) -> Result<(Vec<[f64; 3]>, Vec<isize>), TrackError> {
         self.check()?;
         let to_world = world_from_sensor.map(|row| row.map(|entry| entry as f32));
-        // Values of single precision are between these where they are between the corners.
+        // A value of single precision lies between these bounds exactly if it lies between the corners.
         let (low, high) = (low.map(below), high.map(|value| -below(-value)));
         let (rows, count) = (self.rows.clone(), self.columns.len());
         let all_rays = self.camera.rays();
@@ -73,7 +73,7 @@ impl Window<'_> {
             widest(
                 #[inline(always)]
                 || {
-                    // One column after the other fills whole registers.
+                    // Processing one coordinate after the other fills whole registers.
                     if self.step == 1 {
                         gate(inside, depths.iter().zip(rays), (low, high), &to_world);
                     } else {
@@ -88,7 +88,7 @@ impl Window<'_> {
             let first = row * self.size[1] + self.columns.start;
             let depths = &self.depth[first..][..count];
             let rays = &all_rays[(row * self.camera.width() + self.columns.start) * self.step..];
-            // Most of the columns are passed over, some at once.
+            // Most of the columns are skipped, several at once.
             for (block, inside) in inside.chunks(COLUMNS_TOGETHER).enumerate().filter(|(_, inside)| any(inside)) {
                 for (offset, _) in inside.iter().enumerate().filter(|(_, inside)| **inside) {
                     let offset = block * COLUMNS_TOGETHER + offset;
@@ -106,21 +106,21 @@ impl Window<'_> {
     }
 }
 
-/// Columns that are passed over together where none of them holds anything.
+/// Number of columns that are skipped together if none of them is marked.
 const COLUMNS_TOGETHER: usize = 16;
 
-/// Whether some of these are marked; all are read at once, which is faster than to look for the first one.
+/// Whether any of these is marked. Reading all of them at once is faster than searching for the first one.
 fn any(marks: &[bool]) -> bool {
     marks.iter().fold(false, |any, mark| any | mark)
 }
 
-/// The greatest value of single precision that is not above another one.
+/// The greatest value of single precision that is not above a given one.
 fn below(value: f64) -> f32 {
     let near = value as f32;
     if f64::from(near) > value { near.next_down() } else { near }
 }
 
-/// Which depths along rays are returns from within a box (world, meters).
+/// Which depths along rays are returns within a box (world frame, meters).
 #[inline(always)]
 fn gate<'a>(
     inside: &mut [bool],
@@ -150,7 +150,7 @@ mod tests {
     const HIGH: [f64; 3] = [0.7, 0.9, 2.4];
     const SIZE: [usize; 2] = [48, 64];
 
-    /// A turn about z, and a shift.
+    /// A rotation about z and a translation.
     fn pose(angle: f64, shift: [f64; 3]) -> [[f64; 4]; 4] {
         let (sin, cos) = angle.sin_cos();
         [[cos, -sin, 0.0, shift[0]], [sin, cos, 0.0, shift[1]], [0.0, 0.0, 1.0, shift[2]], [0.0, 0.0, 0.0, 1.0]]

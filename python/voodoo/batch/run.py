@@ -1,4 +1,4 @@
-"""Handing recordings to Dask, and collecting what becomes of them."""
+"""Submits recordings to Dask and collects the results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _EVERY_S, _FRACTION = 2.0, 0.05
 """The table of summaries is written anew at most so often [s], and in at most so much of the time: of a million recordings it is
 large."""
 _AHEAD = 4
-"""So many tasks a worker are known to the scheduler: a million at once would fill its memory."""
+"""Number of tasks per worker that are submitted to the scheduler: a million at once would fill its memory."""
 _CONNECT_S, _POLL_S = 30, 0.3
 
 
@@ -37,15 +37,15 @@ class Batch:
         settings: of all recordings.
 
     Attributes:
-        rows: of the recordings that are done or failed, by name.
-        jobs: what is left to do: recordings that were not done, and those that failed.
+        rows: rows of the recordings that are done or failed, by name.
+        jobs: remaining jobs: recordings that were not tracked yet, and those that failed.
 
     Raises:
         VoodooError: the folder cannot be used, or holds results of other settings.
     """
 
     def __init__(self, sources: Sequence[str], out: str, settings: Settings) -> None:
-        """See what is done."""
+        """Find out which recordings are done."""
         self._store = Store(out)
         self._check_settings(settings)
         text = self._store.read(SUMMARY)

@@ -19,7 +19,7 @@ from voodoo.evaluation.search import find_recordings
 
 _FILES = (".bag", ".mcap", ".db3", ".zip", ".trc", ".c3d")
 _OF_A_FOLDER = re.compile(r"(metadata\.yaml|Calib[^/]*\.toml|calibration\.toml|bag/[^/]*)$")
-"""What a folder that is a recording holds."""
+"""Files that identify a folder as a recording."""
 _TABLE = "part-0.parquet"
 
 

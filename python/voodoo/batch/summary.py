@@ -1,4 +1,4 @@
-"""One row a recording: how it went; and the table of all of them."""
+"""Summary row of a recording, and the table of all recordings."""
 
 from __future__ import annotations
 

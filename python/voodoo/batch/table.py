@@ -16,7 +16,7 @@ from voodoo.export.track import Track
 Columns: TypeAlias = dict[str, npt.NDArray[Any] | list[str]]
 
 NOTE = b"voodoo"
-"""Key of what the file says of itself, JSON: the recording's row of the summary, and the settings."""
+"""Key of the file's metadata, JSON: the recording's row of the summary, and the settings."""
 
 
 def columns_of(tracks: Mapping[int, Track]) -> Columns:
@@ -64,7 +64,7 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
 
 
 def _sigmas(track: Track) -> npt.NDArray[np.float64]:
-    """Root mean square (F, J) of the standard deviations of each joint's coordinates [m]; NaN where nothing is said."""
+    """Root mean square (F, J) of the standard deviations of each joint's coordinates [m]; NaN where unknown."""
     if not track.covariance.size:
         return np.full(track.joints.shape[:2], np.nan)
     return np.asarray(np.sqrt(np.trace(track.covariance, axis1=2, axis2=3) / 3.0))

@@ -1,4 +1,4 @@
-"""What a worker does: one recording, from its files to its table."""
+"""Task of a worker: track one recording and write its table."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def do(job: Job) -> Row:
             Store(job.out).write(Store(job.out).place_of(job.name), encode(columns, note))
             return row
     except Exception as error:
-        # One recording of a thousand costs nothing but itself, whatever is wrong with it.
+        # An error in one recording must not affect the others.
         words = " ".join(str(error).split()) or "no further detail"
         text = words if isinstance(error, (ValueError, OSError)) else f"{type(error).__name__}: {words}"
         return failed(job, text, time.perf_counter() - began)

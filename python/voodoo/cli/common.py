@@ -1,4 +1,4 @@
-"""What all commands do: read words, refuse what does not go together, show progress, turn errors into one line."""
+"""Shared code of all commands: parse options, reject conflicting ones, show progress, print errors as one line."""
 
 from __future__ import annotations
 

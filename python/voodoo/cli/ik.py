@@ -115,7 +115,7 @@ def ik_command(
             )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
-        how["watched"] = partial(progressing, words=source.name, total=len(source))
+        how["wrap"] = partial(progressing, words=source.name, total=len(source))
         result, errors = follow(source, tracker, positions, **how)
         for file in written:
             export(result, file, body=tracker.body, root_frame=source.root_frame)

@@ -53,7 +53,7 @@ _LINE_S = 1.0
 _NO_SCREEN = "--save FILE.rrd writes a file"
 """What `Viewer` advises where there is no screen."""
 _SWITCH_S = 5e-4
-"""How long a thread may keep Python from the others: the default of 5 ms is what a whole step takes."""
+"""Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What commands that track do: open a recording, run over it, draw. Imported when a command runs, not for its help."""
+"""Shared code of commands that track: open a recording, track, draw. Imported when a command runs, not for its help."""
 
 from __future__ import annotations
 

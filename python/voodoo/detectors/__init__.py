@@ -1,4 +1,4 @@
-"""Detectors of one's own: what `Tracker` and `People` take as `detector` besides the one that comes with the package."""
+"""Custom detectors for the `detector` argument of `Tracker` and `People`, besides the shipped one."""
 
 from voodoo.detectors.base import (
     JOINTS,

@@ -1,4 +1,4 @@
-"""What a detector is given, what it returns, and a function as a detector."""
+"""Input and output of a detector, and a detector made from a function."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ JOINTS = (
 """The joints that the shipped detector reports, in its order (H-Anim names, ISO/IEC 19774)."""
 
 LENGTHS = ("upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck", "stature")
-"""Lengths that mean something to the tracker: distances between joints, the mean of both sides, and the stature.
+"""Lengths that the tracker uses: distances between joints, averaged over both sides, and the stature.
 
 `trunk` is the distance from humanoid_root to vc7, `neck` that from vc7 to head_center.
 """
@@ -30,17 +30,17 @@ LENGTHS = ("upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_widt
 
 @dataclass(frozen=True, eq=False)
 class DetectorImage:
-    """A depth image as a detector sees it.
+    """A depth image as the input of a detector.
 
     Args:
-        depth: (H, W) float32 [m] along the optical axis; 0 where nothing returned, and where it is known that what returned is
-            not asked for: boxes that were left out, the learned background, persons who are tracked already.
+        depth: (H, W) float32 [m] along the optical axis; 0 where nothing returned, and in regions that are not
+            requested: excluded boxes, the learned background, persons who are tracked already.
         camera: its calibration.
         world_from_sensor: (4, 4) pose of its optical frame (x right, y down, z forward).
-        floor: unit normal (3,) upwards and height along it [m], in the world, if it is known.
-        query: "all": everybody; "any" or "new": one person will do; "near": the one at `near`. A detector may always return
-            everybody.
-        near: (3,) place in the world [m] at which a person is expected, with the query "near".
+        floor: unit normal (3,) upwards and height along it [m], in the world frame, if known.
+        query: "all": all persons; "any" or "new": one person suffices; "near": the person at `near`. A detector may always
+            return all persons.
+        near: (3,) position in the world frame [m] at which a person is expected, with the query "near".
     """
 
     depth: npt.NDArray[np.float32]
@@ -52,9 +52,11 @@ class DetectorImage:
 
     def points(self) -> npt.NDArray[np.float64]:
         """The point (H, W, 3) of every pixel in the sensor's frame [m]; the origin where depth is 0."""
-        depth = self.depth.astype(np.float64)[..., None]
-        rays = np.nan_to_num(self.camera.rays().astype(np.float64))
-        return np.concatenate([depth * rays, depth], axis=-1)
+        depth = self.depth.astype(np.float64)
+        rows, columns = np.indices(depth.shape, dtype=np.float64)
+        rays = np.nan_to_num(self.camera.undistorted(np.stack([columns.ravel(), rows.ravel()], axis=-1)))
+        x, y = rays.T.reshape(2, *depth.shape)
+        return np.stack([depth * x, depth * y, depth], axis=-1)
 
     def to_world(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Points (..., 3) [m] of the sensor's frame in the world."""
@@ -64,20 +66,20 @@ class DetectorImage:
 
 @dataclass(frozen=True, eq=False)
 class DetectedPerson:
-    """What a detector reports of a person. World frame, meters; probabilities from 0 to 1.
+    """A detected person. World frame, meters; probabilities from 0 to 1.
 
     A `voodoo.Detection` has the same attributes and can be returned instead.
 
     Args:
         joints: name -> position (3,). Any of the detector's `joints`; those that were not found are left out.
-        confidence: probability that it is a person. One look of 0.994 is enough to follow somebody, or two of 0.96; below 0.74
-            it never is.
+        confidence: probability that it is a person. One detection of 0.994 or two of 0.96 are enough to start a track;
+            detections below 0.74 never are.
         joint_sigma: standard deviation along each axis, one for all or name -> number.
         visible: probability that a joint is in the image and not hidden, one for all or name -> number.
-        facing: probability that the front of the trunk shows; None where the detector does not tell.
+        facing: probability that the trunk faces the camera; None if the detector does not report it.
         lengths: name -> length, all of the detector's `lengths` or none.
         length_sigma: name -> standard deviation of it.
-        mask: (H, W) bool, the pixels that show the person; None: all within 0.2 m of the box about the joints.
+        mask: (H, W) bool, pixels of the person; None: all within 0.2 m of the bounding box of the joints.
         floor: unit normal (3,) upwards and height along it, if the detector found the floor.
     """
 
@@ -93,9 +95,9 @@ class DetectedPerson:
 
 
 class PersonDetector(Protocol):
-    """Any object that a tracker can ask about depth images.
+    """Interface of objects that detect persons in depth images for a tracker.
 
-    A step has released the GIL, and takes it again for each call. One object serves all persons of a `People`.
+    A step releases the GIL, and acquires it again for each call. One object serves all persons of a `People`.
     """
 
     @property
@@ -109,16 +111,16 @@ class PersonDetector(Protocol):
     def detect(self, image: DetectorImage) -> Iterable[Any]:
         """The persons in an image, each with the attributes of `DetectedPerson`.
 
-        An exception does not end the tracker's step: it goes on without detections and warns (`voodoo.DetectorWarning`).
+        An exception does not end the tracker's step: it continues without detections and warns (`voodoo.DetectorWarning`).
         """
 
 
 AnyDetector: TypeAlias = "Literal['shipped'] | Detector | PersonDetector | None"
-"""What trackers take: the detector that comes with the package, one with other weights, one of one's own, or none."""
+"""Detectors that trackers accept: the shipped detector, the same network with other weights, a custom one, or none."""
 
 
 class CallableDetector:
-    """A function as a detector.
+    """Detector that calls a function.
 
     Args:
         function: takes a `DetectorImage`, returns the persons in it, each a `DetectedPerson`.
@@ -136,7 +138,7 @@ class CallableDetector:
         """See the class.
 
         Raises:
-            ConfigError: no function, or names that are none.
+            ConfigError: not a function, or invalid names.
         """
         if not callable(function):
             raise ConfigError(f"function: expected something that can be called, found {type(function).__name__}")
@@ -145,15 +147,15 @@ class CallableDetector:
         self.lengths = names_of("lengths", lengths)
 
     def detect(self, image: DetectorImage) -> Iterable[Any]:
-        """What the function returns."""
+        """The persons that the function returns."""
         return self._function(image)
 
 
 def names_of(what: str, names: object) -> tuple[str, ...]:
-    """Names, checked.
+    """Check names.
 
     Raises:
-        ConfigError: something else, or a name twice; it says of what.
+        ConfigError: not names, or a duplicate; it says of what.
     """
     if isinstance(names, str) or not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
         raise ConfigError(f"{what}: expected a sequence of names, found {names!r:.80}")

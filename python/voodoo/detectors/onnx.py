@@ -17,25 +17,25 @@ if TYPE_CHECKING:
     from voodoo._core import PersonCandidate
 
 SIZE = 96
-"""Pixels along an edge of the pictures that a network is given."""
+"""Edge length [px] of the image crops that a network takes."""
 
 
 class OnnxDetector:
-    """A network that looks at pictures of what may be a person, run by ONNX Runtime (`pip install 'voodoo-tracker[onnx]'`).
+    """A network that evaluates crops of candidates, run by ONNX Runtime (`pip install 'voodoo-tracker[onnx]'`).
 
-    What may be a person is cut out of the depth image as for the shipped network. The file's only input is a batch of pictures
-    (N, 2, 96, 96), float32, 2.6 m wide at the depth z0 of the person's median pixel, turned so that up is up. Channel 0 is
-    (z - z0) / 1.2 m, clipped to -1 ... 1, and 1 beside the person; channel 1 is 1 on the person and 0 beside. Two outputs are
-    read, others are ignored: `p` (N, J, 3), meters from the picture's middle to the right, downwards and backwards; and `vis`
-    (N, J + 2), the log odds that each joint is in the image, that the trunk faces the camera, and that it is a person.
+    Candidates are cropped from the depth image as for the shipped network. The only input is a batch of crops
+    (N, 2, 96, 96), float32, 2.6 m wide at the depth z0 of the candidate's median pixel, rotated to be upright. Channel 0 is
+    (z - z0) / 1.2 m, clipped to -1 ... 1, and 1 outside the candidate; channel 1 is 1 on the candidate and 0 outside. Two
+    outputs are read, others are ignored: `p` (N, J, 3), meters from the crop's center to the right, downwards and backwards;
+    and `vis` (N, J + 2), the log odds that each joint is in the image, that the trunk faces the camera, and that it is a person.
 
     Args:
         path: the file.
         joints: names of its J joints, in its order.
         joint_sigma: standard deviation of a joint along each axis [m].
         outputs: names of the two outputs.
-        most: so many pictures of an image are looked at.
-        threads: of ONNX Runtime. With one, results do not depend on the machine's load.
+        most: maximum number of crops evaluated per image.
+        threads: threads of ONNX Runtime. With one, results do not depend on the machine's load.
     """
 
     lengths: tuple[str, ...] = ()
@@ -53,7 +53,7 @@ class OnnxDetector:
         """See the class.
 
         Raises:
-            ConfigError: onnxruntime is missing, the file cannot be read, or its input and outputs are others.
+            ConfigError: onnxruntime is missing, the file cannot be read, or its input and outputs differ from the above.
         """
         try:
             import onnxruntime
@@ -74,7 +74,7 @@ class OnnxDetector:
         self._input = self._checked()
 
     def _checked(self) -> str:
-        """The input's name, if a picture of nothing gives outputs of the right shapes."""
+        """The input's name, after checking that an empty crop gives outputs of the right shapes."""
         (first, *rest), names = self._session.get_inputs(), [output.name for output in self._session.get_outputs()]
         if rest or not set(self._outputs) <= set(names):
             raise ConfigError(
@@ -99,7 +99,7 @@ class OnnxDetector:
         pictures = np.stack([candidate.crop for candidate in candidates])
         places, odds = self._session.run(self._outputs, {self._input: pictures})
         taken = np.zeros(image.depth.shape, dtype=bool)
-        # Of candidates that share pixels the surest stays.
+        # Of candidates that share pixels the most confident is kept.
         for number in sorted(range(len(candidates)), key=lambda number: -float(odds[number][-1])):
             candidate, log_odds = candidates[number], odds[number].astype(np.float64)
             if log_odds[-1] <= 0.0 or (taken & candidate.mask).any():
@@ -148,7 +148,7 @@ class OnnxDetector:
 
 
 def in_camera(candidate: PersonCandidate, places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Places (J, 3) of a candidate's picture as points (J, 3) in the camera's frame [m]."""
+    """Positions (J, 3) in a candidate's crop as points (J, 3) in the camera frame [m]."""
     x0, y0, z0 = candidate.middle
     z = z0 + places[:, 2]
     x, y = z * (x0 + places[:, 0] / z0), z * (y0 + places[:, 1] / z0)

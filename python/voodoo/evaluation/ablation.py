@@ -1,4 +1,4 @@
-"""What each switch of the configuration buys: the same evaluation once for every single change of it."""
+"""Ablation: repeats the evaluation once for every single change of the configuration."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from voodoo.names import HumanModel
 from voodoo.pipeline.start import Automatic
 
 UNCHANGED = "as configured"
-# Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty weighs nothing.
+# Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty has no effect.
 _OFF = (("tangential_weight", 0.0), ("prediction", 0.0), ("motion_scale", 100.0), ("still_prior_gain", 0.0))
 _MEASURES = (
     ("error_m", "error", 100.0, "cm", 2),
@@ -45,7 +45,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class Ablation:
-    """What one configuration reached.
+    """Results of one configuration.
 
     Args:
         name: of the variant.

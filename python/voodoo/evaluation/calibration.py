@@ -1,4 +1,4 @@
-"""Whether errors are as large as the estimate says they may be: shares within one and two standard deviations."""
+"""Compares errors with the estimated covariances: fractions within one and two standard deviations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 DROPPED = 0.2
-"""Share of the joints that are dropped for the sparsification: the least sure ones, or the worst."""
+"""Fraction of the joints that are dropped for the sparsification: the most uncertain ones, or the worst."""
 NORMAL = (0.683, 0.954)
 """Shares within one and two standard deviations of a normal distribution."""
 
@@ -70,12 +70,12 @@ class Coverage:
 
 @dataclass(frozen=True)
 class UncertaintyCalibration:
-    """How far errors are as large as they were said to be.
+    """Agreement of errors with their standard deviations.
 
     Args:
         shares: of all joints, those of the trunk, and the ends of limbs that were called measured or not.
-        quartiles: of the joints of arms and of legs, a quarter each by their standard deviations, the surest first.
-        mean_m, kept_m, oracle_m: mean error of all joints, without the DROPPED least sure ones, and without the worst.
+        quartiles: of the joints of arms and of legs, a quarter each by their standard deviations, the smallest first.
+        mean_m, kept_m, oracle_m: mean error of all joints, without the DROPPED most uncertain ones, and without the worst.
     """
 
     coverages: tuple[Coverage, ...]
@@ -86,7 +86,7 @@ class UncertaintyCalibration:
 
     @property
     def ratio(self) -> float:
-        """Error left without the least sure joints, as a multiple of that without the worst: 1 at best."""
+        """Remaining error without the most uncertain joints, as a multiple of that without the worst: 1 at best."""
         return self.kept_m / self.oracle_m
 
 

@@ -1,11 +1,11 @@
-"""What the depth says about a pose: distances of the person's points to the model, and overlap of the outlines.
+"""Agreement of a pose with depth images: distances of the person's points to the model, and overlap of the silhouettes.
 
 Which depth pixels belong to the person is decided without the tracker wherever that is possible, so that a lost track
-cannot choose its own witnesses:
+cannot select the pixels that it is judged by:
 
 * "segmented": the recording has the person cut out (UTD-MHAD): every pixel with depth (chair and floor band included).
 * "truth": exact joint positions are known: pixels within the capsules of CAPSULES around them.
-* "model": neither: pixels within 10 cm of the box around the model (K06 IV-B 1). Such numbers flatter a lost track.
+* "model": neither: pixels within 10 cm of the box around the model (K06 IV-B 1). Such numbers are too good for a lost track.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class FrameWitness:
 
     @property
     def within(self) -> float:
-        """Share of the points within 5 cm of the model."""
+        """Fraction of the points within 5 cm of the model."""
         return fraction_within(self.distances, WITHIN_M)
 
 
@@ -117,7 +117,7 @@ def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArr
     near = np.zeros(len(points), dtype=bool)
     if not known:
         return near
-    # Most of an image is far from everybody.
+    # Most pixels are far from all persons.
     low = np.min([np.minimum(a, b) - radius for a, b, radius in known], axis=0)
     high = np.max([np.maximum(a, b) + radius for a, b, radius in known], axis=0)
     inside = np.flatnonzero(_in_box(points, low, high))

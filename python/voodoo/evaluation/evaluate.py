@@ -127,7 +127,7 @@ def limb_ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
 
 
 def select_by(recording: Recording) -> Selection:
-    """How the person's points are told from the background in this recording, see witness."""
+    """How the person's points are segmented from the background in this recording, see depth_agreement."""
     if recording.info().loader in _SEGMENTED_LOADERS:
         return "segmented"
     return "truth" if recording.reference is not None and recording.reference.exact else "model"
@@ -185,7 +185,7 @@ def evaluate_all(
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Processes started within do not hear Ctrl-C, which goes to all of a terminal's: this one ends them."""
+    """Processes started within ignore Ctrl-C, which a terminal sends to all its processes; this process ends them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -234,7 +234,7 @@ def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """What is kept of a frame; the images of a whole recording would fill the memory."""
+    """Data kept from a frame; the images of a whole recording would fill the memory."""
 
     stamp: float
     status: str
@@ -260,7 +260,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     errors = errors_best if exact is False else errors0
     limit = LIMIT_EXACT_M if exact else LIMIT_REFERENCE_M
     searching = np.array([word == SEARCHING for word in status])
-    # Who is there and not found is as lost as who is looked for in a wrong place.
+    # A person who is present but not found counts as lost, like one tracked at a wrong position.
     missed = searching[:, None] & np.isfinite(whole).all(axis=2)
     class_, lost = metrics.tracking_class(np.where(missed, NOWHERE_M, errors), stamps, limit=limit)
     compared = metrics.shifted(reference, 0 if exact else lag)

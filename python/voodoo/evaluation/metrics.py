@@ -28,7 +28,7 @@ STILL_M, STILL_S = 0.02, 0.2
 """A joint of the reference stands still in a frame when it stays this near [m] for so long [s] before and after."""
 
 BONE_OFF = 0.25
-"""A reference's bone is as long as ever within this share: twice what those of Kinect's skeleton vary by."""
+"""Tolerated relative change of the length of a reference's bone: twice the variation of Kinect's skeleton."""
 
 _BONES = tuple(
     (f"{side}_{parent}", f"{side}_{joint}")

@@ -1,7 +1,7 @@
 """Measures of a result of several people against the truth: CLEAR MOT, identities, false bodies, and joints.
 
 A match is a root (humanoid_root) within MATCH_M of a person's; only persons with IN_VIEW of their pixels in view are expected.
-Who is less in view may be followed or not: neither counts. MOTA, IDF1 and switches of identity are those of py-motmetrics
+Persons who are less in view may be tracked or not: neither counts. MOTA, IDF1 and switches of identity are those of py-motmetrics
 (Bernardin and Stiefelhagen 2008; Ristani et al. 2016).
 """
 
@@ -107,7 +107,7 @@ class PeopleScore:
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Who is whom in each of F frames.
+    """Matches of persons and ids in each of F frames.
 
     Args:
         stamps: (F,) [s].
@@ -209,7 +209,7 @@ def _frames(truth: PeopleTruth, rows: PeopleRows) -> _Frames:
 
 
 def match(truth: PeopleTruth, rows: PeopleRows, frames: _Frames) -> Matches:
-    """Who is whom, frame by frame, over all persons at once and keeping the pairs of the frame before."""
+    """Match persons and ids frame by frame, jointly for all persons and keeping the pairs of the previous frame."""
     mm = motmetrics()
     roots, own = truth.of(ROOT), rows.of(ROOT)
     posed = np.asarray(np.isfinite(own).all(axis=1))

@@ -90,7 +90,7 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
         VoodooError: the recording has no truth of several people, or a frame was refused.
     """
     truth = truth_of(recording)
-    motmetrics()  # that it is missing should not be told after the work
+    motmetrics()  # a missing library must be reported before the work
     steps = list(track_people(recording, people, settings=settings))
     rows = PeopleTrack.of([step.estimate for step in steps]).rows()
     seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan

@@ -1,4 +1,4 @@
-"""What is measured of a tracked recording."""
+"""Scores of a tracked recording."""
 
 from __future__ import annotations
 

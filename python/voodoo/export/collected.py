@@ -1,4 +1,4 @@
-"""What estimates say, frame by frame, as arrays: joint angles, and how far poses may be off."""
+"""Collects joint angles and covariances of estimates, frame by frame, as arrays."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def angles_of_estimates(estimates: Sequence[Estimate], body: Body | None) -> tup
 def covariances_of(
     estimates: Sequence[Estimate], joint_names: Sequence[str], limb_names: Sequence[str]
 ) -> tuple[FloatArray, FloatArray]:
-    """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where nothing is said, and
-    (F, 0, 3, 3) where nothing ever is."""
+    """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where unknown, and
+    (F, 0, 3, 3) if unknown in all frames."""
     joints = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
     root = np.full((len(estimates), 6, 6), np.nan)
     for index, estimate in enumerate(estimates):

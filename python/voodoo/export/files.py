@@ -1,4 +1,4 @@
-"""One call for every format: the suffix says which."""
+"""Writes a track in any format, selected by the suffix."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
 
 
 def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
-    """Refuse a path that cannot or shall not be written to, before the work.
+    """Reject a path that cannot or must not be written to, before the work starts.
 
     Args:
         path: see FORMATS.
-        inputs: what is read, and not overwritten: markers and bags are recordings and results.
+        inputs: files that are read and must not be overwritten; marker files and bags can be both inputs and results.
 
     Raises:
         VoodooError: another suffix, a bag folder that exists, one of the inputs, or a place where nothing can be written.
@@ -46,7 +46,7 @@ def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a name is a bag folder's: what follows its last dot, if any, is no file's suffix (run.2026-05-01)."""
+    """Whether a name is that of a bag folder: the part after its last dot, if any, is not a file suffix (run.2026-05-01)."""
     return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
 
 
@@ -60,7 +60,7 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
         root_frame: frame of the track, for bags.
 
     Raises:
-        VoodooError: another suffix, or what the format needs is missing.
+        VoodooError: another suffix, or data that the format requires are missing.
         OSError: the file cannot be written.
     """
     check_target(path)

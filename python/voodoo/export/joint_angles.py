@@ -12,8 +12,8 @@ def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
     """Names of the joints that the body has, and their angles (F, N) [rad].
 
     Shoulder: R = Rz(-s y) Rx(s p) Rz(s r); hip: R = Rz(-y) Rx(s p) Ry(-r); head: R = Rx(r) Rz(y) Ry(-p), with s = 1
-    on the left, -1 on the right, R = parent_from_child. Elbow and knee: the turn about the axis -y, elbows flex to
-    positive, knees to negative angles; what is left of their rotation is not in the angle (it is in /tf). The waist
+    on the left, -1 on the right, R = parent_from_child. Elbow and knee: the rotation about the axis -y; elbows flex to
+    positive, knees to negative angles. The rest of their rotation is not in the angle (it is in /tf). The waist
     is 0: the torso is one limb.
     """
     turns = {bone.name: posed.rotations[:, number] for number, bone in enumerate(posed.bones)}
@@ -44,7 +44,7 @@ def _relative(parent: FloatArray, child: FloatArray) -> FloatArray:
 
 
 def _euler(turns: FloatArray, order: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    # A hanging arm has no direction to the side; the third angle is then zero, which is one right answer.
+    # Singular for a hanging arm; the third angle is then set to zero, which is one valid solution.
     first, second, third = euler_angles(turns, order).T
     return first, second, third
 

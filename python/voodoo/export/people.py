@@ -1,4 +1,4 @@
-"""The result of a recording of several people: a track for each of them, and its files."""
+"""The result of a recording of several persons: a track for each of them, and its files."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PeopleTrack:
-    """Everybody who was there in F frames.
+    """All persons in F frames.
 
     Args:
-        stamps: (F,) [s] of all frames, with and without anybody.
-        tracks: person, from 1, to the frames in which they were there, with the same joints for all.
+        stamps: (F,) [s] of all frames, with and without persons.
+        tracks: person number, from 1 -> track of the frames in which the person was present; all have the same joints.
     """
 
     stamps: FloatArray
@@ -47,7 +47,7 @@ class PeopleTrack:
 
         Args:
             estimates: of all frames.
-            bodies: of the persons, with their last sizes; with them the joint angles are known.
+            bodies: bodies of the persons, with their last sizes; required for the joint angles.
         """
         known = bodies or {}
         persons = sorted({person.id for estimate in estimates for person in estimate})
@@ -61,7 +61,7 @@ class PeopleTrack:
         return cls(np.array([estimate.stamp for estimate in estimates], dtype=np.float64), tracks)
 
     def rows(self) -> PeopleRows:
-        """A row for every person who is there in a frame, in the order of time and number."""
+        """A row for every person present in a frame, ordered by time and number."""
         if not self.tracks:
             none = np.empty((0, 0))
             return PeopleRows(np.empty(0), np.empty(0, dtype=np.int64), (), np.empty(0), (), none[..., None], (), none)
@@ -84,7 +84,7 @@ class PeopleTrack:
         )
 
     def unbroken(self, person: int, *, to_the_end: bool = False) -> Track:
-        """The track of a person from their first to their last frame (or the recording's); `searching` while they are away."""
+        """The track of a person from their first to their last frame (or the recording's); `searching` while absent."""
         track = self.tracks[person]
         place = np.searchsorted(self.stamps, track.stamps)
         first, end = int(place[0]), len(self) if to_the_end else int(place[-1]) + 1
@@ -114,7 +114,7 @@ class PeopleTrack:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write .csv (a row for every person who is there) or .npz (by person, exactly); it appears when it is complete.
+        """Write .csv (a row for every person present) or .npz (by person, exact); the file appears when it is complete.
 
         The .npz holds `stamps` (F,), `persons` (P,), and `person_<id>/...` with the arrays of a result of one person.
 
@@ -139,7 +139,7 @@ class PeopleTrack:
 
     @classmethod
     def load(cls, path: str | Path) -> PeopleTrack:
-        """Read what save() wrote; of a .csv the frames without anybody are not known.
+        """Read a file that save() wrote; a .csv does not contain the frames without persons.
 
         Raises:
             VoodooError: another suffix, damage, or a file of another kind.

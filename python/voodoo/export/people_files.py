@@ -1,4 +1,4 @@
-"""One call for every format of a result of several people: the suffix says which."""
+"""Writes a result of several persons in any format, selected by the suffix."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from voodoo.model.body import Body
 
 
 def save_people(result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], root_frame: str) -> list[Path]:
-    """Write a result of several people; the files that were written.
+    """Write a result of several persons; returns the written files.
 
-    .csv, .npz and bags hold everybody. .bvh and .trc hold one person: NAME.bvh becomes NAME_1.bvh, NAME_2.bvh, ..., from the
-    first to the last frame of each; of nobody there is none.
+    .csv, .npz and bags hold all persons. .bvh and .trc hold one person: NAME.bvh becomes NAME_1.bvh, NAME_2.bvh, ..., from the
+    first to the last frame of each; without persons there is no file.
 
     Args:
         result: with limb poses.

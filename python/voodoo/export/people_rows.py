@@ -1,4 +1,4 @@
-"""The .csv of several people, row by row: one row for every person who is there in a frame."""
+"""The .csv of several persons: one row for every person present in a frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from voodoo.errors import VoodooError, reading
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 FIRST = ("stamp_s", "person", "status", "residual_m")
-"""The first columns, which tell such a file from the result of one person."""
+"""The first columns, which distinguish such a file from the result of one person."""
 STATUSES = ("tracking", "degraded", "lost", "searching")
 
 
@@ -53,19 +53,19 @@ class PeopleRows:
         return f"PeopleRows({len(self)} rows, {len(set(self.persons.tolist()))} persons)"
 
     def of(self, name: str) -> FloatArray:
-        """Positions (R, 3) [m] of a site; NaN where the result has it not."""
+        """Positions (R, 3) [m] of a site; NaN where it is missing."""
         if name not in self.joint_names:
             return np.full((len(self), 3), np.nan)
         return np.asarray(self.joints[:, self.joint_names.index(name)])
 
 
 def read_rows(path: Path) -> PeopleRows:
-    """Read a result of several people, whoever wrote it: the columns of FIRST, then NAME_x, NAME_y, NAME_z, then NAME_rad.
+    """Read a result of several persons, written by any program: the columns of FIRST, then NAME_x, NAME_y, NAME_z, then NAME_rad.
 
-    Empty cells are what is not known.
+    Empty cells are unknown values.
 
     Raises:
-        VoodooError: another header, a cell that cannot be, stamps that fall, or two rows of a person at one stamp.
+        VoodooError: another header, an invalid cell, decreasing stamps, or two rows of a person at one stamp.
     """
     with reading(path, "a result of voodoo track --people"), path.open(newline="", encoding="utf-8") as file:
         header, *rows = list(csv.reader(file)) or [[]]
@@ -99,7 +99,7 @@ def read_rows(path: Path) -> PeopleRows:
 
 
 def _check(path: Path, table: FloatArray) -> None:
-    """Refuse rows (N, columns) that cannot be one result."""
+    """Reject rows (N, columns) that are not a consistent result."""
     stamps, persons = table[:, 0], table[:, 1]
     if not np.isfinite(stamps).all() or (np.diff(stamps) < 0.0).any():
         raise VoodooError(f"{path}: stamp_s: expected finite numbers that do not fall, found others")

@@ -45,7 +45,7 @@ def write_bag(
 
     Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
     `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints, and
-    where these are known ellipsoids of one standard deviation about them). Where it is known how far the body may be off,
+    where these are known ellipsoids of one standard deviation about them). If the covariance is known,
     `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
     Searching frames have no transforms, no joint states and no pose; their markers delete those of the frame before.
 
@@ -177,7 +177,7 @@ def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[
         elif bone.name == "head" and "head_center" in sites:
             place = sites["head_center"]
         frames[limb_frames[number]] = (parent, _pose(turn, place))
-        # Without a hand or foot of its own the forearm or calf carries the wrist's or ankle's frame.
+        # In bodies without hand or foot, the forearm or calf carries the frame of the wrist or ankle.
         for limb, end, site in (("_forearm", "_hand", "_wrist"), ("_calf", "_foot", "_ankle")):
             side = bone.name.removesuffix(limb)
             if bone.name.endswith(limb) and side + end not in track.limb_names and side + site in sites:
@@ -251,7 +251,7 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
 
 
 def _no_markers(header: Any) -> Any:  # noqa: ANN401
-    """What removes all markers."""
+    """Message that removes all markers."""
     still = np.array([0.0, 0.0, 0.0, 1.0])
     marker = _marker(header, "", 0, _CYLINDER, np.zeros(3), still, (0.0,) * 3, (0.0,) * 3, [])
     marker.action = _DELETE_ALL
@@ -349,7 +349,7 @@ def instant(
     Raises:
         VoodooError: a stamp before zero.
     """
-    # Angles are not needed; of nobody the body tells the names.
+    # Angles are not needed; if nobody was found, the names come from the body.
     human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, topic)
     return human.messages(0, root_frame, markers=markers)
 

@@ -1,6 +1,6 @@
 """A track as a skeleton whose bones all point the same way when the body stands at rest.
 
-Limb frames have z along the limb. Animation formats and robot descriptions want frames that agree at rest: x forward,
+Limb frames have z along the limb. Animation formats and robot descriptions use frames that agree at rest: x forward,
 y to the left, z up (REP-103). Their orientation is `world_from_limb` times the inverse of the limb's orientation at
 rest.
 """
@@ -32,7 +32,7 @@ class Bone:
         head: (3,) where it is joined to its parent [m]; the origin of the limb's frame for the root.
         tip: (3,) middle of its distal end [m].
         rest: (3, 3) standing_from_limb orientation.
-        head_in_limb: (3,) the same place as `head` in the limb's frame [m].
+        head_in_limb: (3,) position of `head` in the limb frame [m].
     """
 
     name: str
@@ -132,7 +132,7 @@ def skeleton(track: Track, body: Body) -> Skeleton:
 
 
 def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
-    """The skeleton without gaps, for formats that know none.
+    """The skeleton without gaps, for formats that do not support gaps.
 
     A frame without a pose (not in `found` (F,)) gets that of the last frame that has one, the first ones that of the first
     such frame; where there is none at all the body stands at rest.

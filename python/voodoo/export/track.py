@@ -1,4 +1,4 @@
-"""The result of a whole recording, and its files: one row a frame in .csv, arrays in .npz."""
+"""The result of a whole recording, and its files: one row per frame in .csv, arrays in .npz."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
 FORMAT_VERSION = 2
-"""Of .npz. It rises when earlier readers would misread a file; further arrays and columns do not raise it."""
+"""Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
 _STATUS = "_status"
-"""Ends the name of a limb's column in .csv."""
+"""Suffix of the name of a limb's column in .csv."""
 _SIGMA = "_sigma_m"
-"""Ends the name of a joint's column in .csv."""
+"""Suffix of the name of a joint's column in .csv."""
 _BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", "covariance", "root_covariance")
 
 
@@ -48,10 +48,10 @@ class Track:
         angles: (F, A) [rad].
         limb_status: limb -> F of "measured", "inferred" and so on, see Estimate.limb_status, "" while searching; {} when not
             known.
-        left_out: what of the recording could not be used: reason -> how many. Not in .csv.
+        left_out: unusable measurements of the recording: reason -> number. Not in .csv.
         covariance: (F, J, 3, 3) [m^2] of the joints, NaN where unknown; (F, 0, 3, 3) when there is none. In .csv a column
             NAME_sigma_m each: the root mean square of the standard deviations of x, y and z; they are not read again.
-        root_covariance: (F, 6, 6) of the pose of the first limb: x, y, z [m], then turns about the axes of the root frame
+        root_covariance: (F, 6, 6) of the pose of the first limb: x, y, z [m], then rotations about the axes of the root frame
             [rad]; NaN where unknown. Not in .csv.
 
     Positions, poses, angles and residual of a searching frame are NaN: there is no body (empty cells in .csv).
@@ -72,7 +72,7 @@ class Track:
     root_covariance: FloatArray = field(default_factory=lambda: np.empty((0, 6, 6)))
 
     def __post_init__(self) -> None:
-        """Check that the arrays belong together, and that what says it has a pose has one."""
+        """Check that the arrays are consistent, and that all frames with a pose status have a pose."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
         if not self.angle_names:
             object.__setattr__(self, "angles", np.empty((frames, 0)))
@@ -104,16 +104,16 @@ class Track:
             self._check_numbers(name, array)
 
     def _check_numbers(self, name: str, array: FloatArray) -> None:
-        """Refuse poses that are NaN, and poses of nobody."""
+        """Reject poses that are NaN, and poses in searching frames."""
         if name in ("covariance", "root_covariance"):
-            # How sure a pose is may not be known.
+            # Covariances may be unknown.
             return
         searching = ~self.found.reshape(-1, *[1] * (array.ndim - 1))
         finite = np.isfinite(array)
         if name == "stamps":
             right = finite
         elif name == "residual":
-            # A lost frame may have had nothing to measure a residual from, as may one that is carried by prediction.
+            # A lost or extrapolated frame may have no measurements to compute a residual from.
             right = finite | np.array([status in ("lost", "degraded") for status in self.status], dtype=bool)
             right = np.where(searching, np.isnan(array), right)
         else:
@@ -152,7 +152,7 @@ class Track:
     def of(
         cls, estimates: Sequence[Estimate], *, body: Body | None = None, left_out: Mapping[str, int] | None = None
     ) -> Track:
-        """Collect estimates of one body; with the body also its joint angles, and its names where nobody was found.
+        """Collect estimates of one body; the body is required for joint angles, and for names if nobody was found.
 
         Args:
             estimates: one a frame.
@@ -203,7 +203,7 @@ class Track:
 
     @classmethod
     def joined(cls, tracks: Sequence[Track]) -> Track:
-        """One track of several of the same body that follow each other.
+        """Concatenate consecutive tracks of the same body.
 
         Raises:
             VoodooError: no tracks.
@@ -214,7 +214,7 @@ class Track:
         for name in _BY_FRAME:
             parts = [getattr(track, name) for track in tracks]
             shape = max((part.shape[1:] for part in parts), key=lambda one: one[0] if one else 0)
-            # Where how sure a pose is was not known, there are no columns.
+            # Without covariances there are no columns.
             parts = [part if part.shape[1:] == shape else np.full((len(part), *shape), np.nan) for part in parts]
             arrays[name] = np.concatenate(parts)
         limbs = tracks[0].limb_status
@@ -223,7 +223,7 @@ class Track:
         return replace(tracks[0], status=status, limb_status=words, **arrays)
 
     def save(self, path: str | Path) -> None:
-        """Write .csv (positions to 1 um) or .npz (everything, exactly); the file appears only when it is complete.
+        """Write .csv (positions to 1 um) or .npz (everything, exact); the file appears only when it is complete.
 
         Raises:
             VoodooError: another suffix.
@@ -258,7 +258,7 @@ class Track:
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
-        """Read what save() wrote, or the only person of a result of several people.
+        """Read a file that save() wrote, or the only person of a result of several persons.
 
         Raises:
             VoodooError: another suffix, damage, a file of another kind, or several persons.
@@ -285,7 +285,7 @@ class Track:
         last = next((i for i in range(first, len(header)) if not header[i].endswith("_rad")), len(header))
         names = tuple(cell.removesuffix("_x") for cell in header[3:first:3])
         angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:last])
-        # Columns that later versions add stand behind these, and are passed over.
+        # Later versions add columns behind these, which are ignored.
         limbs = {cell.removesuffix(_STATUS): i for i, cell in enumerate(header) if i >= last and cell.endswith(_STATUS)}
         if header[:last] != _header(names, angle_names) or len(set(header)) != len(header):
             raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {header[:5]}")
@@ -314,7 +314,7 @@ class Track:
 
 
 def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
-    """All of a track as arrays of numbers and words, for .npz."""
+    """All data of a track as arrays of numbers and words, for .npz."""
     words = ("status", "joint_names", "limb_names", "angle_names")
     limbs = np.array(list(track.limb_status.values()), dtype=np.str_)
     return {name: np.array(getattr(track, name), dtype=np.str_) for name in words} | {
@@ -399,7 +399,7 @@ def _only_person(path: Path) -> Track:
 
 
 def _optional_fields(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
-    """Status of the limbs, and what was left out, as far as a file has them: the first version has not."""
+    """Status of the limbs, and left-out measurements, if the file has them; the first version does not."""
     if "limb_status" not in content or "left_out_counts" not in content:
         return {}
     words = content["limb_status"].T.tolist()
@@ -412,7 +412,7 @@ def _optional_fields(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
 
 
 def _cell(value: float) -> str:
-    """Text of a number; what is not known is empty."""
+    """Text of a number; empty if unknown."""
     return "" if np.isnan(value) else f"{value:.6f}"
 
 

@@ -41,7 +41,7 @@ def joint_angles(body: Body, estimate: Estimate) -> Mapping[str, float]:
 
     Args:
         body: the tracked body, `tracker.body`.
-        estimate: of that body. If its joints are apart (limbwise solver), the angles are those of the closed chain nearest to
+        estimate: of that body. If its joints are open (limbwise solver), the angles are those of the closed chain nearest to
             it in the least-squares sense.
 
     Raises:
@@ -52,6 +52,6 @@ def joint_angles(body: Body, estimate: Estimate) -> Mapping[str, float]:
 
 
 def angles_of(chain: Chain, estimate: Estimate) -> FloatArray:
-    """The same as (A,) array, for a chain with a free root that is made once: `Chain(body)`."""
+    """Joint angles as an array (A,), for a chain with a free root that the caller creates once: `Chain(body)`."""
     apart = max(estimate.joint_gaps.values(), default=0.0) > _CLOSED_M
     return chain.project(estimate.world_from_limb, closest=apart)[_ROOT:]

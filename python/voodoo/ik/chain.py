@@ -18,20 +18,20 @@ from voodoo.model.joint import short
 
 
 class Chain:
-    """A body, or limbs of one that hang together, with exact joints; made from any Body, hence from TOML."""
+    """A body, or connected limbs of one, with exact joints; made from any Body, hence from TOML."""
 
     def __init__(self, body: Body, *, limbs: Sequence[str] = (), root: Literal["free", "fixed"] | None = None) -> None:
         """Lay out the joint angles.
 
         Args:
             body: any body.
-            limbs: limb names; () for all of them. All but the first must hang on another one of them.
-            root: "free": the first limb's pose are six unknowns; "fixed": it stands still (a whole body) or turns in its
-                joint to a base that does (chosen limbs). None: free for a whole body, fixed for chosen limbs.
+            limbs: limb names; () for all of them. All but the first must be children of another one of them.
+            root: "free": the first limb's pose has six unknowns; "fixed": it is static (a whole body) or rotates in its
+                joint to a static base (chosen limbs). None: free for a whole body, fixed for chosen limbs.
 
         Raises:
-            BodyError: an unknown limb, or limbs that do not hang together.
-            MeasurementError: another word for root, or a single name for limbs.
+            BodyError: an unknown limb, or limbs that are not connected.
+            MeasurementError: another value of root, or a single name for limbs.
         """
         if not isinstance(body, Body):
             raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
@@ -85,12 +85,13 @@ class Chain:
         world_from_base: npt.ArrayLike | None = None,
         closest: bool = True,
     ) -> FloatArray:
-        """Angles (n,) of a pose of the whole body whose joints may be apart (the papers' elastic bands).
+        """Angles (n,) of a pose of the whole body whose joints may be open (the papers' elastic bands).
 
         Args:
             world_from_limb: rigid (4, 4) of every limb of the body.
-            world_from_base: where the chain is rooted.
-            closest: of the closed chain nearest to the pose in the least-squares sense; else only read each joint's turn.
+            world_from_base: pose of the base of the chain.
+            closest: angles of the closed chain nearest to the pose in the least-squares sense; else only the rotation of each
+                joint is read.
 
         Raises:
             MeasurementError: a limb is missing, or a matrix is not rigid.
@@ -124,10 +125,10 @@ class Chain:
             margin, thin, bones: see `Options`.
 
         Raises:
-            BodyError: a site or limb that is not where it should be: bones on the chain, others beside it.
-            MeasurementError: a number that cannot be used; it says which.
+            BodyError: a site or limb in the wrong role: bones must be on the chain, `others` must not.
+            MeasurementError: an invalid number; it names the argument.
         """
-        Options(margin=margin, thin=thin)  # refuses what `solve` refuses
+        Options(margin=margin, thin=thin)  # rejects the same values as `solve`
         views = core_views(images)
         return self._core.criterion(
             base_pose(world_from_base),

@@ -18,13 +18,14 @@ from voodoo.model.transforms import rigid
 
 _UNDISTORTED = 0.5
 _MIDDLE = 0.3
-"""A pixel is a middle if a step of a pixel to any side gains less than all but this; smaller gains more middles."""
+"""A pixel belongs to the medial axis if no step of one pixel increases the distance by more than the step minus this value; a
+smaller value gives more such pixels."""
 _SUBPIXEL_BITS = 4
 _WIDEST = 1000.0
 
 
 class Silhouette:
-    """The person's outline in one calibrated picture, as its Euclidean distance transform (J10 section 3)."""
+    """The person's silhouette in one calibrated image, as its Euclidean distance transform (J10 section 3)."""
 
     def __init__(
         self,
@@ -35,16 +36,17 @@ class Silhouette:
         border: float = 1.0,
         depth: npt.ArrayLike | None = None,
     ) -> None:
-        """Transform a mask; lens distortion is taken out of it, and of depths, first.
+        """Transform a mask, after removing the lens distortion from mask and depths.
 
         Args:
             mask: (height, width), true (or not 0) where the person is.
             camera: its calibration.
             world_from_camera: rigid (4, 4) pose of the optical frame.
-            border: how far the outline may be from where the camera should see it [px], by its own error and by that of the
-                calibration: bones need not lie deep inside, or in the middle, more exactly than that.
-            depth: (height, width) floats, along the optical axis [m] as a depth camera saw it, 0 or not finite where nothing
-                returned: bones lie behind what is seen, too, and no farther than that where the silhouette is the limb itself.
+            border: error of the silhouette's contour [px], including that of the calibration. It is the tolerance for the depth
+                of bones inside the silhouette and for their centering.
+            depth: (height, width) floats, along the optical axis [m] from a depth camera, 0 or not finite where nothing
+                returned. Bones must also lie behind this surface, and not farther than it where the silhouette is the limb
+                itself.
 
         Raises:
             MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
@@ -70,7 +72,7 @@ class Silhouette:
         self.distance.setflags(write=False)
         self.thickness: npt.NDArray[np.float32] = local_thickness(self.distance)
         self.thickness.setflags(write=False)
-        # A picture without the person says nothing; it takes no part.
+        # An image without the person gives no evidence and is not used.
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
         observed = None if depth is None else _depths(depth, camera, person)
@@ -86,16 +88,16 @@ class Silhouette:
         return self._core
 
     def __repr__(self) -> str:
-        """Size, and whether there is anyone in it."""
+        """Size, and whether it contains a person."""
         height, width = self.distance.shape
         return f"Silhouette({width}x{height}, {'empty' if self.empty else 'a person'})"
 
 
 def core_views(images: Sequence[Silhouette]) -> list[_core.View]:
-    """The silhouettes with someone in them, as the core takes them.
+    """The silhouettes that contain a person, in the form that the core takes.
 
     Raises:
-        MeasurementError: something else than silhouettes.
+        MeasurementError: the arguments are not silhouettes.
     """
     if not isinstance(images, Sequence) or not all(isinstance(image, Silhouette) for image in images):
         raise MeasurementError(f"images: expected a list of ik.Silhouette, found {images!r}")
@@ -103,7 +105,7 @@ def core_views(images: Sequence[Silhouette]) -> list[_core.View]:
 
 
 def signed_distance(mask: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
-    """Distance (height, width) [px] to the border of a mask, negative inside; its zero is half-way between two
+    """Distance (height, width) [px] to the border of a mask, negative inside; zero is half-way between two
     pixels."""
     if mask.all():
         return np.full(mask.shape, -float(max(mask.shape)), dtype=np.float32)
@@ -132,7 +134,7 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
     disc within the silhouette that covers it; 0 outside. Exact to half a pixel."""
     inside = np.maximum(-distance, np.float32(0.0))
     thickness = np.zeros(distance.shape, dtype=np.float32)
-    # Discs about the middles of the silhouette cover it (its medial axis): where no neighbor's disc holds the pixel's own.
+    # Discs around the pixels of the medial axis cover the silhouette. A pixel is on it if no neighbor's disc contains its own.
     padded = np.pad(inside, 1)
     middle = inside > 0.0
     height, width = distance.shape
@@ -151,7 +153,7 @@ def local_thickness(distance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32
 
 
 def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
-    """Depths of the person as the core takes them: zero where there is none."""
+    """Depths of the person in the form that the core takes: zero where there is none."""
     if isinstance(depth, np.ndarray) and depth.dtype.kind in "iu":
         raise MeasurementError(
             f"depth: expected meters, as floats, found {depth.dtype}: multiply by the meters of a unit"
@@ -163,15 +165,15 @@ def _depths(depth: npt.ArrayLike, camera: Camera, person: npt.NDArray[np.uint8])
             f"{int((found < 0.0).sum())} of them negative"
         )
     if camera.distorted:
-        # Interpolated depths would be between two surfaces.
+        # Interpolation would give depths between two surfaces.
         at = _distorted_pixels(camera)
         found = np.asarray(cv2.remap(found, at[..., 0], at[..., 1], cv2.INTER_NEAREST), dtype=np.float64)
-    # Beside the person it is the silhouette that says so.
+    # Outside the person the silhouette gives the evidence.
     return np.ascontiguousarray(np.where(person != 0, found, 0.0), dtype=np.float32)
 
 
 def _pinhole(camera: Camera) -> Camera:
-    """The camera without its lens."""
+    """The camera without lens distortion."""
     return replace(camera, distortion=(), model="plumb_bob")
 
 
@@ -184,11 +186,11 @@ def _undistorted(mask: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.
 
 @lru_cache(maxsize=8)
 def _distorted_pixels(camera: Camera) -> npt.NDArray[np.float32]:
-    """Where (height, width, 2) the distorted picture shows what each pixel of that pinhole camera sees. Kept: every picture of
-    a camera has the same, and it takes longer than all the rest of a silhouette."""
+    """Pixels (height, width, 2) in the distorted image for each pixel of that pinhole camera. Cached: it is the same for all
+    images of a camera, and takes longer to compute than the rest of a silhouette."""
     u, v = np.meshgrid(np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64))
     rays = _pinhole(camera).undistorted(np.column_stack([u.reshape(-1), v.reshape(-1)]))
-    # What the lens does not show is off the picture.
+    # Directions that the lens does not map are outside the image.
     pixels = np.nan_to_num(camera.project(np.column_stack([rays, np.ones(len(rays))])), nan=-9.0)
     at = pixels.astype(np.float32).reshape(camera.height, camera.width, 2)
     at.setflags(write=False)

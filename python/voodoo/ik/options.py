@@ -16,17 +16,18 @@ class Options:
     """How to solve.
 
     Args:
-        steps: most steps of each priority level, and of the image (J10: 15).
-        tolerance: a residual below this is zero [m].
-        still: a step that changes no angle by more ends the search [rad].
-        gain: share of the step h / |P grad h|^2 of the image criterion, above 0 to 1: alpha of J10 eq. 4.
-        caution: damping of the image step where few samples lie outside, or the cameras look along the motion: the
-            change of h per radian, as a share of the bones' length in the images, that counts; 0 trusts every pixel.
+        steps: maximum number of steps of each priority level, and of the image (J10: 15).
+        tolerance: a residual below this counts as zero [m].
+        still: the search ends when a step changes no angle by more than this [rad].
+        gain: fraction of the step h / |P grad h|^2 of the image criterion, above 0 to 1: alpha of J10 eq. 4.
+        caution: damping of the image step if few samples lie outside, or the motion is along the optical axes: the
+            smallest significant change of h per radian, as a fraction of the bones' length in the images; 0 trusts every
+            pixel.
         largest_turn: largest change of an angle in one step [rad].
-        margin: how deep bones shall lie inside the silhouettes, in radii of their limbs, less the silhouette's border; 0 is
+        margin: required depth of bones inside the silhouettes, in radii of their limbs, less the silhouette's border; 0 is
             J10's criterion.
-        thin: up to how many times that depth a silhouette is the limb itself, in whose middle the bone shall lie; 0: bones are
-            nowhere centerd.
+        thin: a silhouette up to this many times that depth counts as the limb itself, and the bone is centered in it; 0: no
+            bone is centered.
         bones: the segments that are projected; None: joint to joint.
     """
 

@@ -1,4 +1,4 @@
-"""What a solve found."""
+"""Results of the solver."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from voodoo.ik.values import FloatArray
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Posture:
-    """What a solve found; immutable. World frame, meters, radians.
+    """Result of `solve`; immutable. World frame, meters, radians.
 
     Attributes:
         angles: (n,) in the order of `angle_names`, within the limits.
@@ -23,8 +23,8 @@ class Posture:
         residuals: distance of every target, in the order they were given [m].
         h: image criterion [px] (J10 eq. 5); 0 without images.
         steps: steps used.
-        converged: the angles, or the image criterion, came to rest; what residual is left cannot be removed from here.
-        images: silhouettes that took part; empty ones do not.
+        converged: the angles, or the image criterion, stopped changing; the remaining residual is a local minimum.
+        images: number of silhouettes used; empty ones are not.
     """
 
     angles: FloatArray
@@ -38,7 +38,7 @@ class Posture:
     images: int
 
     def __repr__(self) -> str:
-        """The numbers that say how it went."""
+        """Summary in numbers."""
         worst = max(self.residuals, default=0.0)
         return (
             f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px of {self.images} "
@@ -49,7 +49,7 @@ class Posture:
 @dataclass(frozen=True, eq=False, repr=False)
 class Postures:
     """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px],
-    steps (N,), postures tried on the way (N,), those of them compared with the images (N,), converged (N,)."""
+    steps (N,), number of evaluated postures (N,), of those compared with the images (N,), converged (N,)."""
 
     angles: FloatArray
     joints: FloatArray

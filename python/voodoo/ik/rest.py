@@ -1,4 +1,4 @@
-"""The posture that angles are drawn to where neither targets nor images object."""
+"""The rest posture towards which angles are pulled in directions that targets and images leave free."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from voodoo.ik.posture import Posture
 from voodoo.ik.values import numbers
 
 Rest: TypeAlias = Mapping[str, float] | npt.ArrayLike | Posture
-"""Angles (n,) or a posture of the chain, all joint angles of which count, or name of an angle -> value, those alone [rad, m]."""
+"""Angles (n,) or a posture of the chain, for all joint angles; or name of an angle -> value [rad, m], for these alone."""
 
 
 def rest_parts(chain: Chain, rest: Rest | None) -> list[tuple[int, float]]:
-    """Index and value of every angle that is drawn somewhere; of whole postures all but the pose of a free root.
+    """Index and value of every angle with a rest value; for whole postures all but the pose of a free root.
 
     Raises:
-        BodyError: a name that is no angle of the chain.
+        BodyError: a name that is not an angle of the chain.
         MeasurementError: not finite, another number of angles than the chain has, or of another chain.
     """
     names = chain.angle_names
@@ -36,7 +36,7 @@ def rest_parts(chain: Chain, rest: Rest | None) -> list[tuple[int, float]]:
     if isinstance(rest, Posture) and rest.angle_names != names:
         raise MeasurementError(f"rest: expected a posture of {chain!r}, found one of {', '.join(rest.angle_names)}")
     values = _finite(rest.angles if isinstance(rest, Posture) else rest, len(names))
-    # Where someone stands is no question of comfort.
+    # The position of the root has no rest value.
     joints = 6 if names[:1] == ("root_x",) else 0
     return list(enumerate(values))[joints:]
 
@@ -47,7 +47,7 @@ def named_rest(chain: Chain, rest: Rest | None) -> dict[str, float]:
 
 
 def _finite(values: npt.ArrayLike, count: int) -> list[float]:
-    """So many numbers.
+    """An array of this many numbers.
 
     Raises:
         MeasurementError: another number of them, or not finite.

@@ -1,4 +1,4 @@
-"""One posture, many postures, and sequences (J10 eq. 4)."""
+"""Solvers for one posture, many postures, and sequences (J10 eq. 4)."""
 
 from __future__ import annotations
 
@@ -31,30 +31,29 @@ def solve(
     options: Options | None = None,
     **changes: Any,  # noqa: ANN401 - the fields of Options
 ) -> Posture:
-    """One posture (J10 eq. 4): targets by priority, the silhouettes in what they leave free, a rest posture in what those
-    leave, limits throughout.
+    """Solve one posture (J10 eq. 4): targets by priority, silhouettes in the null space of the targets, a rest posture in the
+    remaining null space, and limits throughout.
 
-    Unreachable or contradictory targets give the posture of least weighted squares; their residuals say so. Nothing
-    here is ever NaN.
+    Unreachable or contradictory targets give the weighted least-squares posture, with large residuals. Results are never NaN.
 
     Args:
-        chain: what moves; a body stands for the chain of all its limbs with a free root.
+        chain: chain to solve; a body means the chain of all its limbs with a free root.
         targets: site name -> position (3,) [m], or Targets. Sites may occur more than once.
-        images: silhouettes; empty ones take no part.
+        images: silhouettes; empty ones are not used.
         start: angles (n,) or a posture to start from; None: at rest.
         world_from_base: rigid (4, 4) pose of the base: of the body's root frame's origin, or of the parent of the
             chosen limbs; None: identity.
-        others: limbs of the body that are not on the chain, as far as they are known: name -> rigid (4, 4) pose, e.g.
-            `world_from_limb` of the posture of the other leg. With images no bone of the chain shall lie in them.
-        rest: posture the angles are drawn to where neither targets nor silhouettes object: angles (n,), e.g. `chain.rest()`,
-            or a posture, without the pose of a free root; or only some, name of an angle -> value [rad, m]. None: they
-            stay where targets and silhouettes are met.
+        others: known limbs of the body that are not on the chain: name -> rigid (4, 4) pose, e.g. `world_from_limb` of the
+            posture of the other leg. With images, bones of the chain are kept outside of them.
+        rest: posture towards which angles are pulled where targets and silhouettes leave them free: angles (n,), e.g.
+            `chain.rest()`, or a posture, without the pose of a free root; or only some angles, name -> value [rad, m]. None:
+            free angles keep their values.
         options: see Options.
         **changes: single fields of Options, e.g. `steps=30, margin=0.0`.
 
     Raises:
-        BodyError: a site or angle that is not on the chain, or another limb that is, or is not in the body.
-        MeasurementError: a number that cannot be used; it says which.
+        BodyError: a site or angle that is not on the chain, or one of `others` that is on it or not in the body.
+        MeasurementError: an invalid number; it names the argument.
     """
     chain = _chain(chain)
     options = chosen_options(options, changes)
@@ -99,9 +98,9 @@ def solve_many(
     """`solve` for N sets of positions (N, K, 3) [m] of K sites, with the same images, in one call on one core.
 
     Args:
-        chain: what moves.
+        chain: chain to solve.
         sites: K site names.
-        positions: where they shall be.
+        positions: target positions.
         images: silhouettes.
         starts: angles (n,) or (N, n); None: at rest.
         world_from_base: as in `solve`.
@@ -111,7 +110,7 @@ def solve_many(
 
     Raises:
         BodyError: a site or an angle that is not on the chain.
-        MeasurementError: a shape or a number that cannot be used.
+        MeasurementError: an invalid shape or number.
     """
     options = chosen_options(options, changes)
     places = np.ascontiguousarray(positions, dtype=np.float64)
@@ -146,7 +145,7 @@ def _chain(chain: Chain | Body) -> Chain:
 
 
 class Follower:
-    """Solves a sequence, each posture from the one before."""
+    """Solves a sequence, each posture starting from the previous one."""
 
     def __init__(
         self,
@@ -156,18 +155,18 @@ class Follower:
         rest: Rest | Literal["mean"] | None = None,
         **changes: Any,  # noqa: ANN401 - the fields of Options
     ) -> None:
-        """Stand at a start.
+        """Initialize with a start posture.
 
         Args:
-            chain: what moves.
+            chain: chain to solve.
             start: angles (n,) or a posture; None: at rest.
-            rest: as in `solve`, for every posture; "mean": the mean of the start and all postures so far, so that what
-                nothing tells any more goes back to where it usually is.
+            rest: as in `solve`, for every posture; "mean": the mean of the start and all postures so far, so that
+                unobserved angles return to their usual values.
             **changes: fields of Options.
 
         Raises:
             BodyError: an angle that is not on the chain.
-            MeasurementError: an option or an angle that cannot be used.
+            MeasurementError: an invalid option or angle.
         """
         self.chain = _chain(chain)
         self.options = chosen_options(None, changes)
@@ -179,7 +178,7 @@ class Follower:
 
     @property
     def rest(self) -> Mapping[str, float]:
-        """What the next posture is drawn to: name of an angle -> value [rad, m]."""
+        """Rest values of the next posture: name of an angle -> value [rad, m]."""
         return self._rest
 
     def step(
@@ -190,9 +189,9 @@ class Follower:
         world_from_base: npt.ArrayLike | None = None,
         others: Mapping[str, npt.ArrayLike] | None = None,
     ) -> Posture:
-        """The next posture; see `solve`. A refused call leaves the follower where it was.
+        """The next posture; see `solve`. A rejected call leaves the follower unchanged.
 
-        A frame that tells nothing, neither targets nor images, is no reason to go to the mean of the postures so far.
+        A frame without targets and images does not pull the posture towards the mean of the postures so far.
         """
         silent = bool(self._count) and not targets and not images
         posture = solve(

@@ -1,4 +1,4 @@
-"""What sites shall reach: positions, and lines of sight."""
+"""Targets of sites: positions, and lines of sight."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ TargetParts: TypeAlias = tuple[str, str, tuple[float, float, float, float, float
 
 @dataclass(frozen=True)
 class Target:
-    """What a site shall reach. Use `at` or `on_ray`.
+    """A target of a site. Create it with `at` or `on_ray`.
 
     Args:
         site: name of a site on the chain.
         kind: "position" or "line".
         values: x, y, z [m], 0, 0, 0; or unit direction and moment of a line in Pluecker form (R07 eq. 11).
-        weight: against the other targets of the same priority.
+        weight: weight relative to the other targets of the same priority.
         priority: 0 is the highest; a target never disturbs one of higher priority.
     """
 
@@ -62,7 +62,7 @@ class Target:
 
     @classmethod
     def on_ray(cls, site: str, *, origin: Vector, direction: Vector, weight: float = 1.0, priority: int = 0) -> Target:
-        """A site on the line through `origin` (3,) [m] along `direction` (3,), as a pixel tells it.
+        """A site on the line through `origin` (3,) [m] along `direction` (3,), e.g. the ray of a pixel.
 
         Raises:
             MeasurementError: not three finite numbers, no direction, or a weight that is not above zero.
@@ -77,7 +77,7 @@ class Target:
         return cls(site, "line", (a, b, c, d, e, f), weight, priority)
 
     def parts(self) -> TargetParts:
-        """The target as the core takes it."""
+        """The target in the form that the core takes."""
         return (self.site, self.kind, self.values, self.weight, self.priority)
 
 
@@ -85,7 +85,7 @@ Targets: TypeAlias = Mapping[str, Vector] | Sequence[Target]
 
 
 def target_parts(targets: Targets) -> list[TargetParts]:
-    """Targets as the core takes them; a mapping holds positions.
+    """Targets in the form that the core takes; a mapping holds positions.
 
     Raises:
         MeasurementError: neither, or a position is not three finite numbers.

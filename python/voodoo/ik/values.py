@@ -1,4 +1,4 @@
-"""What the functions of voodoo.ik take, as the core wants it."""
+"""Conversion of arguments of voodoo.ik to the form that the core takes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from voodoo.model.joint import as_numbers, short
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Vector: TypeAlias = Sequence[float] | FloatArray
 Bone: TypeAlias = tuple[str, str, float]
-"""Two sites and the radius [m] around the segment between them that shall lie inside the silhouettes."""
+"""Two sites and the radius [m] around the segment between them that must lie inside the silhouettes."""
 
 _IDENTITY = np.eye(4)
 

@@ -1,4 +1,4 @@
-"""Live sources: what a camera, a robot's topics, a growing folder or a played recording measure, as recorded frames."""
+"""Live sources: measurements of a camera, a robot's topics, a growing folder or a replayed recording, as recorded frames."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def open(
     Args:
         *sources: "realsense", "realsense:SERIAL", "ros2:TOPIC[,TOPIC...]", "grow:FOLDER", the path of a recording, or a Source of
             your own. The first one's images make the frames.
-        rate: of recordings: how many times as fast they are played.
-        loop: of recordings: begin again at the end.
-        root_frame: of recordings and ROS 2, instead of their own.
-        tell: is given a line for people at every fault.
+        rate: for recordings: playback speed relative to real time.
+        loop: for recordings: start again at the end.
+        root_frame: for recordings and ROS 2: root frame to use instead of their own.
+        tell: called with a readable line for every fault.
 
     Raises:
         VoodooError: no such recording, or a library that the source needs is missing.

@@ -1,4 +1,4 @@
-"""From what arrives to recorded frames: stamps judged, sensors joined, damage named and left out."""
+"""Assembles recorded frames from arrivals: checks stamps, joins sensors, reports and leaves out damaged measurements."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from voodoo.model.camera import Camera
 from voodoo.recordings.recording import refuse_blank
 
 WAIT_S = 0.010
-"""How long a depth image waits for the color picture or transform that belongs to it, as in recordings."""
+"""How long a depth image waits for its color image or transform, as in recordings."""
 _STALE_S = 0.5
-"""What is older than its frame by more is nothing of that instant."""
+"""A measurement that is older than its frame by more does not belong to it."""
 _PENDING = 4
 _FAR_M = 100.0
 _STRIDE = 16
@@ -27,13 +27,13 @@ _STRIDE = 16
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame(RecordedFrame):
-    """A recorded frame that has just come.
+    """A recorded frame that has just arrived.
 
     Args:
-        number: from 0, of those that could be used.
-        taken: the host's time of measurement [s].
-        arrived: the host's time of arrival [s].
-        breaks: it does not go on from the frame before: time jumped, a camera changed, or more than 1 s is missing.
+        number: index from 0, counting usable frames.
+        taken: time of measurement by the host clock [s].
+        arrived: time of arrival by the host clock [s].
+        breaks: it does not continue the previous frame: time jumped, a camera changed, or more than 1 s is missing.
     """
 
     number: int
@@ -43,21 +43,21 @@ class LiveFrame(RecordedFrame):
 
 
 class Assembler:
-    """Makes frames of arrivals; it knows no threads, and time only as it is told.
+    """Makes frames from arrivals; it uses no threads and no clock: the caller passes the time.
 
     Args:
-        faults: counts what cannot be used.
-        wait: how long a frame waits for what belongs to it [s].
-        eager: decode pictures at once, not when somebody looks at them.
+        faults: counts unusable measurements.
+        wait: how long a frame waits for the measurements that belong to it [s].
+        eager: decode images at once, not at first access.
 
     Attributes:
-        refused: arrivals that a frame was to be made for, and that could not be used.
-        frames: those that became frames.
-        kinds: sensor -> kind, of all that came.
+        refused: number of frame-defining arrivals that could not be used.
+        frames: number of arrivals that became frames.
+        kinds: sensor -> kind, for all arrivals.
     """
 
     def __init__(self, faults: Faults, *, wait: float = WAIT_S, eager: bool = True) -> None:
-        """Nothing came yet."""
+        """Start without arrivals."""
         self.refused = self.frames = 0
         self.kinds: dict[str, str] = {}
         self.host = HostTime()
@@ -70,7 +70,7 @@ class Assembler:
         self._images: dict[str, npt.NDArray[np.generic]] = {}
 
     def feed(self, arrival: Arrival, now: float) -> None:
-        """Take up what arrived at the host's time `now` [s]; call `flush` before something else that drives."""
+        """Add an arrival at host time `now` [s]; call `flush` before the next frame-defining arrival."""
         self.kinds.setdefault(arrival.sensor, arrival.kind)
         verdict = self._stamps.setdefault(arrival.sensor, Stamps()).judge(arrival.stamp, now)
         if verdict.fault:
@@ -91,11 +91,11 @@ class Assembler:
         self._driver = (arrival, now)
 
     def poll(self, now: float) -> LiveFrame | None:
-        """The next frame, if there is one by now."""
+        """The next frame, if one is ready."""
         return self.flush(now) if self.due(now) <= 0.0 else None
 
     def flush(self, now: float) -> LiveFrame | None:
-        """A frame of what came, complete or not."""
+        """A frame from the current arrivals, complete or not."""
         if self._driver is None:
             return None
         (driver, arrived), self._driver = self._driver, None
@@ -112,7 +112,7 @@ class Assembler:
         return LiveFrame(driver.stamp, items, self.frames - 1, taken, arrived, breaks)
 
     def due(self, now: float) -> float:
-        """Seconds until a frame may be made of what came; 0 when it is complete, infinity where there is nothing."""
+        """Seconds until a frame may be made from the arrivals; 0 when it is complete, infinity without arrivals."""
         if self._driver is None:
             return float("inf")
         driver, arrived = self._driver
@@ -122,19 +122,19 @@ class Assembler:
         return max(for_transforms, for_pictures, 0.0)
 
     def _is_complete(self, stamp: float) -> bool:
-        """Whether every other camera that is alive has sent what belongs to a time."""
+        """Whether every other live camera has sent its measurement for a time."""
         for sensor, kind in self.kinds.items():
             judged = self._stamps[sensor]
             if kind not in ("color", "keypoints", "depth") or judged.last is None or sensor not in self._others:
                 continue
-            # The next one is due by then, and has not come.
+            # The camera's next image was due by then and has not arrived.
             missing = self._wait < stamp - judged.last < _STALE_S
             if missing and judged.last + 0.9 * judged.period <= stamp + self._wait:
                 return False
         return True
 
     def _joining(self, stamp: float, now: float) -> list[Measurement]:
-        """What other sensors measured up to a time, decoded; what is later waits for the next frame."""
+        """Decoded measurements of other sensors up to a time; later ones wait for the next frame."""
         found: list[Measurement] = []
         for pending in self._others.values():
             due = []
@@ -142,7 +142,7 @@ class Assembler:
                 arrival = pending.popleft()
                 if stamp - arrival.stamp <= _STALE_S:
                     due.append(arrival)
-            # A faster laser tells more; of a faster camera the last picture tells all.
+            # All scans of a faster laser are used; of a faster camera the last image suffices.
             for arrival in due if due and due[-1].kind in ("scan", "points") else due[-1:]:
                 try:
                     item = self._checked(arrival.measure(), now)
@@ -154,10 +154,10 @@ class Assembler:
         return sorted(found, key=lambda item: item.stamp)
 
     def _checked(self, item: Measurement, now: float) -> Measurement:
-        """The measurement, if its picture and camera can be what they say.
+        """The measurement, after checking that image and camera are consistent.
 
         Raises:
-            RecordingError: they cannot.
+            RecordingError: they are not.
         """
         camera = getattr(item, "camera", None)
         if isinstance(camera, Camera):
@@ -188,7 +188,7 @@ class Assembler:
 
 
 def _same(before: npt.NDArray[np.generic], image: npt.NDArray[np.generic]) -> bool:
-    # Noise shows in the first rows that are looked at.
+    # Noise makes the first rows differ, so comparing them suffices.
     rows = slice(None, None, _STRIDE)
     if before.shape != image.shape or not np.array_equal(before[rows], image[rows], equal_nan=image.dtype.kind == "f"):
         return False

@@ -1,4 +1,4 @@
-"""The time of the host, which tests replace by one that they set."""
+"""Clock of the host; tests substitute a clock that they set."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Seconds since 1970 that never go back."""
+    """Interface of a clock: seconds since 1970 that never decrease."""
 
     def now(self) -> float:
         """The time [s]."""
 
 
 class HostClock:
-    """The host's: its time at the start, and what has passed since then by a clock that nobody sets."""
+    """Host clock: system time at the start plus the time elapsed since then on a monotonic clock."""
 
     def __init__(self) -> None:
         """Start."""

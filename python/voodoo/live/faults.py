@@ -1,4 +1,4 @@
-"""What can go wrong with a source: each kind has a name, is counted, and is told on the way."""
+"""Faults of live sources: each kind has a name, is counted and is reported when it occurs."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FAULTS: dict[str, str] = {
     "refused": "a measurement that the tracker refuses",
     "lost on the way": "messages that the network lost",
 }
-"""Name -> what it means."""
+"""Name -> meaning."""
 
 _OF_REASONS = {
     "with a repeated stamp": "repeated stamp",
@@ -43,7 +43,7 @@ _OF_REASONS = {
     "without a transform near its stamp": "transform too old",
 }
 _QUIET_S = 1.0
-"""A fault that goes on is told once a second."""
+"""A persisting fault is reported once per second."""
 
 
 class Fault(RecordingError):
@@ -55,34 +55,34 @@ class Fault(RecordingError):
     """
 
     def __init__(self, kind: str, message: str) -> None:
-        """Keep both."""
+        """Store kind and message."""
         super().__init__(message, reason=kind)
         self.kind = kind
 
 
 def kind_of(error: VoodooError, otherwise: str) -> str:
-    """The name in FAULTS of what raised an error."""
+    """The name in FAULTS for the cause of an error."""
     return error.kind if isinstance(error, Fault) else kind_of_reason(getattr(error, "reason", ""), otherwise)
 
 
 def kind_of_reason(reason: str, otherwise: str) -> str:
-    """The name in FAULTS of a reason for which recordings leave something out."""
+    """The name in FAULTS for a reason why recordings leave out a measurement."""
     return _OF_REASONS.get(reason, otherwise)
 
 
 class Faults:
-    """Counts faults by name and tells them, one that goes on once a second.
+    """Counts faults by name and reports them; a persisting fault is reported once per second.
 
     Args:
-        tell: is given a line for people; None: nobody is told.
+        tell: called with a readable line; None: no reports.
 
     Attributes:
-        counts: name -> how often.
-        first: name -> the first one, in words.
+        counts: name -> number of faults.
+        first: name -> description of the first fault.
     """
 
     def __init__(self, on_message: Callable[[str], None] | None = None) -> None:
-        """None yet."""
+        """Start without faults."""
         self.counts: dict[str, int] = {}
         self.first: dict[str, str] = {}
         self._on_message = on_message
@@ -94,9 +94,9 @@ class Faults:
 
         Args:
             kind: a name in FAULTS.
-            words: where, what was expected and what was found.
-            now: the host's time [s].
-            count: how many at once.
+            words: where it occurred, what was expected and what was found.
+            now: host time [s].
+            count: number of faults.
         """
         with self._lock:
             self.counts[kind] = self.counts.get(kind, 0) + count
@@ -109,14 +109,14 @@ class Faults:
         self.log(f"{kind}: {words}" if since == 1 else f"{kind} ({since} times): {words}")
 
     def add_error(self, error: VoodooError, now: float, otherwise: str) -> None:
-        """Count what raised an error; `otherwise` is its name where the error does not tell."""
+        """Count the cause of an error; `otherwise` is its name if the error does not determine one."""
         self.add(kind_of(error, otherwise), error, now)
 
     def log(self, words: str) -> None:
-        """Tell something that is no fault."""
+        """Report an event that is not a fault."""
         if self._on_message is not None:
             self._on_message(words)
 
     def __len__(self) -> int:
-        """How many there were."""
+        """Total number of faults."""
         return sum(self.counts.values())

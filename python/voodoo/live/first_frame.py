@@ -1,4 +1,4 @@
-"""What a live source looks like to those who ask a recording how to begin."""
+"""A live source in the form of a recording, for code that determines the start of tracking from a recording."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class FirstFrame(Recording):
     """
 
     def __init__(self, live: Live, frame: LiveFrame) -> None:
-        """Keep both."""
+        """Store source and frame."""
         self.name = live.sources[0].name
         self.path = Path(self.name)
         self.root_frame = live.root_frame
@@ -36,7 +36,7 @@ class FirstFrame(Recording):
         return iter(())
 
     def info(self) -> RecordingInfo:
-        """The sensors that measured something."""
+        """The sensors with measurements."""
         sensors = tuple(
             SensorInfo(sensor, kind, self.root_frame, 1, float("nan"), "live")
             for sensor, kind in self._live.kinds.items()

@@ -1,4 +1,4 @@
-"""Follows who is seen in live frames; where frames do not go on from those before, somebody is looked for anew."""
+"""Tracks persons through live frames; after a break in the frames the search starts again."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 GONE_S = 5.0
-"""After so long without a frame whoever is there is somebody new, in sizes of their own."""
+"""After this time without a frame, persons are treated as new, with their own sizes."""
 ONE = 1
-"""The number of the person where only one is followed."""
+"""Number of the person if only one is tracked."""
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What became of a frame.
+    """Result of tracking one frame.
 
     Args:
-        frame: it.
-        estimates: number of a person -> their pose; of one person also where nobody was found (status "searching").
-        bodies: number of a person -> their body, with current sizes.
-        seconds: what tracking took [s].
-        front_end: of one person: what made the tracker's frame.
+        frame: the live frame.
+        estimates: person number -> pose; with a single tracked person also if nobody was found (status "searching").
+        bodies: person number -> body, with current sizes.
+        seconds: duration of tracking [s].
+        front_end: for a single person: the front end that made the tracker's frame.
     """
 
     frame: LiveFrame
@@ -44,24 +44,24 @@ class Step:
 
     @property
     def stamp(self) -> float:
-        """That of the frame [s]."""
+        """Stamp of the frame [s]."""
         return self.frame.stamp
 
     @property
     def people(self) -> PeopleEstimate:
-        """Those who are there."""
+        """The persons present."""
         there = tuple(Person(number, one) for number, one in self.estimates.items() if one.joints)
         return PeopleEstimate(self.stamp, there)
 
 
 class Follower:
-    """One person, or several, through live frames.
+    """Tracks one person or several through live frames.
 
     Args:
-        tracker: of one person; None: `people` are followed.
-        people: makes who follows several; whoever comes after time jumped back has a number that nobody had.
+        tracker: tracker of one person; None: `people` is used.
+        people: creates the tracker of several persons. After time jumped back, new persons get unused numbers.
         settings: see FrontEndSettings.
-        starts: where one person's first pose may come from; None: from whatever is measured.
+        starts: sources of the first pose of a single person; None: every kind of measurement that can give one.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Follower:
         settings: FrontEndSettings | None = None,
         starts: Starts | None = None,
     ) -> None:
-        """Nothing was seen yet."""
+        """Start without frames."""
         if (tracker is None) == (people is None):
             raise VoodooError("follower: expected a tracker or people, found both or neither")
         self._settings = settings or FrontEndSettings()
@@ -85,10 +85,10 @@ class Follower:
         self._arrived = 0.0
 
     def step(self, frame: LiveFrame) -> Step:
-        """The pose of everybody at the frame's time.
+        """Estimate the pose of all persons at the time of the frame.
 
         Raises:
-            VoodooError: a frame that is refused; all is as it was.
+            VoodooError: the frame is rejected; the state is unchanged.
         """
         start = time.perf_counter()
         if frame.breaks and self._stamp is not None:
@@ -111,14 +111,14 @@ class Follower:
         return {numbers[person.id]: person.estimate for person in estimate}, bodies
 
     def restart(self, *, back: bool, gone: bool) -> None:
-        """Go on where frames do not go on from those before.
+        """Continue after a break in the frames.
 
-        The pose is kept, and the tracker finds out where it is wrong; after a long gap somebody is looked for anew. A body that
-        nobody can look for stays where it was.
+        The pose is kept, and the tracker detects where it is wrong. After a long gap the search starts again. A body that no
+        source can find keeps its position.
 
         Args:
-            back: stamps begin again before those that were seen.
-            gone: nothing came for GONE_S.
+            back: stamps restart before earlier ones.
+            gone: no frame arrived for GONE_S.
         """
         if self._one is not None:
             tracker = self._one.tracker
@@ -130,12 +130,12 @@ class Follower:
                 tracker.reset_pose(poses)
             self._one = FrontEnd(tracker, settings=self._settings)
         elif self._make is not None and back:
-            # Those who follow several bear a gap themselves.
+            # `People` handles a gap by itself.
             self._numbers = self._most
             self._all = PeopleFrontEnd(self._make(), settings=self._settings)
 
 
 def without_damaged(frame: LiveFrame) -> tuple[LiveFrame, list[VoodooError]]:
-    """The frame without the pictures that do not decode, and why they do not."""
+    """The frame without the undecodable images, and the reasons."""
     kept, errors = decodable(frame.measurements)
     return replace(frame, measurements=kept), errors

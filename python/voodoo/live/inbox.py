@@ -1,4 +1,4 @@
-"""What the sources hand over, until somebody decodes it: of what makes frames the newest, of the rest the newest few."""
+"""Queue of arrivals between sources and decoding: keeps the newest frame-defining arrival, and a few of the others."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from voodoo.live.mailbox import Closing
 from voodoo.live.source import Arrival
 
 _OTHERS = 4
-"""Of a sensor that joins frames: a laser may be faster than the camera."""
+"""Capacity for a sensor that joins frames: a laser may be faster than the camera."""
 
 
 class Inbox(Closing):
     """A bounded queue of arrivals.
 
     Attributes:
-        dropped: arrivals that a frame was to be made for, and that a newer one overtook.
+        dropped: number of frame-defining arrivals that a newer one replaced.
     """
 
     def __init__(self) -> None:
-        """Nothing in it."""
+        """Start empty."""
         super().__init__()
         self.dropped = 0
         self._items: list[tuple[Arrival, float]] = []
 
     def put(self, arrival: Arrival, now: float) -> None:
-        """Put in what came at the host's time `now` [s]."""
+        """Add an arrival at host time `now` [s]."""
         with self._changed:
             if self._closed:
                 return
@@ -35,7 +35,7 @@ class Inbox(Closing):
             self._changed.notify()
 
     def take(self, timeout: float) -> list[tuple[Arrival, float]]:
-        """All that came, in the order of arrival; empty where nothing comes within `timeout` [s]."""
+        """All arrivals in order; empty if nothing arrives within `timeout` [s]."""
         with self._changed:
             self._wait(timeout)
             items, self._items = self._items, []

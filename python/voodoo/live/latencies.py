@@ -1,4 +1,4 @@
-"""Percentiles of any number of latencies in a few kilobytes: a program that runs for weeks keeps no list."""
+"""Percentiles of any number of latencies in a few kilobytes, so that a program can run for weeks."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ _LEAST_S, _MOST_S, _STEP = 1e-5, 1e3, 1.01
 
 
 class Latencies:
-    """How long things took: counts by size, to 1 %.
+    """Histogram of durations with a resolution of 1 %.
 
     Attributes:
-        count: how many.
-        largest: the longest [s]; NaN without any.
-        last: the latest [s]; NaN without any.
+        count: number of durations.
+        largest: longest duration [s]; NaN without any.
+        last: most recent duration [s]; NaN without any.
     """
 
     def __init__(self) -> None:
-        """None yet."""
+        """Start empty."""
         self.count, self.largest, self.last = 0, math.nan, math.nan
         self._counts = np.zeros(int(math.log(_MOST_S / _LEAST_S) / math.log(_STEP)) + 2, dtype=np.int64)
 
     def add(self, seconds: float) -> None:
-        """Count one [s]; what is below 10 microseconds, or negative, counts as that."""
+        """Add a duration [s]; values below 10 microseconds, including negative ones, count as 10 microseconds."""
         self.count += 1
         self.last = seconds
         self.largest = seconds if math.isnan(self.largest) else max(self.largest, seconds)
@@ -33,7 +33,7 @@ class Latencies:
         self._counts[at] += 1
 
     def percentile(self, percent: float) -> float:
-        """The latency [s] that `fraction` (0 to 100) percent do not exceed, to 1 %; NaN without any."""
+        """Percentile of the latencies [s] to 1 %, with `fraction` in percent (0 to 100); NaN without any."""
         if not self.count:
             return math.nan
         at = int(np.searchsorted(np.cumsum(self._counts), max(math.ceil(self.count * percent / 100.0), 1)))

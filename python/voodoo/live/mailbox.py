@@ -1,4 +1,4 @@
-"""Bounded queues between stages in which the latest wins: what nobody took in time is dropped and counted."""
+"""Bounded queues between stages that keep the newest items: items not taken in time are dropped and counted."""
 
 from __future__ import annotations
 
@@ -11,52 +11,52 @@ T = TypeVar("T")
 
 
 class Closing:
-    """What ends in order: nothing more comes in, and what is in it can still be taken."""
+    """Base class of queues with an orderly end: no more items are accepted, and the remaining ones can still be taken."""
 
     _items: Sized
 
     def __init__(self) -> None:
-        """Open."""
+        """Start open."""
         self._changed = threading.Condition()
         self._closed = False
 
     def close(self) -> None:
-        """Nothing more comes; what is in it can still be taken."""
+        """Accept no more items; the remaining ones can still be taken."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     @property
     def closed(self) -> bool:
-        """Whether nothing more comes and all was taken."""
+        """Whether the queue is closed and empty."""
         with self._changed:
             return self._closed and not self._items
 
     def _wait(self, timeout: float | None) -> None:
-        """Until something is in it, it is closed, or `timeout` [s] is over; the lock is held."""
+        """Wait until there is an item, the queue is closed, or `timeout` [s] is over; the caller holds the lock."""
         if not self._items and not self._closed:
             self._changed.wait(timeout)
 
 
 class Mailbox(Closing, Generic[T]):
-    """A queue of at most `most` items between two threads; the oldest goes when another one comes.
+    """A queue of at most `most` items between two threads; a new item replaces the oldest.
 
     Args:
-        most: how many wait at the same time.
+        most: capacity.
 
     Attributes:
-        dropped: how many went untaken.
+        dropped: number of items replaced before they were taken.
     """
 
     def __init__(self, most: int = 1) -> None:
-        """Nothing in it."""
+        """Start empty."""
         super().__init__()
         self.dropped = 0
         self._most = most
         self._items: deque[T] = deque()
 
     def put(self, item: T) -> None:
-        """Put an item in; after `close` nothing is taken up."""
+        """Add an item; ignored after `close`."""
         with self._changed:
             if self._closed:
                 return
@@ -67,11 +67,11 @@ class Mailbox(Closing, Generic[T]):
             self._changed.notify()
 
     def take(self, timeout: float | None = None) -> T | None:
-        """The oldest item; None where none comes within `timeout` [s], or the box is closed and empty."""
+        """The oldest item; None if none arrives within `timeout` [s], or the mailbox is closed and empty."""
         with self._changed:
             self._wait(timeout)
             return self._items.popleft() if self._items else None
 
     def __len__(self) -> int:
-        """How many wait."""
+        """Number of waiting items."""
         return len(self._items)

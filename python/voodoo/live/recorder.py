@@ -1,4 +1,4 @@
-"""A ROS 2 bag (MCAP) of what was tracked and what came out, which `voodoo track` reads again."""
+"""Records measurements and results of a live session as a ROS 2 bag (MCAP), which `voodoo track` can read."""
 
 from __future__ import annotations
 
@@ -30,11 +30,12 @@ _QUALITY = 95
 class Recorder(Output):
     """Writes depth, clouds, scans, color (JPEG), calibrations, poses of sensors, and the skeletons.
 
-    What was dropped because the tracker was late is not in it; neither are keypoints and markers, for which ROS has no message.
+    Frames that were dropped because the tracker was late are not recorded; nor are keypoints and markers, for which ROS has no
+    message.
 
     Args:
         path: .mcap file; it appears when the recording ends.
-        root_frame: tells the frame of the poses, once something came.
+        root_frame: returns the frame of the poses, once a frame has arrived.
 
     Raises:
         VoodooError: another suffix, or a file that exists.

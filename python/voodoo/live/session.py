@@ -1,4 +1,4 @@
-"""From live frames to published poses: track and publish are stages of their own, and what is late is dropped."""
+"""Live session: tracking and publishing are separate stages, and late items are dropped."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _RATE_S = 2.0
 
 
 class Output(ABC):
-    """Where poses go. A thread of its own calls it.
+    """A receiver of poses. It is called from its own thread.
 
     Attributes:
-        name: for messages.
-        prompt: latency counts until it has taken the pose; others may lag behind.
-        waiting: how many steps wait for it at most; the oldest is dropped and counted.
+        name: name in messages.
+        prompt: latency is measured until it has taken the pose; other outputs may lag behind.
+        waiting: queue capacity in steps; when it is exceeded, the oldest is dropped and counted.
     """
 
     name: str
@@ -35,10 +35,10 @@ class Output(ABC):
 
     @abstractmethod
     def publish(self, step: Step) -> None:
-        """Take a step.
+        """Receive a step.
 
         Raises:
-            VoodooError, OSError: it cannot; the session ends.
+            VoodooError, OSError: it failed; the session ends.
         """
 
     def close(self) -> None:  # noqa: B027 - most have nothing to finish
@@ -70,7 +70,7 @@ class _Lane:
             self.error = error
 
     def finish(self) -> None:
-        """Let it take what waits, and close the outputs."""
+        """Process the waiting steps and close the outputs."""
         self.box.close()
         self._thread.join()
         for output in self.outputs:
@@ -81,18 +81,18 @@ class _Lane:
 
 
 class Session:
-    """Tracks what live sources measure, and publishes it.
+    """Tracks persons in live measurements and publishes the poses.
 
     Args:
-        live: entered by whoever made it.
-        follower: makes a Follower of the first frame.
-        outputs: where poses go.
+        live: live sources; the caller enters the `with` block.
+        follower: makes a Follower from the first frame.
+        outputs: receivers of the poses.
 
     Attributes:
-        latency: from measurement to published pose.
-        tracking: what a step of the tracker took.
-        published: steps that were published.
-        with_pose: of them, those in which somebody was there.
+        latency: time from measurement to published pose.
+        tracking: duration of a step of the tracker.
+        published: number of published steps.
+        with_pose: number of published steps with a person.
     """
 
     def __init__(
@@ -160,11 +160,11 @@ class Session:
 
     @property
     def running(self) -> bool:
-        """Whether more is to come."""
+        """Whether the session is running."""
         return self._thread.is_alive()
 
     def wait(self, seconds: float) -> bool:
-        """Wait for so long [s], or until it has ended; whether it goes on.
+        """Wait for this long [s], or until the session ends; returns whether it is still running.
 
         Raises:
             VoodooError, OSError: a source or an output that failed.
@@ -180,7 +180,7 @@ class Session:
                 raise error
 
     def finish(self) -> None:
-        """Stop, let everything in hand be published, and finish files.
+        """Stop, publish all pending steps, and finish files.
 
         Raises:
             VoodooError, OSError: a source or an output that failed.
@@ -193,11 +193,11 @@ class Session:
 
     @property
     def dropped(self) -> int:
-        """Frames that a newer one overtook, in any stage before they were published."""
+        """Number of frames that a newer one replaced before they were published, in any stage."""
         return self.live.dropped + self._prompt.box.dropped
 
     def persons(self) -> dict[int, str]:
-        """Status of each person who is there; "lost" of all where the source is."""
+        """Status of each person present; "lost" for all if the source is lost."""
         if self._last is None:
             return {}
         lost = self.live.lost
@@ -205,12 +205,12 @@ class Session:
 
     @property
     def rate_hz(self) -> float:
-        """Published poses a second, of the last two seconds."""
+        """Published poses per second over the last two seconds."""
         now = self.live.clock.now()
         return sum(at > now - _RATE_S for at in tuple(self._times)) / min(max(now - self._began, 0.1), _RATE_S)
 
     def line(self) -> str:
-        """Rate, latency, drops and the status of each person, for people."""
+        """Readable line with rate, latency, drops and the status of each person."""
         persons = ", ".join(f"{number} {word}" for number, word in self.persons().items()) or "nobody"
         status = self.live.status
         if status == "waiting" or not self.published:
@@ -226,7 +226,7 @@ class Session:
         return "; ".join(parts)
 
     def report(self) -> dict[str, Any]:
-        """What happened, for a JSON file."""
+        """Summary of the session for a JSON file."""
         span = self._end - self._first if self._first is not None else 0.0
         rate = (self.published - 1) / span if self.published > 1 and span > 0.0 else 0.0
         refused = self.live.refused + self.refused
@@ -257,7 +257,7 @@ class Session:
 
     @property
     def latency_from(self) -> str:
-        """What latencies are counted from."""
+        """Reference time of the latencies."""
         if any(source.get("kind") == "recording" for source in self.live.about()):
             return "when the frame was due"
         return "the stamp" if self.live.by_host_clock else "the fastest arrival: stamps are by another clock"

@@ -1,4 +1,4 @@
-"""What a live source is: it hands over measurements as they come, and says when it is gone."""
+"""Interface of a live source: it passes on measurements as they arrive, and reports when it is gone."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from voodoo.measurements import FloatArray, Measurement
 
 
 class SourceGone(VoodooError):
-    """A source that was there is not any more: unplugged, or its driver ended."""
+    """A source has disappeared: it was unplugged, or its driver ended."""
 
 
 class SourceEnded(VoodooError):
-    """A source that has an end is at its end: a recording that was played."""
+    """A finite source, such as a replayed recording, is at its end."""
 
 
 def _always() -> bool:
@@ -27,16 +27,16 @@ def _always() -> bool:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A measurement that came, not decoded yet.
+    """A measurement that arrived and is not decoded yet.
 
     Args:
         sensor: topic, folder or stream.
         kind: "depth", "points", "scan", "color", "keypoints" or "markers".
         stamp: time of measurement by the source's clock [s].
         measure: decodes it; raises a RecordingError where it cannot be used.
-        drives: whether a frame is made for it; else it joins the next frame.
-        taken: the host's time of measurement [s], where the source knows it.
-        ready: whether all that belongs to it has come, such as a transform with a later stamp.
+        drives: whether it defines a frame; else it joins the next frame.
+        taken: time of measurement by the host clock [s], if the source knows it.
+        ready: whether everything that belongs to it has arrived, such as a transform with a later stamp.
         patience: how long to wait for that [s].
     """
 
@@ -51,13 +51,13 @@ class Arrival:
 
 
 class Source(ABC):
-    """Where measurements come from. One thread calls `open`, then `read` again and again, then `close`.
+    """A source of measurements. One thread calls `open`, then `read` repeatedly, then `close`.
 
     Attributes:
-        name: for messages.
-        stays: a source that is gone may come back, and is opened again.
-        unusable: what came for a frame and could not become an arrival.
-        placed: it is known where its sensors are among those of other sources.
+        name: name in messages.
+        stays: the source may come back after it has disappeared, and is then opened again.
+        unusable: number of frame-defining measurements that could not become an arrival.
+        placed: whether the poses of its sensors relative to other sources are known.
     """
 
     name: str
@@ -68,38 +68,38 @@ class Source(ABC):
     @property
     @abstractmethod
     def root_frame(self) -> str:
-        """The frame that all measurements' `root_from_sensor` lead to."""
+        """The target frame of `root_from_sensor` of all measurements."""
 
     @abstractmethod
     def open(self, clock: Clock, faults: Faults) -> None:
-        """Begin; after the source was gone, begin again.
+        """Open the source, also again after it had disappeared.
 
         Args:
-            clock: the host's.
-            faults: counts what goes wrong while reading.
+            clock: host clock.
+            faults: counts faults while reading.
 
         Raises:
-            SourceGone: it is not there yet.
+            SourceGone: it is not available yet.
             VoodooError: it cannot be used.
         """
 
     @abstractmethod
     def read(self, timeout: float) -> Sequence[Arrival]:
-        """What came, in the order of arrival; empty where nothing came within `timeout` [s].
+        """New measurements in the order of arrival; empty if none arrives within `timeout` [s].
 
         Raises:
             SourceGone: it was unplugged.
-            SourceEnded: nothing more comes.
+            SourceEnded: there are no more measurements.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """End; harmless when it is not open."""
+        """Close the source; no effect if it is not open."""
 
     def root_from(self, frame: str, stamp: float) -> FloatArray | None:
-        """root_from_frame (4, 4) at a time [s]; None where the source does not know."""
+        """root_from_frame (4, 4) at a time [s]; None if the source does not know it."""
         return None
 
     def about(self) -> dict[str, Any]:
-        """What is known of it, for the report."""
+        """Properties for the report."""
         return {"name": self.name}

@@ -1,4 +1,4 @@
-"""Results that grow on disk, not in memory, and become files of any format at the end."""
+"""Collects results on disk instead of in memory, and converts them to files of any format at the end."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _TOGETHER = 30
 
 
 class Files(Output):
-    """Writes poses to files when the session ends; until then they lie in a folder beside the first.
+    """Writes poses to files when the session ends; until then they are in a temporary folder next to the first file.
 
     Args:
         paths: see `voodoo.export.files.FORMATS`.
-        root_frame: tells the frame of the poses, at the end.
-        several: several persons are followed.
+        root_frame: returns the frame of the poses, at the end.
+        several: whether several persons are tracked.
 
     Attributes:
-        written: files that are there after `close`.
-        frames: how many were taken.
+        written: files that exist after `close`.
+        frames: number of received frames.
 
     Raises:
         VoodooError: a path that cannot be written to.
@@ -74,7 +74,7 @@ class Files(Output):
         """Write the files.
 
         Raises:
-            VoodooError: no frame came.
+            VoodooError: there were no frames.
             OSError: a file cannot be written.
         """
         try:

@@ -1,23 +1,23 @@
-"""Stamps decide, not arrival: which measurement is later, repeated, out of order, or by a clock that was set."""
+"""Order of measurements by stamp, not by arrival: detects repeated stamps, wrong order, and clocks that were set."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 GAP_S = 1.0
-"""After so long without a measurement nobody is where they were: somebody is looked for anew."""
+"""After this time without a measurement, persons have moved and the search starts again."""
 _PASSED = 0.25
-"""Stamps that went on by more than a gap, in less than this share of it, were set ahead."""
+"""If stamps advance by more than a gap while less than this fraction of it has elapsed, the clock was set ahead."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a stamp says.
+    """Result of checking a stamp.
 
     Args:
         fault: name in FAULTS, or "".
         usable: whether the measurement is used.
-        breaks: time does not go on from the measurement before.
+        breaks: time does not continue from the previous measurement.
     """
 
     fault: str = ""
@@ -26,13 +26,13 @@ class Verdict:
 
 
 class Stamps:
-    """Judges the stamps of a sensor, one after the other.
+    """Checks the stamps of a sensor, one after the other.
 
-    One stamp that is out of order is left out; when the next goes on from there, time has jumped.
+    A single stamp that is out of order is left out; if the next one continues from it, time has jumped.
 
     Attributes:
-        last: the last one that is used [s].
-        period: between the last two [s]; 0 until there are two.
+        last: last used stamp [s].
+        period: difference of the last two [s]; 0 until there are two.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class Stamps:
         self._apart: float | None = None
 
     def judge(self, stamp: float, now: float) -> Verdict:
-        """Take up a stamp [s] that came at the host's time `now` [s]."""
+        """Check a stamp [s] that arrived at host time `now` [s]."""
         last, passed = self.last, now - self._at
         if last is None:
             return self._take(stamp, now, Verdict())
@@ -67,12 +67,12 @@ class Stamps:
 
 
 class HostTime:
-    """The host's time of measurements: their stamps, where these are by the host's clock.
+    """Converts stamps to host time; stamps by the host clock are used unchanged.
 
-    Stamps by another clock are taken to be as late as the fastest of them arrived: latencies are above the least one then.
+    Stamps by another clock are aligned with the fastest arrival, so latencies are relative to the smallest one.
 
     Attributes:
-        by_host: whether stamps are by the host's clock.
+        by_host: whether stamps are by the host clock.
     """
 
     NEAR_S = 10.0
@@ -83,18 +83,18 @@ class HostTime:
         self._offset: float | None = None
 
     def of(self, stamp: float, now: float) -> float:
-        """When, by the host's clock, something was measured that came just now."""
+        """Host time of a measurement that has just arrived."""
         if abs(now - stamp) < self.NEAR_S:
             self.by_host, self._offset = True, None
             return min(stamp, now)
         self.by_host = False
         offset = now - stamp
-        # A clock that was set starts anew.
+        # After the clock was set, the alignment starts again.
         if self._offset is None or abs(offset - self._offset) > self.NEAR_S:
             self._offset = offset
         self._offset = min(self._offset, offset)
         return stamp + self._offset
 
     def forget(self) -> None:
-        """The clock was set."""
+        """Reset, because the clock was set."""
         self._offset = None

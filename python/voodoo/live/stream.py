@@ -1,4 +1,4 @@
-"""Live sources as an iterator of recorded frames: capture and decoding run beside whoever takes the frames."""
+"""Live sources as an iterator of recorded frames: capture and decoding run in parallel to the consumer of the frames."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from voodoo.measurements import FloatArray
 Status: TypeAlias = Literal["waiting", "running", "lost", "ended"]
 
 LOST_S = 0.3
-"""A source that sent nothing usable for so long is lost; one that is slow anyway, after two and a half of its periods."""
+"""A source without usable data for this time is lost; for a slow source, the limit is two and a half of its periods."""
 _PERIODS = 2.5
 _FIRST_S = 1.0
 """Patience after the very first frame, when the period is not known."""
@@ -29,20 +29,20 @@ _TICK_S = 0.05
 
 
 class Live:
-    """What live sources measure, as recorded frames: the newest one each time; use it in a `with` block.
+    """Measurements of live sources as recorded frames, always the newest one; use it in a `with` block.
 
-    `FrontEnd` and `Tracker` take the frames like those of a recording. A frame that does not go on from the one before
-    (`LiveFrame.breaks`) needs a new search, see `voodoo.live.follow.Follower`.
+    `FrontEnd` and `Tracker` take the frames like those of a recording. A frame that does not continue the previous one
+    (`LiveFrame.breaks`) requires a new search, see `voodoo.live.follow.Follower`.
 
     Args:
-        sources: the first one's images make the frames; what the others measured joins them.
-        clock: of the host.
-        tell: is given a line for people at every fault.
-        wait: how long a frame waits for the pictures and transforms that belong to it [s].
-        eager: decode color pictures at once, beside the tracker; False: when somebody looks at them.
+        sources: images of the first one define the frames; measurements of the others join them.
+        clock: host clock.
+        tell: called with a readable line for every fault.
+        wait: how long a frame waits for the images and transforms that belong to it [s].
+        eager: decode color images at once, in parallel to the tracker; False: at first access.
 
     Attributes:
-        faults: what went wrong, by name.
+        faults: faults by name.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Live:
         """Open the sources.
 
         Raises:
-            VoodooError: a source that cannot be used at all.
+            VoodooError: a source cannot be used at all.
         """
         there = [self._opened(source) for source in self.sources]
         for source, is_open in zip(self.sources, there, strict=True):
@@ -95,10 +95,10 @@ class Live:
         self.close()
 
     def __iter__(self) -> Iterator[LiveFrame]:
-        """The newest frame each time, until the sources end or `stop` is called.
+        """Yield the newest frame each time, until the sources end or `stop` is called.
 
         Raises:
-            VoodooError: a source that cannot go on, or nobody entered the `with` block.
+            VoodooError: a source failed, or the `with` block was not entered.
         """
         if not self._threads and not self._frames.closed:
             raise VoodooError("live sources: expected a `with` block around the loop, found none")
@@ -109,16 +109,16 @@ class Live:
         self._raise()
 
     def next(self, timeout: float) -> LiveFrame | None:
-        """The newest frame that nobody took; None where none comes within `timeout` [s].
+        """The newest frame that was not taken yet; None if none arrives within `timeout` [s].
 
         Raises:
-            VoodooError: a source that cannot go on.
+            VoodooError: a source failed.
         """
         self._raise()
         return self._frames.take(timeout)
 
     def stop(self) -> None:
-        """Take up nothing more; who iterates comes to an end."""
+        """Accept no more measurements; iterations end."""
         self._stop.set()
         self._inbox.close()
 
@@ -136,7 +136,7 @@ class Live:
 
     @property
     def status(self) -> Status:
-        """Whether usable measurements come: "lost" when there were none for LOST_S."""
+        """Whether usable measurements arrive: "lost" if there were none for LOST_S."""
         if self._frames.closed:
             return "ended"
         if self._good is None:
@@ -145,7 +145,7 @@ class Live:
 
     @property
     def lost(self) -> bool:
-        """Whether there was nothing usable for LOST_S, or two and a half periods of a slow source; also at its end."""
+        """Whether there were no usable data for LOST_S, or two and a half periods of a slow source; also true at its end."""
         return self._good is not None and self.silent > self._patience
 
     @property
@@ -160,35 +160,35 @@ class Live:
 
     @property
     def kinds(self) -> dict[str, str]:
-        """Sensor -> kind, of all that came."""
+        """Sensor -> kind, for all arrivals."""
         return dict(self._assembler.kinds)
 
     @property
     def received(self) -> int:
-        """Measurements that a frame was to be made for."""
+        """Number of frame-defining measurements."""
         return self._delivered + sum(source.unusable for source in self.sources)
 
     @property
     def dropped(self) -> int:
-        """Frames, or what would have become some, that a newer one overtook."""
+        """Number of frames, or frame-defining measurements, that a newer one replaced."""
         return self._inbox.dropped + self._frames.dropped
 
     @property
     def refused(self) -> int:
-        """What was to become a frame and could not be used; `faults` says why."""
+        """Number of frame-defining measurements that could not be used; `faults` has the reasons."""
         return self._assembler.refused + sum(source.unusable for source in self.sources)
 
     @property
     def by_host_clock(self) -> bool:
-        """Whether latencies are from the stamps; else from the fastest arrival, because stamps are by another clock."""
+        """Whether latencies are relative to the stamps; else to the fastest arrival, because stamps are by another clock."""
         return self._assembler.host.by_host
 
     def root_from(self, frame: str, stamp: float) -> FloatArray | None:
-        """root_from_frame (4, 4) at a time [s]; None where no source knows."""
+        """root_from_frame (4, 4) at a time [s]; None if no source knows it."""
         return self.sources[0].root_from(frame, stamp)
 
     def about(self) -> list[dict[str, Any]]:
-        """What is known of the sources."""
+        """Properties of the sources."""
         return [source.about() for source in self.sources]
 
     # The stages
@@ -212,7 +212,7 @@ class Live:
             raise error
 
     def _opened(self, source: Source) -> bool:
-        """Open a source; whether it is there."""
+        """Open a source; returns whether it is available."""
         try:
             source.open(self.clock, self.faults)
         except SourceGone as error:
@@ -227,7 +227,7 @@ class Live:
         return True
 
     def _capture(self, source: Source, is_open: bool) -> None:
-        """Read a source until it ends; open it again when it was gone."""
+        """Read a source until it ends; reopen it after it has disappeared."""
         while not self._stop.is_set():
             try:
                 if not is_open:
@@ -235,7 +235,7 @@ class Live:
                     is_open = True
                     self.faults.log(f"{source.name}: it is there again")
                 for arrival in source.read(_TICK_S):
-                    # The first source's images make the frames.
+                    # Images of the first source define the frames.
                     self.deliver(arrival if source is self.sources[0] else replace(arrival, drives=False))
             except SourceEnded:
                 break
@@ -252,19 +252,19 @@ class Live:
             self._inbox.close()
 
     def _decode(self) -> None:
-        """Make frames of what came."""
+        """Make frames from arrivals."""
         while not self._inbox.closed:
             self.turn(_TICK_S)
         self._hand_on(self._assembler.flush(self.clock.now()))
         self._frames.close()
 
     def deliver(self, arrival: Arrival) -> None:
-        """Take up what just came from a source."""
+        """Add new arrivals from a source."""
         self._delivered += arrival.drives
         self._inbox.put(arrival, self.clock.now())
 
     def turn(self, timeout: float) -> None:
-        """One turn of the decoding stage, which waits for arrivals for `timeout` [s] at most."""
+        """One iteration of the decoding stage, which waits for arrivals for at most `timeout` [s]."""
         assembler = self._assembler
         for arrival, at in self._inbox.take(min(assembler.due(self.clock.now()), timeout, _TICK_S)):
             if arrival.drives:
@@ -300,14 +300,14 @@ class Live:
         return max(LOST_S, _PERIODS * self._period)
 
     def _check_states(self) -> None:
-        """Tell that a source stalls."""
+        """Report that a source stalls."""
         if not self._lost and self.lost and not self._inbox.closed:
             self._lost = True
             self.faults.add("stalled", f"nothing usable for {self.silent:.1f} s: lost", self.clock.now())
 
 
 def _check_joined(sources: Sequence[Source]) -> None:
-    """Refuse several sources that cannot be told apart, or of which nobody says where they are."""
+    """Reject several sources that have the same name, or whose relative poses are unknown."""
     names = [source.name for source in sources]
     if len(set(names)) < len(names):
         raise VoodooError(

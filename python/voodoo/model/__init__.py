@@ -1,1 +1,1 @@
-"""What is tracked and looked at: bodies, cameras, transforms, and how a body looks from a camera."""
+"""Bodies, cameras, transforms, and projections of a body to a camera."""

@@ -33,7 +33,7 @@ _ALIASES = {
     "Inverse Brown Conrady": "inverse_plumb_bob", "Kannala Brandt4": "equidistant",
 }  # fmt: skip
 MOST_PIXELS = 2**25
-"""Of an image: those of an 8K picture. What is larger was mistyped, and would take gigabytes; the core has the same limit."""
+"""Maximum number of pixels: those of an 8K image. Larger sizes are typing errors; the core has the same limit."""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class _Part(Strict):
 
 
 class Place(_Part):
-    """Where a joint's ellipse is on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame.
+    """Pose of a joint's ellipse on a limb: `position` [m] and `rotation`, a rotation vector [rad], in the limb's frame.
 
     Raises:
         BodyError: not three finite numbers each.
@@ -80,7 +80,7 @@ class Joint(_Part):
 
 
 def problems(values: dict[str, Any], error: ValidationError) -> str:
-    """What pydantic complains about, each by its key; parts of lists by their names."""
+    """Errors of pydantic, each with its key; parts of lists with their names."""
 
     def key(location: tuple[str | int, ...]) -> str:
         parts: list[str] = []

@@ -1,4 +1,4 @@
-"""How the body looks from somewhere: views project points of the root frame to a picture; limbs become outlines."""
+"""Projection of the body: views project points of the root frame to an image; limbs become silhouettes."""
 
 from __future__ import annotations
 

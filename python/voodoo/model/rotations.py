@@ -1,4 +1,4 @@
-"""Rotations as matrices, quaternions (x, y, z, w), turns (axis times angle) and Euler angles."""
+"""Rotations as matrices, quaternions (x, y, z, w), rotation vectors (axis times angle) and Euler angles."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _quaternion_of_turn(x: float, y: float, z: float) -> tuple[float, float, flo
 
 
 def _turn_of_quaternion(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
-    # Of the two quaternions of a rotation the one whose turn is less than half a circle.
+    # Of the two quaternions of a rotation, the one with an angle of at most half a circle.
     if w < 0.0 or (w == 0.0 and (x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0))))):
         x, y, z, w = -x, -y, -z, -w
     angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
@@ -97,7 +97,7 @@ def _product(
 
 
 def turned_between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
-    """The rotation (3, 3) at a share, 0 to 1, of the way from one to another, turning evenly about one axis."""
+    """Interpolated rotation (3, 3) at a fraction, 0 to 1, with constant angular velocity about one axis."""
     (ax, ay, az, aw), (bx, by, bz, bw) = quaternions(np.array([first, second])).tolist()
     turn = _turn_of_quaternion(*_product((-ax, -ay, -az, aw), (bx, by, bz, bw)))
     x, y, z = (value * fraction for value in turn)

@@ -1,5 +1,5 @@
-"""From recorded measurements to the tracker's Frame, the one way there is: prediction, gates, agreement of rays, weights
-from standard deviations. What is special about a sensor is in its adapter, see `voodoo.sensors.adapters`."""
+"""Converts recorded measurements to the tracker's `Frame`: prediction, gates, agreement of rays, weights from standard
+deviations. All commands use this front end. Sensor-specific code is in the adapters, see `voodoo.sensors.adapters`."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ class FrontEnd:
     """Feeds one tracker from recorded measurements of any kind.
 
     Args:
-        tracker: with a first pose (`reset`), or without one: then it is looked for in what comes.
+        tracker: with a first pose (`reset`), or without one; then the first pose is searched for in the measurements.
         settings: see FrontEndSettings.
-        starts: where a first pose may come from; None: from whatever is measured.
+        starts: sources of the first pose; None: every kind of measurement that can give one.
 
     Attributes:
-        search: whether somebody is tracked, and how the first pose was found.
-        memory: what the adapters keep of their sensors.
-        rays: of the last frame, with their trust.
+        search: whether a person is tracked, and how the first pose was found.
+        memory: state that the adapters keep between frames.
+        rays: rays of the last frame, with their trust.
     """
 
     def __init__(
         self, tracker: Tracker, *, settings: FrontEndSettings | None = None, starts: Starts | None = None
     ) -> None:
-        """Begin with the tracker as it is."""
+        """Start from the current state of the tracker."""
         self.tracker = tracker
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
@@ -51,20 +51,20 @@ class FrontEnd:
         self._begin()
 
     def _begin(self) -> None:
-        """A new person: nothing was measured of them."""
+        """Clear all state for a new person."""
         chosen = self.settings
-        # Somebody set the pose, or a source other than the tracker did.
+        # The pose was set by the user, or by a source other than the tracker.
         self._trusted_start = self.search.posed
         self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
 
     @property
     def frozen(self) -> tuple[str, ...]:
-        """Sensors that repeated themselves in the last frame, and were left out."""
+        """Sensors that repeated their measurement in the last frame and were left out."""
         return self._frozen.names
 
     @property
     def reports(self) -> dict[str, KeypointReport]:
-        """What became of the keypoints of each sensor's last image."""
+        """Outcome of the keypoints in each sensor's last image."""
         return self.memory.all("keypoints")
 
     @property
@@ -76,14 +76,14 @@ class FrontEnd:
         """Make the frame, step the tracker, and learn from the estimate.
 
         Returns:
-            The estimate; with status "searching" and without joints where nobody was found yet, or the person is gone.
+            The estimate. Its status is "searching" and it has no joints if no person was found yet, or the person has left.
 
         Raises:
-            MeasurementError: a measurement that cannot be used.
-            BodyError: a given first pose names a site that the body has not.
-            RecordingError: a picture that cannot be decoded.
+            MeasurementError: a measurement is invalid.
+            BodyError: a given first pose names a site that the body does not have.
+            RecordingError: an image cannot be decoded.
 
-        After any of them, tracker and front end are as they were.
+        After an error, tracker and front end are unchanged.
         """
         before = self._state()
         try:
@@ -113,14 +113,14 @@ class FrontEnd:
         self._trusted_start = False
 
     def _forget(self) -> None:
-        """The person is gone: whoever comes next moves and looks otherwise."""
+        """Clear what was learned about a person who left: the next one moves and looks different."""
         self.rays = []
         for adapter in all_adapters():
             adapter.forget(self.memory)
         self._begin()
 
     def _state(self) -> dict[str, Any]:
-        """All that `frame` changes, as it is."""
+        """Snapshot of all state that `frame` changes."""
         return {
             "rays": self.rays,
             "memory": copy(self.memory),
@@ -131,7 +131,7 @@ class FrontEnd:
         }
 
     def frame(self, recorded: RecordedFrame) -> Frame:
-        """The tracker's frame, without stepping; a tracker without a pose is put where a source of first poses finds one."""
+        """Make the tracker's frame without stepping. A tracker without a pose is reset to a first pose if a source finds one."""
         use = self.settings.use
         alive = self._frozen.without(recorded.measurements, use=use)
         if self.search.is_due(recorded.stamp):

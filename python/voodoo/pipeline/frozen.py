@@ -1,4 +1,4 @@
-"""Sensors that repeat themselves: a frozen depth camera would say with all its points that nobody moves."""
+"""Detects frozen sensors. The points of a frozen depth camera would all be false evidence that nobody moves."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from voodoo.sensors.adapters import adapters_of
 
 
 class FrozenSensors:
-    """Finds sensors that are frozen; `names` are those of the last frame."""
+    """Detects frozen sensors; `names` are those found in the last frame."""
 
     def __init__(self) -> None:
-        """Nothing seen yet."""
+        """Start without measurements."""
         self.names: tuple[str, ...] = ()
         self._contents: dict[str, npt.NDArray[Any]] = {}
 
     def __copy__(self) -> FrozenSensors:
-        """The same; what was measured is never changed in place."""
+        """A copy; measurements are shared because they are never changed in place."""
         twin = FrozenSensors()
         twin.names, twin._contents = self.names, dict(self._contents)
         return twin
@@ -33,11 +33,11 @@ class FrozenSensors:
         use: Sequence[str],
         idle: Callable[[Measurement], bool] | None = None,
     ) -> list[Measurement]:
-        """Those measurements whose sensor is not frozen.
+        """The measurements whose sensor is not frozen.
 
-        A sensor is frozen when it repeats its last measurement bit by bit while another one measures something new:
-        real sensors have noise. Only kinds in `use` count. What is `idle` is not used in this frame; pictures would have to be
-        decoded for it, so it is looked at only where another sensor repeats itself.
+        A sensor is frozen if it repeats its last measurement bit by bit while another sensor measures something new: real
+        sensors have noise. Only kinds in `use` count. Measurements in `idle` are not used in this frame. Comparing them would
+        require decoding images, so they are compared only when another sensor repeats its measurement.
         """
         repeats: list[Measurement] = []
         changes = False
@@ -68,7 +68,7 @@ def _content(item: Measurement, use: Sequence[str]) -> npt.NDArray[Any] | None:
 
 
 def _same(before: npt.NDArray[Any], content: npt.NDArray[Any]) -> bool:
-    # Noise shows in the first row that is looked at.
+    # Noise makes the first row differ, so comparing stops there.
     middle = len(before) // 2
     if before.shape != content.shape or before[middle : middle + 1].tobytes() != content[middle : middle + 1].tobytes():
         return False

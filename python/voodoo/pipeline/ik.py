@@ -1,5 +1,4 @@
-"""Inverse kinematics through a recording: known sites from its reference or a result file, silhouettes from its
-pictures."""
+"""Inverse kinematics (IK) for a recording: known sites from its reference or a result file, silhouettes from its images."""
 
 from __future__ import annotations
 
@@ -30,9 +29,9 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pictures: TypeAlias = Literal["depth", "color", "regions", "none"]
 
 KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")
-"""What J10 takes for known, and the trunk that carries its chains."""
+"""Sites that are known in J10, and the trunk that carries its chains."""
 _STAND_INS = {"head_center": "skullbase", "l_hand": "l_wrist", "r_hand": "r_wrist"}
-"""Taken for known where these are not: keypoint networks know wrists, not hands."""
+"""Substitutes for known sites that are missing: keypoint networks detect wrists, not hands."""
 _SAME_TIME_S = 0.02
 _LEARN = 41
 _REACHED_M = 0.05
@@ -48,10 +47,10 @@ class Positions:
 
     @classmethod
     def of(cls, recording: Recording, result: Track | None = None) -> Positions:
-        """Those of a result, or of the recording's reference.
+        """Positions from a result, or from the recording's reference.
 
         Raises:
-            VoodooError: the recording has no reference and no result was given, or the result is of another time.
+            VoodooError: the recording has no reference and no result was given, or the result covers another time span.
         """
         if result is not None:
             about = recording.info()
@@ -70,7 +69,7 @@ class Positions:
         return cls(recording.reference.stamps, recording.reference.names, recording.reference.positions)
 
     def at(self, stamp: float, sites: Sequence[str]) -> dict[str, FloatArray]:
-        """The sites known within 20 ms of a time; empty when none is."""
+        """Sites with a known position within 20 ms of a time; empty if there is none."""
         index = int(np.argmin(np.abs(self.stamps - stamp)))
         if abs(self.stamps[index] - stamp) > _SAME_TIME_S:
             return {}
@@ -90,30 +89,30 @@ def follow(
     rest: bool = True,
     wrap: Callable[[Iterable[RecordedFrame]], Iterable[RecordedFrame]] = iter,
 ) -> tuple[Track, dict[str, FloatArray]]:
-    """Postures of all frames from the known sites and the silhouettes.
+    """Solve the postures of all frames from the known sites and the silhouettes.
 
     Args:
         recording: read while solving.
-        tracker: at the first pose, see voodoo.pipeline.run.start_tracker; gives body and start.
-        positions: of the known sites.
-        sites: which ones are taken for known. None: those of head, trunk, hands and ankles that `positions` has; wrists and
-            skullbase where hands and head are lacking.
-        pictures: where silhouettes come from: "depth" cuts the person out by what hangs together with the known sites and the
-            last posture, or stands before the still scene; "color" by the difference from the still background; "regions" by
-            colors, learned where the person was, near the posture that the known sites have alone; "none": plain inverse
-            kinematics.
+        tracker: at the first pose, see voodoo.pipeline.run.start_tracker; provides body and start.
+        positions: positions of the known sites.
+        sites: names of the known sites. None: those of head, trunk, hands and ankles that `positions` has; wrists and
+            skullbase if hands and head are missing.
+        pictures: how silhouettes are segmented. "depth": surface connected to the known sites and the last posture, or in front
+            of the static scene. "color": difference from the static background. "regions": colors learned from the person in
+            earlier frames, near the posture solved from the known sites alone. "none": plain inverse kinematics.
         options: see voodoo.ik.Options.
-        warm: start each frame from the posture before; else solve it by itself, from the first pose.
-        watched: hands the frames on, and may show how far it is.
-        rest: with `warm`: what neither sites nor silhouettes tell goes back to the mean of the postures so far, see ik.Follower.
+        warm: start each frame from the previous posture; else solve each frame independently, from the first pose.
+        wrap: passes the frames on, e.g. to display progress.
+        rest: with `warm`: angles that sites and silhouettes leave free return to the mean of the postures so far, see
+            ik.Follower.
 
     Returns:
-        The result, angles included; status is "degraded" without a known site, or with targets more than 5 cm away,
-        else "tracking"; residual is the root mean square of the targets'. And the error (F,) [m] of every other site
-        of `positions`, NaN where unknown. Ctrl-C leaves the frames up to there, if any.
+        The result, including angles, and the error (F,) [m] of every other site of `positions`, NaN where unknown. The status
+        is "degraded" without a known site, or if targets are missed by more than 5 cm, else "tracking". The residual is the
+        root mean square of the target residuals. After Ctrl-C the frames solved so far, if any, are returned.
 
     Raises:
-        VoodooError: an unknown site, or one without positions, no known site at all, unknown words, damage in the recording.
+        VoodooError: an unknown site, a site without positions, no known site at all, an unknown value, or a damaged recording.
     """
     if pictures not in ("depth", "color", "regions", "none"):
         raise VoodooError(f'pictures: expected "depth", "color", "regions" or "none", found {pictures!r}')
@@ -200,7 +199,7 @@ def _silhouettes(
     *,
     level: bool,
 ) -> list[Silhouette]:
-    """Silhouettes of all pictures whose scene is known; `sites`: where the person is and was (3,) [m]."""
+    """Silhouettes of all images whose scene is known; `sites`: current and previous positions (3,) [m] of the person."""
     found = []
     for item in recorded.measurements:
         scene = scenes.get(item.sensor)
@@ -217,7 +216,7 @@ def _silhouettes(
 def _cut_out(
     regions: RegionSilhouettes, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
 ) -> list[Silhouette]:
-    """Silhouettes of all pictures by their colors, near a posture."""
+    """Silhouettes of all images by color, near a posture."""
     found = zip(regions.of(pictures, world_from_limb), pictures, strict=True)
     return [Silhouette(mask, camera=camera, world_from_camera=item.root_from_sensor) for (mask, camera), item in found]
 
@@ -225,7 +224,7 @@ def _cut_out(
 def _scenes(
     recording: Recording, positions: Positions, known: Sequence[str], pictures: Pictures
 ) -> dict[str, StillScene | StillBackground]:
-    """What each camera sees without the person, from pictures spread over the recording; cameras are taken to stand still."""
+    """Background image of each camera, from images spread over the recording; cameras are assumed to be static."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
     depths: dict[str, list[DepthImage]] = {}
     colors: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}

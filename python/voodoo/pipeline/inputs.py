@@ -1,4 +1,4 @@
-"""What `voodoo track` reads: a recording, and what is joined to it on the command line."""
+"""Inputs of `voodoo track`: a recording, and further data joined to it on the command line."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from voodoo.recordings.videos import picture_sources
 
 
 def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
-    """Sensor -> folder of "SENSOR=FOLDER" each.
+    """Parse "SENSOR=FOLDER" arguments to a mapping from sensor to folder.
 
     Raises:
-        VoodooError: another form, or a folder that does not exist.
+        VoodooError: an argument of another form, or a folder that does not exist.
     """
     folders = {}
     for word in words:
@@ -46,20 +46,20 @@ def join(
     bare: bool = False,
     left_out: LeftOut | None = None,
 ) -> Recording:
-    """The recording with all that is joined to it.
+    """The recording joined with all further data.
 
     Args:
-        recording: gives the frames.
-        keypoints: sensor -> folder of OpenPose JSON files, one for each of its images.
-        layout: of those keypoints.
+        recording: provides the frames.
+        keypoints: sensor -> folder of OpenPose JSON files, one file for each image of the sensor.
+        layout: layout of those keypoints.
         others: further recordings of the scene, marker files among them.
         offset: [s] added to their stamps.
-        markers: what the markers in marker files mean.
-        numbers: options of their loaders, for those that have them.
+        markers: meaning of the markers in marker files.
+        numbers: numeric options, passed to the loaders that have them.
         bare, left_out: see `open_recording`.
 
     Raises:
-        VoodooError: what cannot be read or does not belong together.
+        VoodooError: an input cannot be read, or the inputs do not belong together.
     """
     layout_of(layout)
     if not math.isfinite(offset):
@@ -82,15 +82,15 @@ def loader_options(
     numbers: Mapping[str, float] | None = None,
     use: Sequence[str] | None = None,
 ) -> dict[str, Any]:
-    """Of the options of `voodoo track` those that the loader of a recording takes.
+    """The options of `voodoo track` that the loader of a recording accepts.
 
-    Where pictures alone are to be used they make the frames: of a bag that has depth, of a folder that has keypoints.
+    If only images are to be used, they define the frames, even of a bag that has depth or a folder that has keypoints.
 
     Raises:
-        VoodooError: no loader for it.
+        VoodooError: no loader reads this recording.
     """
     if loader is None and not path.exists():
-        return {}  # opening it says so
+        return {}  # opening the recording reports the error
     alone = pictures_alone(path, loader, use)
     name = alone.get("loader") or loader or guess_loader(path)
     options: dict[str, dict[str, Any]] = {"markers": {"markers": markers}, "pose2sim": {"layout": layout}}
@@ -99,7 +99,7 @@ def loader_options(
 
 
 def pictures_alone(path: Path, loader: str | None, use: Sequence[str] | None) -> dict[str, Any]:
-    """Options of `open_recording` by which pictures make the frames, if `use` names nothing but what is seen in them."""
+    """Options of `open_recording` by which images define the frames, if `use` names only inputs extracted from images."""
     if use is None or "color" not in use or not set(use) <= {"color", "skin"} or not path.exists():
         return {}
     name = loader or guess_loader(path)

@@ -1,4 +1,4 @@
-"""Which measurements belong to one frame."""
+"""Groups measurements into frames."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from voodoo.recordings.recording import Recording
 def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFrame]:
     """The frames of a recording, each with the measurements that follow it within `wait` seconds.
 
-    A color picture taken a few milliseconds after a depth image belongs to it, not to the next one a whole period
-    later; the price is a latency of at most `wait`. The stamp of a frame stays that of its own measurement. Frames that are
-    complete stay as they are.
+    A color image taken a few milliseconds after a depth image belongs to that depth image, not to the next one a whole
+    period later. This adds a latency of at most `wait`. A frame keeps the stamp of its own measurement. Complete frames are
+    not changed.
 
     Raises:
-        RecordingError: damage in the recording.
+        RecordingError: the recording is damaged.
     """
     if recording.complete:
         yield from recording
@@ -26,7 +26,7 @@ def paired(recording: Recording, *, wait: float = 0.010) -> Iterator[RecordedFra
     held: RecordedFrame | None = None
     for recorded in recording:
         if held is not None:
-            # A fast sensor's next measurement, and the one a frame was made for, stay where they are.
+            # The next measurement of a fast sensor, and the measurement that defines a frame, stay in their own frames.
             has = {item.sensor for item in held.measurements}
             early = tuple(
                 item

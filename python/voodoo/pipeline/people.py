@@ -1,4 +1,4 @@
-"""From a recording to everybody in it: the loop of several people."""
+"""Tracking loop for several persons in a recording."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from voodoo.tracker import Tracker
 
 
 class PeopleFrontEnd:
-    """Feeds `voodoo.People` from recorded measurements: those that need nobody's pose, pictures in color, keypoints, skin.
+    """Feeds `voodoo.People` from recorded measurements: depth and other inputs that need no pose, color images, keypoints, skin.
 
     Args:
-        people: who is followed.
+        people: the tracked persons.
         settings: see FrontEndSettings.
     """
 
     def __init__(self, people: People, *, settings: FrontEndSettings | None = None) -> None:
-        """Nothing was measured yet."""
+        """Start without measurements."""
         self.people = people
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
         self.own = PeopleOwn(people, self.settings)
         self._frozen = FrozenSensors()
-        # Adapters ask who is tracked; nobody in particular is.
+        # Adapters query the tracked person; here there is no single one.
         self._nobody = Tracker(Body.human())
 
     def step(self, recorded: RecordedFrame) -> PeopleEstimate:
-        """Make the frame and step everybody.
+        """Make the frame and step all persons.
 
         Raises:
-            MeasurementError: a measurement that cannot be used; all is as it was.
+            MeasurementError: a measurement is invalid; the state is unchanged.
         """
         memory, frozen, own = copy(self.memory), copy(self._frozen), copy(self.own)
         try:
@@ -85,7 +85,7 @@ class PeopleFrontEnd:
                 if adapter.while_searching:
                     adapter.add(frame, item, context)
             if used and isinstance(item, ColorImage) and colored:
-                # Clothes tell persons apart.
+                # Colors of clothes distinguish persons.
                 frame.add_color(
                     item.image, camera=item.camera, world_from_sensor=item.root_from_sensor, source=item.sensor
                 )
@@ -94,12 +94,12 @@ class PeopleFrontEnd:
 
 @dataclass(frozen=True)
 class TrackedPeople:
-    """One frame with everybody in it.
+    """One frame with all persons in it.
 
     Args:
         index: number in the recording, from 0.
         recorded: the measurements.
-        estimate: who is there, and how.
+        estimate: the persons present and their poses.
         seconds: wall-clock time from measurements in memory to the estimate [s].
     """
 
@@ -120,12 +120,12 @@ def track_people(
 
     Args:
         recording: read while iterating.
-        people: who is followed; somebody new is found in depth images, and in keypoints of several cameras.
-        settings: what is used and how; None means all there is, see FrontEndSettings.of.
-        left_out: counts pictures that do not decode and frames that are refused, which are left out then; None: they are errors.
+        people: the tracked persons; new ones are detected in depth images, and in keypoints of several cameras.
+        settings: which inputs are used and how; None means all available ones, see FrontEndSettings.of.
+        left_out: counts undecodable images and rejected frames, which are then left out; None: they are errors.
 
     Raises:
-        VoodooError: a recording without depth images, damage in it, or a frame that is refused; names the frame.
+        VoodooError: a recording without depth images, a damaged one, or a rejected frame; names the frame.
     """
     chosen = settings or FrontEndSettings.of(recording)
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}

@@ -1,4 +1,4 @@
-"""What is one person's alone among several: their keypoints in several cameras, and their skin; and who is new."""
+"""Assigns keypoints in several cameras and skin to single persons, and detects new persons."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from voodoo.sensors.rays import add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
 
 _SAME_M = 0.4
-"""Who is found within this of somebody who is followed is the same person."""
+"""A person found within this distance of a tracked person is the same person."""
 _ROOT = "humanoid_root"
 
 
 @dataclass
 class _Person:
-    """What is kept of one person between frames."""
+    """State of one person that is kept between frames."""
 
     gate: SiteGate
     memory: Memory = field(default_factory=Memory)
@@ -39,32 +39,32 @@ class _Person:
 
 
 class PeopleOwn:
-    """Gives the keypoints and the skin of every picture to persons, and lets somebody in whom most of the cameras show.
+    """Assigns keypoints and skin of every image to persons, and adds a new person whom most of the cameras observe.
 
     Args:
-        people: who is followed.
-        settings: what is used, and how much it is believed.
+        people: the tracked persons.
+        settings: which inputs are used, and with which weights.
     """
 
     def __init__(self, people: People, settings: FrontEndSettings) -> None:
-        """Nobody is there."""
+        """Start without persons."""
         self._people = people
         self._settings = settings
         self._persons: dict[int, _Person] = {}
         self._cameras: set[str] = set()
 
     def __copy__(self) -> PeopleOwn:
-        """The same, with a memory of its own."""
+        """A copy with its own memory."""
         twin = PeopleOwn(self._people, self._settings)
         twin._persons = {number: copy(person) for number, person in self._persons.items()}
         twin._cameras = set(self._cameras)
         return twin
 
     def frames(self, stamp: float, measurements: Iterable[object]) -> dict[int, Frame]:
-        """Number of a person -> their keypoints and skin as rays; somebody new is followed from this frame on.
+        """Person number -> their keypoints and skin as rays; new persons are tracked from this frame on.
 
         Raises:
-            MeasurementError: keypoints or a picture that cannot be used.
+            MeasurementError: keypoints or an image are invalid.
         """
         used = list(measurements)
         images = [item for item in used if isinstance(item, KeypointImage) and "keypoints" in self._settings.use]
@@ -85,7 +85,7 @@ class PeopleOwn:
         return frames
 
     def learn(self, estimate: PeopleEstimate, measurements: Iterable[object]) -> None:
-        """Take up where everybody is, and how their skin looks."""
+        """Update the positions of all persons and their skin models."""
         pictured = [item for item in measurements if isinstance(item, ColorImage) and self.skin]
         there = {person.id: person.estimate for person in estimate}
         self._persons = {number: kept for number, kept in self._persons.items() if number in there}
@@ -97,7 +97,7 @@ class PeopleOwn:
 
     @property
     def skin(self) -> bool:
-        """Whether skin is looked for on each of them."""
+        """Whether skin is detected on each person."""
         return "skin" in self._settings.use and self._settings.skin.each
 
     def _new(self) -> _Person:
@@ -107,7 +107,7 @@ class PeopleOwn:
     def _come(
         self, stamp: float, rest: Sequence[KeypointImage], predicted: Mapping[int, Mapping[str, FloatArray]]
     ) -> dict[int, Mapping[str, FloatArray]]:
-        """Who is new, with their joints."""
+        """New persons, with their joints."""
         least = max(2, len(self._cameras) // 2 + 1)
         if sum(bool(item.people) for item in rest) < least:
             return {}
@@ -157,7 +157,7 @@ class PeopleOwn:
 
 
 def _own_adapters(item: KeypointImage | ColorImage, settings: FrontEndSettings) -> list[Adapter[Any]]:
-    """Adapters of what is one person's: color regions are everybody's."""
+    """Adapters whose output belongs to one person; color regions belong to all persons and are not included."""
     return [
         adapter
         for adapter in adapters_of(item)

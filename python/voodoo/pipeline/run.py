@@ -1,4 +1,4 @@
-"""From a recording to estimates: the one loop that the command line, the demo and the evaluation run."""
+"""Tracking loop for one person in a recording, which the command line, the demo and the evaluation share."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 
 def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, ...], list[VoodooError]]:
-    """Measurements without the pictures that do not decode, and why they do not; the rest is as good as ever."""
+    """Measurements without the undecodable images, and the reasons; the other measurements remain usable."""
     kept, errors = [], []
     for item in measurements:
         try:
@@ -39,14 +39,14 @@ def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, .
 
 @dataclass(frozen=True)
 class TrackedFrame:
-    """One frame with what the tracker made of it.
+    """One frame with its estimate.
 
     Args:
         index: number in the recording, from 0.
         recorded: the measurements.
-        estimate: the pose.
+        estimate: the estimated pose.
         seconds: wall-clock time from measurements in memory to the estimate [s]; pictures are decoded within it.
-        front_end: what made the tracker's frame of them: its rays and skin candidates are those of this frame.
+        front_end: the front end that made the tracker's frame; its rays and skin candidates are those of this frame.
     """
 
     index: int
@@ -71,13 +71,12 @@ def track(
     Args:
         recording: read while iterating.
         tracker: see start_tracker; one without a pose searches.
-        settings: what is used and how; None means all there is, see FrontEndSettings.of.
-        starts: where a first pose may come from; None: from whatever the recording offers.
-        left_out: counts pictures that do not decode and frames that the tracker refuses, which are left out then; None: they are
-            errors.
+        settings: which inputs are used and how; None means all available ones, see FrontEndSettings.of.
+        starts: sources of the first pose; None: all that the recording offers.
+        left_out: counts undecodable images and frames that the tracker rejects, which are then left out; None: they are errors.
 
     Raises:
-        VoodooError: damage in the recording, or a frame that the tracker refuses; names the frame.
+        VoodooError: the recording is damaged, or the tracker rejects a frame; names the frame.
     """
     front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
     for index, recorded, estimate, seconds in stepped(recording, front_end.step, left_out):
@@ -91,7 +90,7 @@ def stepped(
 
     Args:
         recording: read while iterating.
-        step: a front end's.
+        step: the step function of a front end.
         left_out: see track.
 
     Raises:

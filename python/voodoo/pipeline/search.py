@@ -1,4 +1,4 @@
-"""When a body is tracked, and when one is looked for: the state before the first pose, and after the person is gone."""
+"""Decides when a body is tracked and when one is searched for: before the first pose, and after the person has left."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 GONE_S = 3.0
-"""A body that a source found is gone when it was lost for so long [s]: neither source nor tracker found it again."""
+"""A body found by a source counts as gone after being lost for this time [s]: neither source nor tracker found it again."""
 
 RESTART_S = 0.5
-"""A body that was lost for so long [s] starts anew where a source finds it: the tracker's own search has had its turn."""
+"""After being lost for this time [s], a body restarts where a source finds it: until then the tracker's own search has
+priority."""
 
 
 class Search:
     """Finds the first pose of a tracker, in frames as they come.
 
     Args:
-        tracker: with a pose, or without one.
-        starts: which sources are asked; None: whatever a recording offers.
+        tracker: with or without a pose.
+        starts: which sources are used; None: all that a recording offers.
 
     Attributes:
         posed: whether a body is tracked.
-        found: the first pose that was taken last, if one of the sources found it.
+        found: the most recent first pose, if one of the sources found it.
     """
 
     def __init__(self, tracker: Tracker, starts: Starts | None = None) -> None:
@@ -42,16 +43,16 @@ class Search:
         self._supported: float | None = None
 
     def __copy__(self) -> Search:
-        """The same; what finders have seen is shared."""
+        """A copy; the finders' observations are shared."""
         twin = object.__new__(Search)
         vars(twin).update(vars(self))
         return twin
 
     def search(self, stamp: float, measurements: Sequence[Any], settings: FrontEndSettings) -> bool:
-        """Ask the sources, and put the tracker where one of them found somebody; whether one did.
+        """Query the sources and reset the tracker to the first pose found; returns whether there is one.
 
         Raises:
-            BodyError, MeasurementError: a given pose that is none of this body.
+            BodyError, MeasurementError: a given pose does not fit this body.
         """
         frame = StartFrame(stamp, measurements, self._tracker.body, settings)
         for finder in self._starts.finders:
@@ -71,7 +72,7 @@ class Search:
         return True
 
     def is_due(self, stamp: float) -> bool:
-        """Whether somebody is looked for at this time [s]: nobody is tracked, or a body that a source found is lost."""
+        """Whether the search is active at this time [s]: nobody is tracked, or a body that a source found is lost."""
         if not self.posed:
             return True
         lost = self._lost_for(stamp)
@@ -79,13 +80,13 @@ class Search:
 
     @property
     def by_tracker(self) -> bool:
-        """Whether the tracker looks for somebody in the depth images itself."""
+        """Whether the tracker itself searches for a person in the depth images."""
         return self._starts.by_tracker and self._tracker.can_search
 
     def learn(self, estimate: Estimate) -> Estimate:
-        """Take up what a step found; the same, or an estimate of nobody where the person is gone for good.
+        """Update with the estimate of a step. Returns it, or an empty estimate if the person has left.
 
-        A person that a source found is gone when lost for GONE_S; of one that it found itself the tracker tells.
+        A person that a source found has left after being lost for GONE_S. For an auto-initialized track, the tracker decides.
         """
         if str(estimate.status) == SEARCHING:
             self.posed, self.found = False, None
@@ -101,7 +102,7 @@ class Search:
         return estimate
 
     def _lost_for(self, stamp: float) -> float | None:
-        """For how long [s] a body that a source found by itself has been lost; None of other bodies."""
+        """How long [s] a body that a source found by itself has been lost; None for other bodies."""
         if self.found is None or self._supported is None or any(finder.given for finder in self._starts.finders):
             return None
         return stamp - self._supported

@@ -1,4 +1,4 @@
-"""Where a tracker starts: a first pose that is given or comes with a recording, or wherever somebody is found."""
+"""Start of a tracker: a first pose that is given or comes with a recording, or a search for a person."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ Position = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
 class Init(BaseModel):
-    """Where the body is in the first frame, or at a time: any subset of named positions that fixes the pose.
+    """First pose of the body, in the first frame or at a time: any subset of named positions that determines the pose.
 
     Args:
         height_m: stature [m], None if unknown.
-        stamp_s: the pose is that of the first frame at or after this time [s]; None: of the first frame.
-        frame: the positions' frame; None: the recording's root frame.
-        format_version: of the file.
+        stamp_s: the pose belongs to the first frame at or after this time [s]; None: to the first frame.
+        frame: coordinate frame of the positions; None: the root frame of the recording.
+        format_version: version of the file format.
         joints: site name to (x, y, z) [m].
     """
 
@@ -76,7 +76,7 @@ class Init(BaseModel):
             raise VoodooError(f"{path}: {_first_problem(error)}") from error
 
     def to_json(self) -> str:
-        """As `load` reads it, a joint a line."""
+        """JSON text that `load` reads, one joint per line."""
         entries = {
             "format_version": self.format_version,
             "height_m": self.height_m,
@@ -92,7 +92,7 @@ class Init(BaseModel):
         """The same pose in the recording's root frame.
 
         Raises:
-            RecordingError: the recording does not know where the frame is.
+            RecordingError: the recording has no transform from this frame.
         """
         if self.frame in (None, recording.root_frame):
             return self
@@ -117,14 +117,14 @@ class Init(BaseModel):
 
 
 Automatic: TypeAlias = Literal["auto"]
-"""The word for: look for somebody, whatever lies beside the recording."""
+"""Value that requests a search, even if a first pose comes with the recording."""
 AUTO: Automatic = "auto"
 Beginning: TypeAlias = Init | Track | Automatic
 """A first pose, an earlier result that has one, or neither."""
 
 
 def beginning_of(word: str | None) -> Beginning | None:
-    """What --init says: "auto", a JSON file (see Init.load), or a .csv or .npz of `voodoo track`.
+    """Read the value of --init: "auto", a JSON file (see Init.load), or a .csv or .npz of `voodoo track`.
 
     Raises:
         VoodooError: a file that is none of these; names it.
@@ -146,23 +146,23 @@ def start_tracker(
     use: Sequence[str] | None = None,
     detector: AnyDetector = "shipped",
 ) -> Tracker:
-    """A tracker for a recording: in its first pose, or without one, so that it looks for somebody.
+    """A tracker for a recording: in its first pose, or without a pose, so that it searches for a person.
 
     Args:
-        recording: gives the start when `init` is None, if one comes with it.
-        init: first pose, and stature unless `height` is given. One for a certain time, an earlier result and "auto" leave the
-            tracker without a pose; give `starts_of(init)` to `track`.
-        body: what to track; None means the default human, or two legs where there is nothing but a laser to start from.
+        recording: provides the start if `init` is None and it comes with one.
+        init: first pose, and stature unless `height` is given. A pose for a given time, an earlier result and "auto" leave the
+            tracker without a pose; then pass `starts_of(init)` to `track`.
+        body: body to track; None means the default human, or two legs if a laser is the only input to start from.
         height: stature of the default body [m]; not together with `body`.
         model: which human, see `Body.human`; None: "measured" without a first pose, else "full".
         config: None means the defaults.
-        markers: those worn on limbs become sites of the body.
-        use: kinds of inputs in use; None: all.
+        markers: markers worn on limbs, which become sites of the body.
+        use: kinds of inputs that are used; None: all.
         detector: see `Tracker`.
 
     Raises:
-        VoodooError: the first pose does not fix that of this body, both body and height are given, a marker stands for a
-            site that the body has not, or there is no pose and nothing by which this body could be found.
+        VoodooError: the first pose does not determine the pose of this body, both body and height are given, a marker stands
+            for a site that the body does not have, or there is neither a pose nor an input in which this body could be found.
     """
     if body is not None and height is not None:
         raise VoodooError("body and height: expected at most one of them, found both")
@@ -190,10 +190,10 @@ def start_tracker(
 
 
 def starts_of(init: Beginning | None, recording: Recording) -> Starts | None:
-    """Where a tracker without a pose takes its first one from, for `track`; None: from whatever the recording offers.
+    """Sources of the first pose of a tracker without one, for `track`; None: all that the recording offers.
 
     Raises:
-        RecordingError: the frame of the given pose is not known.
+        RecordingError: the coordinate frame of the given pose is unknown.
     """
     if isinstance(init, Init) and init.stamp_s is not None:
         return Starts((GivenStart(init.in_root_frame(recording).joints, init.stamp_s),), by_tracker=False)
@@ -209,17 +209,17 @@ def first_pose(
     after: float = float("-inf"),
     left_out: LeftOut | None = None,
 ) -> Estimate | None:
-    """Step a tracker until somebody is found; the estimate of that frame, or None.
+    """Step a tracker until a person is found; returns the estimate of that frame, or None.
 
     Args:
-        recording: read while looking.
+        recording: read while searching.
         tracker: without a pose; it has one afterwards.
         settings, starts: see `voodoo.pipeline.run.track`.
         after: frames before this time [s] are left out.
-        left_out: counts frames that the tracker refuses, which are left out; None: they are errors.
+        left_out: counts frames that the tracker rejects, which are left out; None: they are errors.
 
     Raises:
-        VoodooError: damage in the recording, or a frame that the tracker refuses.
+        VoodooError: the recording is damaged, or the tracker rejects a frame.
     """
     front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
     for recorded in paired(recording):
@@ -238,11 +238,11 @@ def first_pose(
 
 
 def pose_as_init(estimate: Estimate, body: Body) -> Init:
-    """The pose of a frame as a first pose, with its time and, of a person, the stature.
+    """The pose of a frame as a first pose, with its time and, for a person, the stature.
 
     Args:
         estimate: with a pose.
-        body: with the sizes it has.
+        body: the body with its current sizes.
     """
     common = Body.human(model="papers").site_names
     names = [name for name in body.site_names if name in common] or list(body.site_names)
@@ -251,7 +251,7 @@ def pose_as_init(estimate: Estimate, body: Body) -> Init:
 
 
 def stature(body: Body) -> float | None:
-    """Stature [m] of a body that is divided like the default human; None of another one."""
+    """Stature [m] of a body with the limbs of the default human; None for other bodies."""
     for model in get_args(HumanModel):
         human = Body.human(model=model)
         if human.limb_names == body.limb_names:
@@ -260,24 +260,24 @@ def stature(body: Body) -> float | None:
 
 
 def _upright(body: Body) -> float:
-    """Height [m] at rest from the lowest ankle to the highest place."""
+    """Height [m] at rest from the lowest ankle to the highest point."""
     heights = [place[2] for bone in bones(body) for place in (bone.head, bone.tip)]
     return float(max(heights) - min(heights))
 
 
 def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
-    """Kinds of inputs that a recording has and that are in use."""
+    """Kinds of inputs that a recording has and that are used."""
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     return has & set(use if use is not None else inputs_for(recording))
 
 
 def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
-    """Whether there is nothing but lasers to start from: nobody is found in pictures."""
+    """Whether lasers are the only inputs to start from, because no person can be found in images."""
     return _kinds(recording, use) - {"skin", "color"} == {"scan"}
 
 
 def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] | None) -> None:
-    """Refuse to look for a body that nothing in the recording can show."""
+    """Raise an error if no input of the recording can be used to find this body."""
     kinds, body = _kinds(recording, use), tracker.body
     blind = {"points", "skin", "color"}
     if not tracker.can_search:
@@ -294,7 +294,7 @@ def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] |
 
 
 def _first_problem(error: ValidationError) -> str:
-    """The first complaint of pydantic as "key: what was expected, found what"."""
+    """The first error of pydantic as "key: what was expected, found what"."""
     problem = error.errors(include_url=False)[0]
     key = ".".join(str(part) for part in problem["loc"])
     found = "" if problem["type"] in ("missing", "json_invalid") else f", found {short(problem['input'])}"

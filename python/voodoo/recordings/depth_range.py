@@ -1,4 +1,4 @@
-"""How far away a recording's depth images see: a wrong unit shows here before it shows as a lost body."""
+"""Range of depths in a recording's depth images; reveals a wrong unit before it causes a lost body."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from voodoo.measurements import DepthImage
 from voodoo.recordings.recording import Recording
 
 _IMAGES = 5
-"""Images at the start that are looked at until one shows something."""
+"""Number of images at the start that are searched for valid depths."""
 _NEAR_M, _FAR_M = 1.2, 8.0
-"""A camera that sees a person sees farther than the first, and sees the nearest half of what it sees before the second."""
+"""Plausible depths of a camera that observes a person: some are beyond the first limit, and the median is below the second."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class DepthRange:
     far: float
 
     def __str__(self) -> str:
-        """A line for people."""
+        """Readable line."""
         return f"{self.near:.2f} to {self.far:.2f} m (90 % of the first image, half of it before {self.middle:.2f} m)"
 
     @property
     def warning(self) -> str:
-        """What is wrong with it where no person is that near or that far; "" otherwise."""
+        """Description of the problem if depths are too small or too large for a person; "" otherwise."""
         if self.near < self.far < _NEAR_M or self.middle > _FAR_M:
             return (
                 f"depths of {self.near:.2f} to {self.far:.2f} m leave no room for a person: is the unit right? "
@@ -41,7 +41,7 @@ class DepthRange:
 
 
 def depth_range(recording: Recording) -> DepthRange | None:
-    """That of the first depth image in which something is seen; None without one, or where it cannot be read."""
+    """The range of the first depth image with valid depths; None without one, or if it cannot be read."""
     try:
         for recorded in islice(recording, _IMAGES):
             for item in recorded.measurements:
@@ -52,5 +52,5 @@ def depth_range(recording: Recording) -> DepthRange | None:
                         near, middle, far = (float(value) for value in np.percentile(meters, (5.0, 50.0, 95.0)))
                         return DepthRange(near, middle, far)
     except VoodooError:
-        return None  # whoever reads on is told
+        return None  # reading the frames reports the error
     return None

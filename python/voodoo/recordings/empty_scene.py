@@ -1,4 +1,4 @@
-"""Pictures of the scene without anybody in it, beside a recording: whose they are goes by their names."""
+"""Images of the empty scene beside a recording, assigned to cameras by file name."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from voodoo.recordings.stored import read_stored
 FOLDER = "background"
 PICTURES = (".png", ".jpg", ".jpeg")
 MOST = 100
-"""Pictures of a camera that are read, spread over all there are."""
+"""Maximum number of images read per camera, spread over all available ones."""
 
 
 def find_background(place: Path) -> Path | None:
-    """`background/` beside what lies at `place`, in it, or one folder up."""
+    """The folder `background/` beside `place`, in it, or one folder up."""
     folder = place if place.is_dir() else place.parent
     for candidate in (folder / FOLDER, folder.parent / FOLDER):
         if candidate.is_dir():
@@ -34,8 +34,8 @@ def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str,
     """The files of each camera: NAME.jpg, NAME_0.jpg, NAME-7.png, ... or all in a folder NAME/.
 
     Args:
-        folder: where they are.
-        cameras: sensor -> names that its pictures may have; a name that two cameras share is nobody's.
+        folder: folder of the images.
+        cameras: sensor -> names that its images may have; names shared by two cameras are ignored.
 
     Returns:
         Sensor -> its files in the order of their names; a sensor without any is missing.
@@ -55,7 +55,7 @@ def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str,
 def read_pictures(
     files: Mapping[str, Sequence[Path]], cameras: Mapping[str, Camera], *, left_out: LeftOut | None
 ) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
-    """Decode them, at most MOST of a camera.
+    """Decode the images, at most MOST per camera.
 
     Args:
         files: of each sensor.
@@ -89,7 +89,7 @@ def no_pictures(folder: str | Path, cameras: Mapping[str, Sequence[str]]) -> Rec
 
 
 def scene_words(folder: Path | None, files: Mapping[str, Sequence[Path]]) -> tuple[str, ...]:
-    """What is known of the empty scene, in words; () without a folder of pictures."""
+    """Description of the available images of the empty scene; () without a folder of images."""
     if folder is None:
         return ()
     listed = ", ".join(f"{sensor} {len(paths)}" for sensor, paths in files.items()) or "none that belongs to a camera"

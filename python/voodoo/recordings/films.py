@@ -1,4 +1,4 @@
-"""Pictures of one camera after the other: a video, or a folder of picture files."""
+"""Image sequences of one camera: a video, or a folder of image files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ByteImage: TypeAlias = npt.NDArray[np.uint8]
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v")
 _MOST_BYTES = 2**40
 _PADDING_PX = 16
-"""Coders of videos cut or fill pictures at the right and below to a multiple of 16 pixels, or leave that to the player."""
+"""Video codecs crop or pad images at the right and bottom to a multiple of 16 pixels, or leave that to the player."""
 
 
 class Pictures(ABC):
@@ -62,7 +62,7 @@ class Pictures(ABC):
         self.camera: Camera = replace(placed.camera, width=size[0], height=size[1])
 
     def __iter__(self) -> Iterator[ColorImage]:
-        """The pictures, each decoded when it is asked for; they are best asked for one after the other."""
+        """The images, each decoded on access; sequential access is fastest."""
         picture = self._reader()
         for index, stamp in enumerate(self.stamps):
             yield ColorImage(
@@ -71,7 +71,7 @@ class Pictures(ABC):
 
     @abstractmethod
     def _reader(self) -> Callable[[int], ByteImage]:
-        """What gives the picture of a number; damage is a RecordingError."""
+        """Function that returns the image with a number; raises a RecordingError if it is damaged."""
 
 
 class Video(Pictures):
@@ -96,7 +96,7 @@ class Video(Pictures):
         stored_rate = float(film.get(cv2.CAP_PROP_FPS))
         film.release()
         rate = stored_rate if rate is None else rate
-        # A picture takes a byte at least: a damaged head may announce billions.
+        # An image takes at least one byte: a damaged header may announce billions of images.
         if not (0 < count <= path.stat().st_size and np.isfinite(rate) and 0.0 < rate < 1e5):
             raise RecordingError(f"{path}: expected pictures at a rate above zero, found {count} at {rate} a second")
         super().__init__(sensor, placed, size)
@@ -113,7 +113,7 @@ class PictureFolder(Pictures):
         files: the pictures.
         sensor: name of the folder.
         placed: the camera, as calibrated.
-        clock: knows the stamps.
+        clock: converts names to stamps.
 
     Raises:
         RecordingError: the first picture cannot be read or has another size than calibrated, or two have one stamp.
@@ -140,7 +140,7 @@ def pictures_in(folder: Path) -> list[Path]:
 
 
 def _number(file: Path) -> str:
-    """The path with the stamp alone as its name: the last number of a name that is none."""
+    """The path with only the stamp as its name: the last number in a name that is not a number itself."""
     try:
         float(file.stem)
     except ValueError:
@@ -158,7 +158,7 @@ def _opened(path: Path) -> cv2.VideoCapture:
 
 
 class _VideoReader:
-    """Decodes a video one picture after the other; going back starts anew."""
+    """Decodes a video sequentially; going back reopens it."""
 
     def __init__(self, path: Path, count: int, size: tuple[int, int]) -> None:
         self._path, self._count, self._size = path, count, size

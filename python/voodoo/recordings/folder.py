@@ -31,7 +31,7 @@ _RATE = 30.0
 _MOST_NUMBERED = 1_000_000
 """Larger whole numbers are times in seconds, not numbers of images: nine hours of them."""
 _CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
-"""Seconds of a unit of the times since 1970 that have so many digits."""
+"""Number of digits of a time since 1970 -> its unit in seconds."""
 _PICTURES = (".png", ".jpg", ".jpeg")
 
 
@@ -70,9 +70,9 @@ class FolderRecording(Recording):
     Args:
         path: the folder.
         calibration: another calibration file.
-        rate: images per second where they are numbered; None: 30 is assumed, and said so.
+        rate: images per second if they are numbered; None: 30 is assumed, and reported.
         bare: read neither truth.csv nor init.json.
-        left_out: counts what cannot be used, which is then left out; None: it is refused.
+        left_out: counts unusable images, which are then left out; None: they are errors.
 
     Raises:
         RecordingError: no images, no calibration, names that are no stamps, or stamps that do not rise.

@@ -1,4 +1,4 @@
-"""More inputs beside a recording: keypoints of its own cameras, and other recordings of the same scene."""
+"""Joins further inputs to a recording: keypoints of its own cameras, and other recordings of the same scene."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from voodoo.recordings.recording import Recording, RecordingInfo
 
 
 class Joined(Recording):
-    """A recording whose frames also hold what other recordings measured since the frame before.
+    """A recording whose frames also hold the measurements of other recordings since the previous frame.
 
     All must be of the same scene, in the same root frame and by the same clock. Start, reference and the times of the
     frames are those of the first one.
 
     Args:
-        first: gives the frames.
-        others: what is added; their own start and reference are not used.
+        first: provides the frames.
+        others: recordings that are added; their own start and reference are not used.
         offset: [s] added to the stamps of the others.
 
     Raises:
-        RecordingError: one of the others measured nothing during the first, which tells of another clock.
+        RecordingError: one of the others has no measurements during the first, which indicates another clock.
     """
 
     def __init__(self, first: Recording, others: Sequence[Recording], *, offset: float = 0.0) -> None:
@@ -57,7 +57,7 @@ class Joined(Recording):
         streams = [_Ahead(other, self._offset) for other in self._others]
         for recorded in self._first:
             added = tuple(item for stream in streams for item in stream.until(recorded.stamp))
-            # The frame's own measurement stays the last one.
+            # The measurement that defines the frame stays last.
             yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
@@ -77,7 +77,7 @@ class Joined(Recording):
 
 
 class _Ahead:
-    """Measurements of a recording, handed out as time goes on."""
+    """Reads the measurements of a recording in step with time."""
 
     def __init__(self, recording: Recording, offset: float) -> None:
         self._frames = iter(recording)
@@ -85,7 +85,7 @@ class _Ahead:
         self._held: RecordedFrame | None = None
 
     def until(self, stamp: float) -> tuple[Measurement, ...]:
-        """What was measured since the last call, up to `stamp`: the last of each sensor."""
+        """Measurements since the last call, up to `stamp`: the last of each sensor."""
         found: tuple[Measurement, ...] = ()
         while True:
             held = self._held if self._held is not None else next(self._frames, None)
@@ -147,7 +147,7 @@ class WithKeypoints(Recording):
                 if isinstance(item, (ColorImage, DepthImage)) and count.get(item.sensor, -1) >= 0:
                     number = count[item.sensor]
                     if self._left_out is not None:
-                        # Where images were left out the others keep their numbers.
+                        # If images were left out, the others keep their numbers.
                         number = self._left_out.numbers.get((item.sensor, item.stamp), number)
                     count[item.sensor] = number + 1
                     items += self._keypoints(item, self._files[item.sensor][number])

@@ -1,7 +1,7 @@
-"""The one table that ties the keypoints of common networks to the sites of the body.
+"""Table that maps the keypoints of common networks to the sites of the body.
 
-Each row: site, {keypoint index: share}, spread [m]. A site is the sum of its keypoints times their shares; the spread
-is how far the network's idea of the joint lies from ours (a hip keypoint sits on the skin, a neck keypoint between
+Each row: site, {keypoint index: weight}, spread [m]. A site is the weighted sum of its keypoints; the spread is the
+distance between the network's definition of the joint and ours (a hip keypoint sits on the skin, a neck keypoint between
 the shoulders, ears below the middle of the head).
 Sites that would only repeat keypoints used already (a neck that a network computes from its two shoulders) are left
 out: they would count one error twice.

@@ -1,4 +1,4 @@
-"""What of a damaged recording is left out, so that the rest can be tracked."""
+"""Counts measurements of a damaged recording that are left out, so that the rest can be tracked."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from voodoo.errors import VoodooError
 
 
 class LeftOut:
-    """Measurements that cannot be used, counted by reason.
+    """Unusable measurements, counted by reason.
 
-    A loader that gets one leaves such measurements out and goes on; without one it raises at the first.
+    A loader that gets this object leaves such measurements out and continues; without it, the first one is an error.
 
     Attributes:
         counts: reason -> how many.
@@ -36,11 +36,11 @@ class LeftOut:
         self.first.setdefault(reason, str(words))
 
     def add_error(self, error: VoodooError) -> None:
-        """Count what raised an error."""
+        """Count the measurement that raised an error."""
         self.add(getattr(error, "reason", "refused"), error)
 
     def __len__(self) -> int:
-        """How many were left out."""
+        """Number of left-out measurements."""
         return sum(self.counts.values())
 
     @staticmethod

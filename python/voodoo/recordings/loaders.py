@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Loader:
-    """How one kind of recording is opened, and what it looks like on disk.
+    """Opener and file layout of one kind of recording.
 
     Args:
         find: imports what opens it; other loaders' libraries are not needed.
@@ -87,7 +87,7 @@ _ADVICE = {
     ".svo": ("a recording of a ZED", "its depth images as PNG files in a folder, or a ROS bag"),
     ".svo2": ("a recording of a ZED", "its depth images as PNG files in a folder, or a ROS bag"),
 } | dict.fromkeys((".mp4", ".avi", ".mov", ".webm", ".m4v"), _FILM)
-"""By suffix: what is not read, and what is needed instead."""
+"""Suffix of an unsupported file -> what is needed instead."""
 
 
 def open_recording(
@@ -104,7 +104,7 @@ def open_recording(
         path: file or folder.
         loader: name in LOADERS; guessed from the path when None.
         bare: leave out first pose, truth and reference, and read none of the files beside the recording that hold them.
-        left_out: what cannot be used (a repeated, late or undecodable image) is left out and counted here; None: it is refused.
+        left_out: counts unusable measurements (repeated, late or undecodable images), which are left out; None: they are errors.
         **options: of the loader, e.g. `use=("depth", "scan")`, `root_frame="odom"` for bags; see RosRecording,
             UtdMhadRecording and FolderRecording.
 
@@ -127,7 +127,7 @@ def open_recording(
         message = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
         raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {message}")
     recording = LOADERS[name].open(path, **options)
-    found = getattr(recording, "loader", name)  # a bag tells itself which of the two it is
+    found = getattr(recording, "loader", name)  # a bag itself reports which of the two kinds it is
     if found != name:
         raise RecordingError(f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {found!r}")
     return recording

@@ -1,4 +1,4 @@
-"""truth_people.csv beside a recording: where everybody is, and how much of them the camera sees."""
+"""truth_people.csv beside a recording: positions of all persons, and their visible fractions."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class PeopleTruth:
     Args:
         stamps: (F,) [s], rising; those at which anybody is in the scene.
         persons: (P,) numbers from 1, the same when a person comes back.
-        in_view: (F, P) share of a person's pixels that the depth camera sees, 0..1; 0 for who is not in the scene.
+        in_view: (F, P) fraction of a person's pixels that is visible to the depth camera, 0..1; 0 outside the scene.
         names: J site names.
-        positions: (F, P, J, 3) [m] in the recording's root frame; NaN for who is not in the scene.
+        positions: (F, P, J, 3) [m] in the recording's root frame; NaN for persons outside the scene.
     """
 
     stamps: FloatArray
@@ -50,7 +50,7 @@ class PeopleTruth:
         return f"PeopleTruth({len(self.persons)} persons, {len(self.stamps)} stamps, {len(self.names)} joints)"
 
     def of(self, name: str) -> FloatArray:
-        """Positions (F, P, 3) [m] of a site; NaN where the truth has it not."""
+        """Positions (F, P, 3) [m] of a site; NaN where it is missing."""
         if name not in self.names:
             return np.full((*self.in_view.shape, 3), np.nan)
         return np.asarray(self.positions[:, :, self.names.index(name)])

@@ -1,6 +1,6 @@
-"""Decoding of stored pictures that refuses damaged ones.
+"""Decoding of stored images with detection of damage.
 
-OpenCV fills what it cannot read with gray or black and says nothing, so the container is checked first.
+OpenCV silently fills unreadable parts with gray or black, so the container is checked first.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from voodoo.errors import RecordingError
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _JPEG_MAGIC = b"\xff\xd8\xff"
 _JPEG_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
-"""Marks of a JPEG that tell its size."""
+"""JPEG markers of segments that contain the image size."""
 
 
 def check_png(data: bytes, source: object) -> None:

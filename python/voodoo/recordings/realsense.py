@@ -1,4 +1,4 @@
-"""What is peculiar about the .bag of librealsense's recorder (2.55): see docs/how-to/cameras.md.
+"""Special features of the .bag of librealsense's recorder (2.55): see docs/how-to/cameras.md.
 
 After every image four bytes follow (float32, meters of a unit of depth); calibration lies on `.../Depth_0/info/camera_info`;
 frame ids are numbers, and the pose of a stream is on `.../Depth_0/tf/N`, where N numbers what the poses are relative to.
@@ -34,12 +34,12 @@ def frame_name(topic: str) -> str:
 
 
 def info_topic(topic: str) -> str:
-    """Where the calibration of an image topic lies."""
+    """Topic of the calibration of an image topic."""
     return f"{topic.removesuffix('/image/data')}/info/camera_info"
 
 
 def units_topic(topic: str) -> str | None:
-    """Where the unit of depth [m] of an image topic lies; None of another topic."""
+    """Topic of the depth unit [m] of an image topic; None for other topics."""
     found = _STREAM.match(topic)
     return None if found is None else f"{found[1]}/option/Depth_Units/value"
 
@@ -59,6 +59,6 @@ def lens_topic(topic: str) -> str | None:
 
 
 def with_lens(camera: Camera, words: Message) -> Camera:
-    """The camera with the lens model that the recorder's words tell: its CameraInfo calls every model plumb_bob."""
+    """The camera with the lens model given in the recorder's strings: its CameraInfo calls every model plumb_bob."""
     inverse = "model=inverse brown conrady" in str(getattr(words, "data", "")).lower()
     return replace(camera, model="inverse_plumb_bob") if inverse and camera.model == "plumb_bob" else camera

@@ -1,4 +1,4 @@
-"""What every loader returns: a recording that can be iterated, and what is known about it."""
+"""Base class of the recordings that loaders return: iterable frames and metadata."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Joints(TypedDict):
 
 
 class Start(_Joints, total=False):
-    """Where the body is in the first frame: `joints` [m] in the root frame and, if known, its stature `height_m`."""
+    """Pose of the body in the first frame: `joints` [m] in the root frame and, if known, its stature `height_m`."""
 
     height_m: float
 
@@ -36,7 +36,7 @@ class Reference:
         stamps: (F,) [s].
         names: J site names.
         positions: (F, J, 3) [m] in the recording's root frame; NaN = missing.
-        exact: True for rendered truth, False for another tracker's opinion.
+        exact: True for rendered truth, False for an estimate of another tracker.
     """
 
     stamps: FloatArray
@@ -79,7 +79,7 @@ class RecordingInfo:
         sensors: what is yielded; the first one makes the frames.
         unused: (topic, reason) of what was recognized but is not yielded.
         reference: words on the reference, or "none".
-        notes: what to mind about this kind of recording.
+        notes: remarks on this kind of recording.
     """
 
     name: str
@@ -115,17 +115,17 @@ class RecordingInfo:
 
 
 class Recording(ABC):
-    """Base of all recordings: sized, iterable as often as one likes, read while iterating.
+    """Base class of all recordings: sized, iterable any number of times, read while iterating.
 
     Attributes:
         path: what was opened.
         name: short name for reports.
         root_frame: frame all poses and the reference are in.
-        start: where the body is in the first frame, or None.
+        start: pose of the body in the first frame, or None.
         reference: joint positions to compare with, or None.
-        assumed: what nothing in the recording tells and was assumed, or is not used, in words.
-        people: where everybody is, of a recording of several people with a truth, or None.
-        complete: whether each frame holds all that was measured at its time, so that nothing of the next one belongs to it.
+        assumed: descriptions of assumptions that the recording does not confirm, and of unused data.
+        people: exact positions of all persons, if the recording has such a truth, or None.
+        complete: whether each frame holds all measurements of its time, so that none of the next frame belongs to it.
     """
 
     assumed: tuple[str, ...] = ()
@@ -138,7 +138,7 @@ class Recording(ABC):
     complete: bool = False
 
     def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
-        """Sensor -> pictures (H, W, 3) BGR uint8 of what that camera sees when nobody is there; {}: none are known.
+        """Sensor -> images (H, W, 3) BGR uint8 of the empty scene; {}: there are none.
 
         Raises:
             RecordingError: a picture that cannot be read.
@@ -187,7 +187,7 @@ def reference_words(reference: Reference | None, people: PeopleTruth | None = No
 
 
 def refuse_blank(item: DepthImage, where: object) -> None:
-    """Refuse a depth image in which nothing returned.
+    """Raise an error for a depth image without valid depths.
 
     Raises:
         RecordingError: it is blank.

@@ -45,7 +45,7 @@ from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_tru
 
 _MILLIMETER = 0.001
 STILL_FRAMES = ("odom", "map")
-"""Where a robot that moves says it is (REP-105): smoothly, and without drift but with jumps."""
+"""Fixed frames of a moving robot (REP-105): the first is smooth, the second without drift but with jumps."""
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -227,7 +227,7 @@ class RosRecording(Recording):
         )
 
     def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
-        """Meters of a unit of 16-bit depth: what librealsense's recorder wrote, unless somebody tells."""
+        """Scale of 16-bit depth in meters: the value of librealsense's recorder, unless the user sets one."""
         units = realsense.units_topic(topic)
         if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
@@ -268,7 +268,7 @@ class RosRecording(Recording):
             return asked
         if self._own_root != OWN_ROOTS[0]:
             return self._own_root
-        # Before a robot that moves people and rooms stand still in the frame it moves in.
+        # For a moving robot, persons and rooms are static in the frame in which the robot moves.
         moving = [frame for frame in STILL_FRAMES if self._tree.moves(frame, self._own_root)]
         return next(
             (frame for frame in moving if all(self._tree.reaches(frame, s.frame) for s in sources)), self._own_root
@@ -296,7 +296,7 @@ class RosRecording(Recording):
                 self._tree.add_edge(*frames, 0.0, stream_from_reference, static=True)
 
     def _check_together(self, sources: Sequence[TopicSource]) -> None:
-        """Refuse pictures of several cameras of which nobody tells how they stand to each other; tell what is left out."""
+        """Reject images of several cameras whose relative poses are unknown; report what is left out."""
         if len(self._sources) == 1:
             raise RecordingError(
                 f"{self.path}: expected transforms between the cameras on tf or tf_static, found none between "
@@ -308,7 +308,7 @@ class RosRecording(Recording):
             self.assumed = (*self.assumed, f"not used: {', '.join(left)}; voodoo info says why")
 
     def _names_of_cameras(self) -> dict[str, tuple[str, ...]]:
-        """Topic -> by which names pictures of its empty scene may be known."""
+        """Topic -> possible names of images of its empty scene."""
         return {
             s.topic: (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame"))
             for s in self._sources.values()

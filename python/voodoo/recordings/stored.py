@@ -1,4 +1,4 @@
-"""Reading the files of a recording: regular ones, and none larger than it can be meant."""
+"""Reading the files of a recording: only regular files of plausible size."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MOST_BYTES = 2**28
 
 
 def check_stored(path: Path, expected: str, *, most: int = MOST_BYTES) -> None:
-    """Refuse what is no regular file (a FIFO waits for ever, a device never ends), and files that are too large.
+    """Reject files that are not regular (a FIFO blocks forever, a device never ends) or too large.
 
     Args:
         path: the file.

@@ -1,4 +1,4 @@
-"""Pictures of several cameras as frames: one for each picture of the first camera, with what the others saw at that time."""
+"""Groups images of several cameras to frames: one for each image of the first camera, with those of the others at its time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import pairwise
 from voodoo.measurements import Measurement, RecordedFrame
 
 FARTHEST_S = 0.25
-"""A picture taken so much earlier or later [s] belongs to no frame, however rare the pictures are."""
+"""An image with a larger time difference [s] belongs to no frame, even at low frame rates."""
 _AHEAD = 2
 
 

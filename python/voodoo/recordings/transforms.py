@@ -15,7 +15,7 @@ from voodoo.model.rotations import turned_between
 from voodoo.recordings.ros_messages import Message
 
 WAVERS_M, WAVERS_RAD = 0.05, math.radians(2.0)
-"""A robot whose odometry stays within this stands: how far wheels and gyroscopes drift in a recording."""
+"""A robot whose odometry stays within these limits is standing: they cover the drift of wheels and gyroscopes in a recording."""
 
 
 def matrix(translation: Message, rotation: Message, source: object) -> FloatArray:
@@ -49,7 +49,7 @@ def inverse(a_from_b: FloatArray) -> FloatArray:
 
 
 def between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
-    """The rigid transform (4, 4) at a share, 0 to 1, of the way from one to another: straight on, turning evenly."""
+    """Interpolated rigid transform (4, 4) at a fraction, 0 to 1: linear translation, constant angular velocity."""
     result = np.eye(4)
     result[:3, :3] = turned_between(first[:3, :3], second[:3, :3], fraction)
     result[:3, 3] = (1.0 - fraction) * first[:3, 3] + fraction * second[:3, 3]
@@ -76,7 +76,7 @@ class _Edge:
 
     def keep(self, since: float, until: float) -> None:
         low, high = bisect_left(self.stamps, since), bisect_right(self.stamps, until)
-        # The newest that is too old still tells something: errors name its age.
+        # The newest transform, even if too old, is kept, because errors name its age.
         low = min(low, max(len(self.stamps) - 1, 0))
         self.stamps, self.transforms = self.stamps[low:high], self.transforms[low:high]
 
@@ -116,7 +116,7 @@ class TransformTree:
         return tuple(sorted(self._neighbors))
 
     def add(self, message: Message, *, static: bool) -> None:
-        """Take up a tf2_msgs/TFMessage."""
+        """Add a tf2_msgs/TFMessage."""
         for item in message.transforms:
             parent, child = str(item.header.frame_id).lstrip("/"), str(item.child_frame_id).lstrip("/")
             where = f"{self.source}: transform {parent!r} from {child!r}"
@@ -127,7 +127,7 @@ class TransformTree:
             self.add_edge(parent, child, stamp, transform, static=static)
 
     def add_edge(self, parent: str, child: str, stamp: float, transform: FloatArray, *, static: bool) -> None:
-        """Take up parent_from_child (4, 4) at a stamp [s]."""
+        """Add parent_from_child (4, 4) at a stamp [s]."""
         if (parent, child) not in self._edges:
             self._edges[parent, child] = _Edge()
             self._neighbors.setdefault(parent, []).append(child)

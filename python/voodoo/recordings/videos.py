@@ -37,7 +37,7 @@ from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_start, read_truth
 
 _ROOMS = ("videos", "images", ".")
-"""Where videos or image folders are looked for, the first place that has some."""
+"""Folders that are searched for videos or image folders; the first one that has some is used."""
 _OTHERS = (FOLDER, "keypoints", "pose", "calibration", "Calibration", "pose-3d", "kinematics")
 
 

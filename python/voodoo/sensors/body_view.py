@@ -1,4 +1,4 @@
-"""What a depth camera sees of the body, in the picture of a color camera beside it; and what may be the still scene."""
+"""Registers the depth measurements near the body to the image of a color camera, and finds the still scene."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def body_view(
     step: int = 1,
     scene: StillDepth | None = None,
 ) -> BodyView:
-    """Where, in a color image, a depth camera beside it saw something within the box around the body.
+    """Registers the points of a depth image within the box around the body to a color image.
 
     Args:
         depth: (H, W) uint16 or float32; 0 and NaN mean "no return".
@@ -41,7 +41,7 @@ def body_view(
         joints: (N, 3) predicted positions of the body [m].
         margin: enlargement of their box [m].
         step: every step-th row and column of the depth image is used.
-        scene: what the depth camera saw before; takes up this image.
+        scene: the still scene of the depth camera; is updated with this image.
 
     Returns:
         Mask of the color image and the points; the gaps between the depth pixels are closed in the mask.
@@ -59,9 +59,9 @@ def body_view(
         world_from_depth=world_from_depth,
         color_from_depth=_between(*poses),
         color_camera=color_camera,
-        # A few centimeters of the body's distance move what is beyond by less than a pixel.
+        # A few centimeters of the body's distance change the field of view in the color image by less than a pixel.
         beyond=lambda away: _beyond(lens, poses[1], color_camera, poses[0], max(round(away, 1), 0.1)),
-        # A depth pixel covers this many color pixels; one and a half of them close the gaps and the edge filter's rim.
+        # A depth pixel covers this many color pixels; one and a half times as many close the gaps and the edge filter's rim.
         reach=math.ceil(1.5 * step * color_camera.fx / lens.fx),
         step=step,
         margin=margin,
@@ -70,7 +70,7 @@ def body_view(
 
 
 _SIDE, _OUTWARDS = 16, 32
-"""Places on each side of a depth image's border, and on the way from its middle to each of them."""
+"""Number of samples on each side of a depth image's border, and on the line from its center to each of them."""
 
 
 def _corners(camera: Camera) -> FloatArray:
@@ -83,8 +83,8 @@ def _corners(camera: Camera) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _border(camera: Camera) -> FloatArray:
-    """Rays (4 _SIDE _OUTWARDS, 3) with z = 1 from the middle of an image to places on its border, place by place; NaN where the
-    lens has none."""
+    """Rays (4 _SIDE _OUTWARDS, 3) with z = 1 through samples on lines from the center of an image to its border, line by line;
+    NaN where the lens model has none."""
     right, bottom = camera.width - 1.0, camera.height - 1.0
     corners = np.array([(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)])
     fraction = np.arange(_SIDE)[:, None] / _SIDE
@@ -107,14 +107,14 @@ def _between(color_pose: bytes, depth_pose: bytes) -> FloatArray:
 def _beyond(
     depth_camera: Camera, depth_pose: bytes, color_camera: Camera, color_pose: bytes, z: float
 ) -> npt.NDArray[np.bool_]:
-    """(H, W) of the color image: True where the depth camera does not look, at a distance from it [m]; read-only."""
+    """(H, W) of the color image: True outside the depth camera's field of view at a distance from it [m]; read-only."""
     world_from_depth, world_from_color = (np.frombuffer(pose).reshape(4, 4) for pose in (depth_pose, color_pose))
     bent = depth_camera.distorted or color_camera.distorted
     rays = _border(depth_camera) if bent else _corners(depth_camera)
     border = (z * rays) @ world_from_depth[:3, :3].T + world_from_depth[:3, 3]
     contour = color_camera.project(in_sensor(world_from_color, border))
     if bent:
-        # Of each way from the middle outwards the last place that both lenses show.
+        # On each line from the center outwards, the last sample that both lenses map.
         contour = contour.reshape(-1, _OUTWARDS, 2)
         last = np.isfinite(contour).all(axis=2).cumprod(axis=1).sum(axis=1) - 1
         contour = contour[last >= 0, last[last >= 0]]

@@ -1,5 +1,4 @@
-"""What is dropped from a depth image before it becomes points: flying pixels at depth edges, and what is out of
-range."""
+"""Filters depth images before they become points: removes flying pixels at depth edges, and pixels out of range."""
 
 from __future__ import annotations
 
@@ -20,12 +19,12 @@ DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
 @dataclass(frozen=True)
 class DepthFilter:
-    """Drops pixels that are not surface.
+    """Removes pixels that do not lie on a surface.
 
-    A flying pixel of a time-of-flight camera mixes the light of two surfaces and hangs between them, so it has
-    neighbors clearly nearer AND clearly farther along one of the four lines through it. A pixel of a slanted surface
-    has that too, but with equal steps: it is kept when it lies near the middle of two neighbors that are less than
-    `slant` apart. A pixel that has no neighbor at its own depth at all is a flying one as well.
+    A flying pixel of a time-of-flight camera mixes the light of two surfaces and lies between them. So along one of the
+    four lines through it, one neighbor is clearly nearer and the other clearly farther. A pixel of a slanted surface has
+    such neighbors too, but less than `slant` apart, and is kept. A pixel without any neighbor at its own depth is a flying
+    pixel as well.
 
     Args:
         edge: depths that differ by more than this belong to different surfaces [m], at 1 m; it grows with the depth.
@@ -50,7 +49,7 @@ class DepthFilter:
             )
 
     def apply(self, image: DepthArray, *, meters_per_unit: float = 0.001) -> DepthArray:
-        """A copy of the image (H, W) with 0 where a pixel is dropped.
+        """Returns a copy of the image (H, W) with 0 where a pixel is removed.
 
         Args:
             image: uint16 or float32; 0 and NaN mean "no return".
@@ -62,7 +61,7 @@ class DepthFilter:
         return kept
 
     def dropped(self, image: DepthArray, *, meters_per_unit: float = 0.001) -> npt.NDArray[np.bool_]:
-        """(H, W): True for pixels that returned something that is not used.
+        """Returns a mask (H, W): True for pixels with a return that is removed.
 
         Raises:
             MeasurementError: not a 2-D uint16 or float32 array, or no unit.
@@ -96,7 +95,7 @@ class DepthFilter:
 
 
 def depth_points(depth: DepthImage) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Points (H*W, 3) [m] of a depth image in the root frame, row by row, and which pixels (H*W,) measured anything."""
+    """Points (H*W, 3) [m] of a depth image in the root frame, row by row, and which pixels (H*W,) have a return."""
     z = depth.image.astype(np.float64).reshape(-1) * depth.meters_per_unit
     rays = depth.camera.rays().reshape(-1, 2)
     valid = np.isfinite(z) & (z > 0.0) & np.isfinite(rays).all(axis=1)
@@ -108,6 +107,6 @@ def depth_points(depth: DepthImage) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
 
 
 def meters(depth: DepthImage) -> FloatArray:
-    """Depths (height, width) [m], NaN where nothing returned."""
+    """Depths (height, width) [m], NaN where there is no return."""
     z = depth.image.astype(np.float64) * depth.meters_per_unit
     return np.asarray(np.where(z > 0.0, z, np.nan))

@@ -1,4 +1,4 @@
-"""Where a laser has looked through: what stands there later has come, and is no furniture."""
+"""A free-space map of a planar laser: returns from cells that were free before come from new objects, not from furniture."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from voodoo.model.projection import transform
 from voodoo.sensors.pixels import FloatArray
 
 CELL_M, SIZE_M = 0.10, 40.0
-"""Side of a cell, half a leg; and of the map, around where the laser was first."""
+"""Side of a cell, half the width of a leg; and side of the map, centered on the laser's first position."""
 _LEAST_PASSES = 3
 _FRACTION = 0.2
-"""A cell that returned more than this share of the beams that came to it may be furniture, as may its neighbors."""
+"""A cell that returned more than this fraction of the beams that reached it may be furniture, as may its neighbors."""
 _ALL_NEW = 0.25
-"""Where more than this share of all returns has come, the map is wrong: the frame moves."""
+"""If more than this fraction of all returns is new, the map is invalid because the frame moves."""
 
 
 class FreeSpace:
-    """A map of cells in the plane of one laser, in a frame that stands still."""
+    """A grid map in the plane of one laser, in a static frame."""
 
     def __init__(self) -> None:
-        """Nothing seen yet."""
+        """Start with an empty map."""
         self._origin: FloatArray | None = None
         count = round(SIZE_M / CELL_M)
         self._passes = np.zeros((count, count), dtype=np.float32)
         self._hits = np.zeros((count, count), dtype=np.float32)
 
     def come(self, scan: LaserScan) -> npt.NDArray[np.bool_]:
-        """Which valid returns (N,) of a scan stand where its laser looked through before, and have not stood there long.
+        """Which valid returns (N,) of a scan lie in cells that beams passed before and that have seldom returned one.
 
-        None at all where nearly everything is new.
+        All are False if more than a quarter of them is new.
         """
         places = transform(scan.root_from_sensor, scan.points())[:, :2]
         if self._origin is None or not len(places):
@@ -46,7 +46,7 @@ class FreeSpace:
         return new & (new.mean() <= _ALL_NEW)
 
     def learn(self, scan: LaserScan) -> None:
-        """Take up a scan; a laser that has left the map starts a new one."""
+        """Update the map with a scan; a laser that has left the map's inner half starts a new one."""
         origin = scan.root_from_sensor[:2, 3]
         if self._origin is None or np.abs(origin - self._origin).max() > SIZE_M / 4.0:
             self._origin = np.array(origin)
@@ -65,7 +65,7 @@ class FreeSpace:
             grid += observed
 
     def _cells(self, places: FloatArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-        """Rows and columns (M, 2) of the places (N, 2) that lie in the map, and which do (N,)."""
+        """Rows and columns (M, 2) of the positions (N, 2) within the map, and which these are (N,)."""
         origin = np.zeros(2) if self._origin is None else self._origin
         cells = np.floor((places - origin + SIZE_M / 2.0) / CELL_M).astype(np.intp)
         inside = np.asarray(((cells >= 0) & (cells < len(self._passes))).all(axis=1))

@@ -1,4 +1,4 @@
-"""Gates around predicted sites: what is too far from where a site must be is not a measurement of it."""
+"""Gates around predicted sites, which reject measurements too far from the prediction."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from voodoo.sensors.pixels import FloatArray, ray_distance
 class SiteGate:
     """Accepts measurements near predicted sites, per site and source, and opens slowly while nothing is accepted.
 
-    A gate that stays closed would never let a tracker that drifted off come back, so it widens by `growth` for every
-    second since the last measurement of that site it accepted, up to `widest`.
+    With a fixed gate a tracker that has drifted could never recover. So the radius grows by `growth` for every second since
+    the last accepted measurement of the site, up to `widest`.
 
     Args:
         radius: [m].
@@ -43,7 +43,7 @@ class SiteGate:
         self.core = _core.SiteGate(self.radius, self.growth, self.widest)
 
     def __copy__(self) -> SiteGate:
-        """The same, with a memory of its own."""
+        """Copy the gate with its state."""
         twin = SiteGate.__new__(SiteGate)
         vars(twin).update(vars(self), core=copy(self.core))
         return twin

@@ -1,11 +1,11 @@
-"""Which kinds of inputs there are: those of the package, and those of adapters that were registered."""
+"""The known kinds of inputs: those of the package, and those of registered adapters."""
 
 from __future__ import annotations
 
 from voodoo.names import INPUTS
 
 _known: dict[str, str] = {kind: "color" if kind == "skin" else kind for kind in INPUTS}
-"""Kind -> what recordings call its sensors."""
+"""Kind of input -> kind of its sensors in recordings."""
 
 
 def inputs() -> tuple[str, ...]:
@@ -15,16 +15,16 @@ def inputs() -> tuple[str, ...]:
 
 
 def inputs_of(recorded: str) -> tuple[str, ...]:
-    """Which inputs a recording's sensor of a kind serves (see `SensorInfo`)."""
+    """Returns the inputs that a sensor of a recorded kind provides (see `SensorInfo`)."""
     return tuple(kind for kind, name in _known.items() if name == recorded)
 
 
 def add_kind(kind: str, recorded: str) -> None:
-    """Make a kind known; `recorded` is what recordings call its sensors."""
+    """Register a kind; `recorded` is the kind of its sensors in recordings."""
     _known[kind] = recorded
 
 
 def remove_kind(kind: str) -> None:
-    """Forget a kind that was added."""
+    """Unregister a kind that was added."""
     if kind not in INPUTS:
         _known.pop(kind, None)

@@ -32,12 +32,12 @@ __all__ = [
 
 
 def body_with_markers(body: Body, markers: Mapping[str, tuple[str, Sequence[float]]]) -> Body:
-    """The body with a site for every marker that is worn on a limb.
+    """Returns the body with an additional site for every marker that is worn on a limb.
 
     A measurement is then `frame.add_position(marker, position, weight=...)`.
 
     Args:
-        body: stays as it is.
+        body: the original body, which is not changed.
         markers: marker name -> (limb, (x, y, z) [m] in the limb's frame: z along its axis from the proximal end).
 
     Raises:
@@ -75,11 +75,11 @@ def add_markers(
     """Add the markers of one instant to a frame; missing ones are left out.
 
     Args:
-        frame: gets the positions.
-        trajectories: of all markers.
-        index: which instant.
-        sites: marker name -> site name; others are not used.
-        weight: of each, e.g. SensorModel().weight(0.01).
+        frame: the frame that the positions are added to.
+        trajectories: trajectories of all markers.
+        index: index of the instant.
+        sites: marker name -> site name; other markers are not used.
+        weight: weight of each marker, e.g. SensorModel().weight(0.01).
         world_from_markers: rigid (4, 4); identity by default.
         source: name for `Estimate.sources`.
 

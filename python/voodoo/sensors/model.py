@@ -1,14 +1,15 @@
 """The sensor model: a standard deviation for every datum, which becomes its weight (K06 IV-C).
 
-K06 weighs each datum "with a measure that describes its accuracy" and gives bare numbers: 3-D point 1, face 30, hand
-20. Here every number has one meaning. A datum whose position is uncertain by `sigma` meters weighs
+K06 weights each datum "with a measure that describes its accuracy" and gives numbers without units: 3-D point 1, face 30,
+hand 20. Here the weight follows from a standard deviation. A datum whose position has the standard deviation `sigma` in
+meters has the weight
 
     weight = min( (reference_sigma / sigma)^2 / sharing, max_weight )
 
-with `reference_sigma` = 0.10 m. A ray with a sigma of 2.2 cm at the body then weighs 20, one of 1.8 cm 30: what a skin
-region's center is good for, so the published numbers are those of this model. `sharing` is the number of data that
-share one error: the pixels of a depth image are as many measurements of the surface, but the misfit between model and
-clothes is common to a patch of them. With 25 (a patch of 5 x 5) a time-of-flight point at 3 m weighs 1.
+with `reference_sigma` = 0.10 m. A ray with a sigma of 2.2 cm at the body then has weight 20, and one of 1.8 cm has weight 30.
+This is the accuracy of the center of a skin region, so the published numbers follow from this model. `sharing` is the number
+of data that share one error: every pixel of a depth image measures the surface, but the misfit between model and clothes is
+common to a patch of pixels. With 25 (a patch of 5 x 5) a time-of-flight point at 3 m has weight 1.
 
 The tracker's run time does not depend on weights.
 """
@@ -41,8 +42,8 @@ class SensorModel:
     """How standard deviations become weights.
 
     Args:
-        reference_sigma: a datum this uncertain [m] weighs 1.
-        max_weight: no datum weighs more; a number that claims more accuracy than the body model has is not believed.
+        reference_sigma: standard deviation [m] of a datum with weight 1.
+        max_weight: upper limit of weights, because no measurement is more accurate than the body model.
 
     Raises:
         MeasurementError: a number is not above zero.
@@ -75,7 +76,7 @@ class SensorModel:
         if not sharing >= 1.0:
             raise MeasurementError(f"sharing: expected a number of data >= 1, found {sharing!r}")
         if isinstance(sigma, float) and 0.0 < sigma < math.inf:
-            # Rays come one by one, and an array of one number costs ten times as much.
+            # Rays are weighted one by one, and an array of one number takes ten times as long.
             return min((self.reference_sigma / sigma) ** 2 / sharing, self.max_weight)
         values = np.asarray(sigma, dtype=np.float64)
         if not np.isfinite(values).all() or (values <= 0.0).any():
@@ -84,7 +85,7 @@ class SensorModel:
         return float(weights) if weights.ndim == 0 else weights
 
     def sigma(self, weight: float) -> float:
-        """The standard deviation [m] that a bare weight, such as those of K06, stands for."""
+        """Returns the standard deviation [m] that corresponds to a weight, such as those of K06."""
         _check("weight", weight, zero=False)
         return self.reference_sigma / math.sqrt(weight)
 
@@ -128,7 +129,7 @@ STRUCTURED_LIGHT = RangeNoise(quadratic=0.0015)
 """A Kinect-like camera: 1.5 mm z^2."""
 LIDAR_CAMERA = RangeNoise(constant=0.0025, linear=0.001)
 PLANAR_LASER = RangeNoise(constant=0.030)
-"""A beam is good to 1 cm; the legs of the model are not those in the trousers."""
+"""A beam is accurate to 1 cm; the rest is the difference between the model's legs and the trousers."""
 
 
 def stereo_noise(*, focal: float, baseline: float, disparity_sigma: float = 0.5) -> RangeNoise:
@@ -151,9 +152,9 @@ def stereo_noise(*, focal: float, baseline: float, disparity_sigma: float = 0.5)
 class PixelNoise:
     """Standard deviation of a feature in an image.
 
-    At depth z it is uncertain across the ray by `pixels / confidence * z / focal`; a confidence of 0.5 doubles it.
-    `spread` is how far the feature itself is from the site it stands for (a network's idea of a hip), in meters at
-    any depth.
+    At depth z the standard deviation perpendicular to the ray is `pixels / confidence * z / focal`, so a confidence of 0.5
+    doubles it. `spread` is added in quadrature: the distance in meters, at any depth, between the feature and the site
+    that it represents (networks define a hip differently).
 
     Args:
         pixels: at confidence 1 [px].
@@ -172,7 +173,7 @@ class PixelNoise:
         _check("spread", self.spread)
 
     def sigma(self, z: float, focal: float, *, confidence: float = 1.0, spread: float | None = None) -> float:
-        """Standard deviation [m] across the ray.
+        """Standard deviation [m] perpendicular to the ray.
 
         Args:
             z: depth of the predicted site along the optical axis [m].

@@ -1,4 +1,4 @@
-"""Pictures as a pinhole camera would have taken them: contours of limbs are straight lines' projections only there."""
+"""Undistorts images: only in a pinhole camera are the contours of limbs projections of straight lines."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import numpy.typing as npt
 from voodoo.model.camera import Camera
 
 MOST_PIXELS = 640 * 480
-"""Larger pictures are reduced: an edge is found to a pixel or two, which here is a centimeter at four meters."""
+"""Larger images are reduced. An edge is located to a pixel or two, which at this size is a centimeter at four meters."""
 
 
 class Pinhole:
-    """Takes the lens distortion out of a camera's pictures, and reduces large ones.
+    """Removes the lens distortion from the images of a camera, and reduces large ones.
 
     Args:
-        camera: as calibrated.
-        most: pixels of a picture that is not reduced.
+        camera: the calibrated camera.
+        most: greatest number of pixels of an image that is not reduced.
 
     Attributes:
-        original: the camera that was given.
-        camera: the pinhole camera of the pictures that `apply` returns: the same focal length and center, but for the size.
+        original: the calibrated camera.
+        camera: the pinhole camera of the images that `apply` returns, with the focal length and center scaled to their size.
     """
 
     def __init__(self, camera: Camera, *, most: int = MOST_PIXELS) -> None:
-        """Find where each pixel comes from."""
+        """Compute the maps for undistortion."""
         self.original = camera
         fraction = min(1.0, float(np.sqrt(most / (camera.width * camera.height))))
         width, height = max(round(camera.width * fraction), 1), max(round(camera.height * fraction), 1)
@@ -44,14 +44,14 @@ class Pinhole:
         if camera.distorted:
             rays = self.camera.rays().reshape(-1, 2).astype(np.float64)
             places = camera.project(np.column_stack([rays, np.ones(len(rays))]))
-            # The reduced picture is what is looked into.
+            # Convert to pixels of the reduced image.
             places = (places + 0.5) * (x, y) - 0.5
-            # What the lens does not show is off the picture.
+            # Pixels that the lens does not map come from outside the image.
             maps = np.nan_to_num(places, nan=-9.0).astype(np.float32).reshape(height, width, 2)
             self._maps = cv2.convertMaps(maps[..., 0], maps[..., 1], cv2.CV_16SC2)
 
     def apply(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-        """A picture (H, W, 3) of the original camera as the pinhole camera would have taken it; black where it saw nothing."""
+        """Returns an image (H, W, 3) of the original camera undistorted and reduced; black outside its field of view."""
         size = (self.camera.width, self.camera.height)
         if image.shape[1::-1] != size:
             image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

@@ -22,7 +22,7 @@ def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:
         pixels: (N, 2) coordinates (u, v).
 
     Returns:
-        (N, 2); NaN where the lens puts no direction.
+        (N, 2); NaN where the lens model has no ray for the pixel.
 
     Raises:
         MeasurementError: the shape is not (N, 2).
@@ -48,10 +48,10 @@ def world_rays(
 
 
 def checked_camera(camera: object) -> Camera:
-    """A calibration, checked.
+    """Check that the argument is a calibration and return it.
 
     Raises:
-        MeasurementError: something else, or none.
+        MeasurementError: it is something else, or None.
     """
     if not isinstance(camera, Camera):
         raise MeasurementError(f"camera: expected a Camera, the calibration of the image, found {camera!r}")
@@ -59,7 +59,7 @@ def checked_camera(camera: object) -> Camera:
 
 
 def in_sensor(world_from_sensor: FloatArray, points: npt.ArrayLike) -> FloatArray:
-    """World points (N, 3) in the sensor's frame."""
+    """World points (N, 3) in the sensor frame."""
     return np.asarray((np.asarray(points, dtype=np.float64) - world_from_sensor[:3, 3]) @ world_from_sensor[:3, :3])
 
 
@@ -71,5 +71,5 @@ def ray_distance(origin: FloatArray, directions: FloatArray, points: FloatArray)
 
 
 def lengths(vectors: FloatArray) -> FloatArray:
-    """Of vectors (..., 3)."""
+    """Lengths of vectors (..., 3)."""
     return np.asarray(np.sqrt(np.add.reduce(vectors * vectors, axis=-1)))

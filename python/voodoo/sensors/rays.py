@@ -1,4 +1,4 @@
-"""Rays on which named sites were seen, from any number of cameras, and how far they agree with each other."""
+"""Rays on which named sites were detected, from any number of cameras, and their mutual agreement."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ SiteRay = _core.SiteRay
 def agreed(
     rays: Sequence[SiteRay], *, predicted: Mapping[str, npt.NDArray[np.float64]], scale: float = 0.08
 ) -> list[SiteRay]:
-    """The rays with a trust that tells how well those of one site agree.
+    """Returns the rays with a trust that measures how well those of one site agree.
 
     With three rays or more to a site, its position is found by reweighted least squares from the predicted position;
     the Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it is the ray's trust, s = `scale`
-    [m]. A camera whose network confuses a joint thus loses to the others instead of pulling the limb half way. Fewer
-    rays keep their trust.
+    [m]. So a camera whose network confuses a joint is outvoted by the others instead of pulling the limb half way. With
+    fewer than three rays the trust is unchanged.
     """
     groups: dict[str, list[int]] = {}
     for index, ray in enumerate(rays):
@@ -50,7 +50,7 @@ def _trust(
 ) -> FloatArray:
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     offsets = np.einsum("nij,nj->ni", across, origins)
-    # The prediction takes part as one weak datum, so that parallel rays leave no direction open.
+    # The prediction is a weak prior, so that the position is determined for parallel rays too.
     prior = 0.01 * float(information.max())
     point = start
     for _ in range(_STEPS):
@@ -68,10 +68,10 @@ def _trust(
 
 
 def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_trust: float = 0.05) -> int:
-    """Add rays with the weights of their standard deviations; those trusted less than `min_trust` are left out.
+    """Add rays with the weights of their standard deviations; rays with a trust below `min_trust` are left out.
 
     Returns:
-        How many were added.
+        The number of rays added.
 
     Raises:
         MeasurementError: a standard deviation that is not a number above zero.

@@ -1,4 +1,4 @@
-"""Which inputs are used, and how much each is believed."""
+"""Settings of the inputs: which are used, and with what weights."""
 
 from __future__ import annotations
 
@@ -24,37 +24,36 @@ ByteImage: TypeAlias = npt.NDArray[np.uint8]
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 WHOLE_BODY = ("depth", "points", "keypoints", "markers")
-"""Inputs that tell the whole body's pose, so that color regions are used beside them only where somebody asks for it."""
+"""Inputs that determine the whole body's pose; beside them color regions are used only on request."""
 
 
 def default_inputs() -> tuple[str, ...]:
-    """What is used unless somebody says otherwise: all inputs but color regions."""
+    """Returns the default inputs: all but color regions."""
     return tuple(kind for kind in inputs() if kind != "color")
 
 
 @dataclass(frozen=True)
 class FrontEndSettings:
-    """What is used, and how much it is believed.
+    """Which inputs are used, and with what weights.
 
     Args:
-        use: kinds of inputs, by default all there are but "color"; measurements of other kinds are left out.
-        model: standard deviation to weight.
+        use: kinds of inputs, by default all but "color"; measurements of other kinds are ignored.
+        model: converts standard deviations to weights.
         depth_noise: of depth images and point clouds; the weight is that at the predicted range of the body. None:
-            every point weighs 1, as in the papers (a time-of-flight point at 3 m).
-        scan_noise: of laser scans; None: every return weighs 1.
-        sharing: neighboring depth pixels that share one error.
-        scan_sharing: the same for a scan, whose beams lie farther apart.
+            every point has weight 1, as in the papers (a time-of-flight point at 3 m).
+        scan_noise: of laser scans; None: every return has weight 1.
+        sharing: number of neighboring depth pixels that share one error.
+        scan_sharing: number of neighboring returns of a scan that share one error; its beams lie farther apart.
         keypoint_noise: of 2-D keypoints.
-        min_confidence: keypoints believed less are not used.
+        min_confidence: keypoints with a lower confidence are not used.
         gate_radius, gate_growth, gate_widest: see SiteGate.
         agreement: scale [m] of `agreed`; 0 switches it off.
         marker_sigma: standard deviation [m] of a marker that is given without one.
-        depth_filter: what is dropped from depth images; None takes them as they are.
+        depth_filter: removes pixels from depth images; None uses the images unchanged.
         skin: settings of the skin-color cue.
-        exclude: boxes (low, high), two corners [m] in the root frame: nobody is looked for in them, and nothing in them is the
-            body's.
-        empty_scene: sensor -> pictures (H, W, 3) of what that camera sees when nobody is there, for color regions.
-        draw_regions: pictures of the result show what is the body by its colors, and the edges found along its contour.
+        exclude: boxes (low, high), two corners [m] in the root frame, that contain no person: points in them are not used.
+        empty_scene: sensor -> images (H, W, 3) of the scene without people, for color regions.
+        draw_regions: overlays show the body's color regions and the edges detected along its contour.
         ground_z: height [m] of the floor in a root frame whose z points up; None: not known.
 
     Raises:
@@ -82,7 +81,7 @@ class FrontEndSettings:
     ground_z: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the kinds, and what would silently let everything in."""
+        """Check the kinds, the boxes, and the confidence, which would accept every keypoint if it were NaN."""
         check_confidence(self.min_confidence)
         for box in self.exclude:
             _check_box(box)
@@ -92,10 +91,11 @@ class FrontEndSettings:
 
     @classmethod
     def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:
-        """The defaults for a recording, with the inputs in `use`.
+        """Returns the defaults for a recording, with the inputs in `use`.
 
-        Without `use` all inputs, color regions only where nothing tells the whole body's pose (see WHOLE_BODY), and no skin
-        in pictures that are all there is, nor of several persons. The floor is known where the root frame is one of LEVEL_FRAMES.
+        Without `use` all inputs are used, with exceptions: color regions are used only if no input determines the whole body's
+        pose (see WHOLE_BODY). Skin is not used if color images are the only input, nor for several persons. The floor is known
+        if the root frame is one of LEVEL_FRAMES.
 
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
@@ -114,7 +114,7 @@ class FrontEndSettings:
 
 
 def inputs_for(recording: Recording) -> tuple[str, ...]:
-    """The inputs by which a recording is tracked unless somebody says otherwise, see `FrontEndSettings.of`."""
+    """Returns the default inputs for tracking a recording, see `FrontEndSettings.of`."""
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
@@ -123,7 +123,7 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
 
 
 def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
-    """Which places (N, 3) [m] lie in one of the boxes."""
+    """Which positions (N, 3) [m] lie in one of the boxes."""
     inside = np.zeros(len(places), dtype=bool)
     for low, high in boxes:
         inside |= ((places >= low) & (places <= high)).all(axis=1)
@@ -131,7 +131,7 @@ def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.N
 
 
 def _check_box(box: Box) -> None:
-    """Refuse a box that excludes nothing."""
+    """Raise an error for a box that excludes nothing."""
     low, high = box
     if not all(math.isfinite(value) for value in (*low, *high)) or not all(
         a < b for a, b in zip(low, high, strict=True)

@@ -41,14 +41,14 @@ class StereoPair:
     Args:
         left, right: calibrations, of the same size.
         left_from_right: (4, 4) pose of the right camera in the left one's optical frame; its x is the baseline.
-        nearest, farthest: range of depths to look for [m].
+        nearest, farthest: range of depths to search [m].
         block: side of the matched squares [px], odd.
         disparity_sigma: standard deviation of a disparity [px].
-        max_difference: disparities of left and right may differ by this [px]; where they differ more, one of the
-            cameras does not see the place.
+        max_difference: greatest difference between the disparities of left and right [px]; where it is exceeded, the point is
+            not visible to one of the cameras.
 
     Raises:
-        MeasurementError: sizes differ, the right camera is not to the right, a range that is none, or a fish-eye lens.
+        MeasurementError: sizes differ, the right camera is not to the right, an empty range, or a fish-eye lens.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Places from rays, without a prediction: where several cameras see one site."""
+"""Triangulates sites from the rays of several cameras, without a prediction."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.rays import SiteRay
 
 AGREE_M = 0.08
-"""A ray that passes a place by this much speaks for it a quarter as loud as one through it: networks err by 2 to 6 cm."""
+"""A ray at this distance from a position has a quarter of the weight of a ray through it; networks have errors of 2 to 6 cm."""
 TRUSTED = 0.25
-"""A ray with less trust does not see the place."""
+"""A ray with less trust does not support the position."""
 _STEPS = 20
 _MOVED_M = 1e-4
 _PARALLEL = 1e-3
-"""Rays whose directions differ by less than 2 degrees (sine squared) fix no place."""
+"""Rays whose directions differ by less than 2 degrees (sine squared) do not determine a position."""
 
 
 @dataclass(frozen=True, eq=False)
 class TriangulatedSite:
-    """Where rays meet.
+    """A position triangulated from rays.
 
     Args:
         position: (3,) [m], world.
@@ -38,15 +38,15 @@ class TriangulatedSite:
 
     @property
     def visible_in(self) -> npt.NDArray[np.bool_]:
-        """Which rays (N,) see it."""
+        """Which rays (N,) support it."""
         return np.asarray(self.trust >= TRUSTED)
 
 
 def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> TriangulatedSite | None:
-    """Where the rays of one site meet, by robust least squares; None where fewer than two rays agree.
+    """Triangulates the rays of one site by robust least squares; returns None if fewer than two rays agree.
 
-    The meeting points of all pairs are tried; the one that most rays agree with is refined with the Geman-McClure weight
-    `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it, s = `scale` [m].
+    Every pair of rays gives an initial position. The one with the most support from all rays is refined with the
+    Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it, s = `scale` [m].
     """
     if len(rays) < 2:
         return None

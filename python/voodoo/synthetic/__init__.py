@@ -1,1 +1,1 @@
-"""Made-up depth images of the body, with exact truth."""
+"""Synthetic depth images of the body, with exact truth."""

@@ -1,4 +1,4 @@
-"""What R07 section 5.2 did to its images."""
+"""Image disturbances of R07 section 5.2."""
 
 from __future__ import annotations
 

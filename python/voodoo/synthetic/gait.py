@@ -19,9 +19,9 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 _STRIDE_M = 1.4
 """Two steps."""
 _TURN_S = 0.4
-"""Who goes on in another direction turns for so long."""
+"""Duration of a turn when the walking direction changes."""
 _STANDS_M = 0.05
-"""Who comes no farther than this from one stop to the next stands."""
+"""A person who moves less than this from one stop to the next is standing."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Somebody walks by in front of the person of a recording: a made-up body in real or rendered pictures."""
+"""Adds a synthetic person who walks by in front of the person of a recording, in real or rendered images."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class Walker:
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """What a made-up depth camera does to exact depths.
+    """Noise model of a synthetic depth camera.
 
     Args:
         sigma_m, sigma_square: standard deviation `sigma_m + sigma_square z^2` [m] at z meters.
@@ -94,7 +94,7 @@ class Noise:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What is seen, by whom, for how long.
+    """Scene, camera and duration of a synthetic recording.
 
     Args:
         name: of the recording.

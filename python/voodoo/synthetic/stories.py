@@ -20,7 +20,7 @@ Points: TypeAlias = Sequence[tuple[float, float, float]]
 
 CAMERA_HEIGHT_M = 1.1
 AWAY_S = 5.0
-"""How long somebody is out of view in `returning`."""
+"""How long a person is out of view in `returning`."""
 MOVES_M, TURNS_RAD = 1.5, math.radians(30.0)
 """How far the camera of `robot` moves and turns."""
 _CLOTHES: tuple[tuple[Color, Color], ...] = (
@@ -183,7 +183,7 @@ def _recorded(
 
 def _furniture(chance: np.random.Generator) -> tuple[Box, ...]:
     """A wall, a cupboard as high as a person, a table and a chair."""
-    # Nobody walks beyond 4.2 m: the furniture begins behind that.
+    # Persons stay within 4.2 m: the furniture begins behind that.
     wall = float(chance.uniform(5.4, 5.9))
     side = float(chance.choice((-1.0, 1.0)))
 

@@ -1,1 +1,1 @@
-"""Pictures, films and Rerun: what the tracker sees and finds."""
+"""Images, videos and Rerun logs of measurements and estimates."""

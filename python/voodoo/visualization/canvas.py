@@ -1,4 +1,4 @@
-"""The picture that adapters draw their measurements on: of one camera, or from above."""
+"""The image on which adapters draw their measurements: that of a camera, or a view from above."""
 
 from __future__ import annotations
 

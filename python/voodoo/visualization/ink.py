@@ -1,4 +1,4 @@
-"""What all pictures share: their type, colors, and pixel coordinates as OpenCV draws them."""
+"""Common definitions for drawing: image type, colors, and pixel coordinates for OpenCV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures to look at: limbs, joints and measured points drawn over what the sensor saw."""
+"""Overlay images: limbs, joints and measured points drawn over the sensor's image."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Overlay:
         self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
         self._range: tuple[float, float] | None = None
         self._origin: float | None = None
-        # What a view from above shows until somebody is found.
+        # Center of the view from above until a person is found.
         self._center = (0.0, 0.0, 0.0)
         found: dict[str, Pictured] = {}
         for recorded in islice(paired(recording), _LOOK_AHEAD):
@@ -93,7 +93,7 @@ class Overlay:
     def draw_people(
         self, recorded: RecordedFrame, estimate: PeopleEstimate, bodies: Mapping[int, Body], *, index: int
     ) -> Picture:
-        """Draw everybody in a frame, each in a color of their own and with their number.
+        """Draw all persons in a frame, each with a separate color and number.
 
         Args:
             recorded: the measurements; needs the picture of a camera.

@@ -1,4 +1,4 @@
-"""Several people drawn into a picture: each in a color of their own, with their number."""
+"""Draws several persons into an image, each with a separate color and number."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ABOVE_M = 0.2
 
 
 def draw_people(picture: Picture, estimate: PeopleEstimate, bodies: Mapping[int, Body], view: View) -> None:
-    """Draw everybody who has a pose, the farthest first.
+    """Draw all persons with a pose, the farthest first.
 
     Args:
         picture: drawn into.

@@ -1,4 +1,4 @@
-"""What adapters log a step of Rerun with."""
+"""Logging of a step to Rerun, used by adapters."""
 
 from __future__ import annotations
 

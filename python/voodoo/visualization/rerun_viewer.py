@@ -1,4 +1,4 @@
-"""See what the tracker sees: measurements, limbs, rays, pictures and curves on one timeline, in Rerun.
+"""Shows measurements, limbs, rays, images and curves on one timeline, in Rerun.
 
 Rerun is an optional extra: `pip install 'voodoo-tracker[view]'`.
 """
@@ -165,7 +165,7 @@ class Viewer:
         rr = self._rr
         self._set_time(estimate.stamp)
         if recorded is not None:
-            # Pictures and points belong to nobody in particular.
+            # Images and points are not assigned to persons.
             log = StepLog(rr, self._stream, nobody(estimate.stamp), Body.human(), _MOST_POINTS, self._whole)
             for item in recorded.measurements:
                 for adapter in adapters_of(item):
@@ -194,7 +194,7 @@ class Viewer:
         self._stream.set_time("time", **{clock: stamp})
 
     def _clear(self, path: str) -> None:
-        """Nobody is there; the meshes have to be sent again for the next person."""
+        """Clear the body; the meshes must be sent again for the next person."""
         self._stream.log(path, self._rr.Clear(recursive=True))
         self._shapes = {name: shape for name, shape in self._shapes.items() if not name.startswith(f"{path}/")}
 
@@ -280,7 +280,7 @@ class Viewer:
 
 
 def _alike(one: TaperedEllipticCylinder | None, other: TaperedEllipticCylinder) -> bool:
-    """Whether nobody sees a difference: sizes are refined in every frame, and a mesh takes kilobytes."""
+    """Whether the difference is invisible: sizes are refined in every frame, and a mesh takes kilobytes."""
     sizes = ("length", "a0", "b0", "a1", "b1")
     return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _VISIBLE_M for name in sizes)
 

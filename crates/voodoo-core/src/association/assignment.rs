@@ -1,4 +1,4 @@
-//! Steps 2-4: which candidate belongs to which limb, fewer of them, and the closest points (K06 IV-B.2-4).
+//! Steps 2-4: assigns candidates to limbs, samples them, and finds the closest points (K06 IV-B.2-4).
 
 use crate::association::correspondence::LimbMatches;
 use crate::association::nearest_limb::{NONE, NearestLimb};
@@ -11,18 +11,17 @@ use crate::shape::Region;
 /// Working memory of the assignment.
 #[derive(Debug, Default)]
 pub(crate) struct Assignment {
-    /// Candidates of each limb, ascending.
+    /// Candidate indices of each limb, ascending.
     members: Vec<Vec<u32>>,
     search: NearestLimb,
     /// The nearest limb of each candidate.
     nearest: Vec<u32>,
-    /// Which limbs' boxes hold each candidate, where the policy asks for it.
+    /// For each candidate, which limbs' boxes contain it; only filled when the overlap policy needs it.
     inside: Vec<bool>,
 }
 
 impl Assignment {
-    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; those of `buried` limbs to
-    /// others.
+    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; `buried` limbs get none.
     pub(crate) fn assign(
         &mut self,
         body: &Body,
@@ -33,11 +32,11 @@ impl Assignment {
         buried: &[bool],
     ) {
         let Self { members, search, nearest, inside } = self;
-        // One more for those in no limb's box.
+        // One more list for the candidates outside all boxes.
         members.resize_with(poses.len() + 1, Vec::new);
         for limb in members.iter_mut() {
             limb.clear();
-            // Room at once, not when a limb comes to hold more than ever before.
+            // Reserves the full capacity at once, so that no frame reallocates.
             limb.reserve(candidates.len());
         }
         nearest.resize(candidates.len(), NONE);
@@ -51,7 +50,8 @@ impl Assignment {
                 let limb = if known[index] == ANY_LIMB { nearest[index] } else { u32::from(known[index]) };
                 (limb as usize).min(poses.len())
             };
-            // Those of a row of pixels mostly follow each other: one at a time would wait for the length of the list.
+            // Consecutive candidates mostly belong to the same limb; pushing them one at a time would wait for the list length
+            // each time.
             let mut start = 0;
             while start < count {
                 let limb = limb_of(start);
@@ -99,12 +99,12 @@ impl Assignment {
     }
 }
 
-/// Copies places and weights of a limb's sampled candidates.
+/// Copies the positions and weights of a limb's sampled candidates.
 fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
     let LimbMatches { candidate, measured, base_weight, .. } = matches;
     measured.resize(candidate.len());
     base_weight.resize(candidate.len(), 0.0);
-    // Columns of one length: one check of the index serves them all.
+    // Columns of equal length: one bounds check of the index covers them all.
     let count = candidates.len();
     let Points { x, y, z } = &candidates.points;
     let (x, y, z, weight) = (&x[..count], &y[..count], &z[..count], &candidates.weight[..count]);
@@ -115,8 +115,8 @@ fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
     }
 }
 
-/// Step 4: finds the closest points of a limb's sampled candidates; those too far or on a cap that faces a joint get weight
-/// zero.
+/// Step 4: finds the closest points of a limb's sampled candidates. Points that are too far, or closest to a cap that faces a
+/// joint, get weight zero.
 pub(crate) fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
     let (refused, limit) = (refused_regions(limb), max_distance as f32);
@@ -139,7 +139,7 @@ fn sampled_count(members: usize, config: &Config) -> usize {
     (members / config.sampling_factor).max(config.min_limb_points).min(config.max_limb_points).min(members)
 }
 
-/// Caps and rims that face a joint lie inside the body: one bit a region.
+/// Caps and rims that face a joint lie inside the body: one bit per region.
 fn refused_regions(limb: &Limb) -> u32 {
     let [proximal, distal] = limb.match_caps;
     let both = |cap: Region, rim: Region, matched: bool| if matched { 0 } else { 1 << cap as u32 | 1 << rim as u32 };
@@ -157,7 +157,7 @@ mod tests {
 
     const MARGIN: f64 = 0.1;
 
-    /// A body, and points around it, the last ten known to lie on limb 3.
+    /// A body, and points around it; the last ten are known to lie on limb 3.
     fn scene() -> (Body, Vec<Pose>, Candidates) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = body.rest_pose(Pose::IDENTITY);
@@ -181,7 +181,7 @@ mod tests {
         (body, poses, candidates)
     }
 
-    /// The limbs that hold each candidate after an assignment.
+    /// The limbs that contain each candidate after an assignment.
     fn holders(overlap: Overlap) -> (Body, Vec<Pose>, Candidates, Vec<Vec<usize>>) {
         let (body, poses, candidates) = scene();
         let mut assignment = Assignment::default();
@@ -194,7 +194,7 @@ mod tests {
         (body, poses, candidates, holders)
     }
 
-    /// Whether a limb's enlarged box holds a candidate; `None` within rounding of its border.
+    /// Whether a limb's enlarged box contains a candidate; `None` within rounding error of its border.
     fn in_box(body: &Body, poses: &[Pose], limb: usize, point: Vec3) -> Option<bool> {
         let (bounds, local) = (body.limbs()[limb].shape.local_aabb(), poses[limb].inverse_transform_point(point));
         let outside = (bounds.mins - local).max(local - bounds.maxs).max_element() - MARGIN;
@@ -229,7 +229,7 @@ mod tests {
             };
             let Some(limb) = holders.first() else { continue };
             let least = (0..poses.len()).map(distance).fold(f64::INFINITY, f64::min);
-            // By a distance that is rough away from the surface: right wherever it is near and outside.
+            // The distance is approximate away from the surface, and accurate near and outside it.
             if least > 0.0 && least < 0.03 {
                 assert!(distance(*limb) < least + 0.01, "point {index}: {} m, not {least} m", distance(*limb));
                 near += 1;

@@ -1,27 +1,27 @@
-//! Limbs inside others: no camera sees them, so that no point belongs to them.
+//! Limbs inside other limbs: no camera sees them, so no point belongs to them.
 //!
-//! The surface of an arm that has slipped into the chest comes as near to the chest's points as the chest's own does: they hold it
-//! there.
+//! When an arm has slipped into the chest, its surface comes as near to the chest's points as the chest itself. Those points
+//! would hold it there.
 
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 
-/// Places on a limb's axis, as shares of its length.
+/// Positions on a limb's axis, as fractions of its length.
 const ON_AXIS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-/// A place that lies so deep in another limb is inside it, meters: limbs are soft, and thinner or thicker than their models.
+/// A position this deep in another limb counts as inside it, meters: limbs are soft, and thinner or thicker than their models.
 const DEEP: f64 = 0.03;
 
-/// Which limbs of a body lie inside others.
+/// Which limbs of a body lie inside other limbs.
 #[derive(Debug, Default)]
 pub(crate) struct Buried {
     limbs: Vec<bool>,
-    /// A sphere around each limb.
+    /// Bounding sphere of each limb.
     spheres: Vec<(Vec3, f64)>,
 }
 
 impl Buried {
-    /// Finds the limbs most of whose axis lies inside other limbs; those that are joined, or joined to the same parent, overlap in
-    /// any pose.
+    /// Finds the limbs that have most of their axis inside other limbs. Limbs that are joined, or have the same parent, are not
+    /// tested against each other: they overlap in any pose.
     pub(crate) fn find(&mut self, body: &Body, poses: &[Pose]) -> &[bool] {
         let Self { limbs, spheres } = self;
         let parts = body.limbs();
@@ -51,7 +51,7 @@ mod tests {
     use crate::math::Quat;
     use crate::testing::standing;
 
-    /// Names of the limbs that lie inside others.
+    /// Names of the limbs that lie inside other limbs.
     fn buried<'a>(body: &'a Body, poses: &[Pose]) -> Vec<&'a str> {
         let mut buried = Buried::default();
         let found = buried.find(body, poses).iter().zip(body.limbs());
@@ -65,7 +65,7 @@ mod tests {
         assert!(buried(body, &poses).is_empty(), "limbs that are joined overlap");
         let [forearm, hand, trunk] = ["l_forearm", "l_hand", "thorax"].map(|name| body.limb_index(name).unwrap());
         let front = body.limbs()[trunk].shape.a0();
-        // Across the trunk's axis, in half of its height, so far in front of it.
+        // Perpendicular to the trunk's axis, at half of its height, at the given distance in front of it.
         let across = |ahead: f64| {
             let mut poses = poses.clone();
             let length = body.limbs()[forearm].shape.length();

@@ -1,52 +1,53 @@
-//! The contour of limbs in depth images: where, across a limb, the body ends and the camera sees past it.
+//! The depth contour of limbs: where, perpendicular to a limb, the body ends and the camera sees past it.
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
 use crate::math::{Points, Pose, Vec3, widest};
 use crate::observation::depth_view::{DepthView, Pixel};
 
-/// Where along a limb its contour is looked for, in shares of its length; the ends belong to the neighbors as well.
+/// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
 const STATIONS: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
-/// A return this far from the limb's axis in depth, beyond its own half thickness, is another thing, meters.
+/// A return that differs in depth from the limb's axis by more than this plus the limb's half thickness is another object,
+/// meters.
 const DEPTH_REACH: f64 = 0.12;
-/// A limb whose axis makes an angle with the line of sight of less than this sine (30 degrees) shows no sides: what ends there
-/// is the next limb.
+/// Sine of the least angle between a limb's axis and the line of sight (30 degrees). Below it, the sides of the limb are not
+/// visible: an edge there belongs to the next limb.
 const ASLANT: f64 = 0.5;
-/// How far beyond the limb's rim its edge is looked for, meters: clothes, and the error of a predicted pose.
+/// How far outside the limb's rim its edge is searched for, meters: clothes, and the error of a predicted pose.
 const EDGE_REACH: f64 = 0.08;
-/// The same beyond a free limb's tip, meters: along its axis a limb slides farther than across.
+/// How far beyond the tip of a free end the edge is searched for, meters: a limb slides farther along its axis than across it.
 const TIP_REACH: f64 = 0.20;
-/// An edge with the surface of another limb this near, meters, may be that limb's: it tells nothing of girths.
+/// An edge this near to the surface of another limb may belong to that limb, meters: it gives no evidence for girths.
 const OTHERS_EDGE: f32 = 0.03;
-/// Edges are approached in strides of about this length, meters: a fraction of what is fitted, for speed.
+/// Approximate stride of the search for an edge, meters: a fraction of the quantities that are fitted, for speed.
 const STRIDE: f64 = 0.008;
-/// A stride is so many steps of half a pixel at most: in a coarse image it would pass over a thin limb.
+/// Maximum stride in steps of half a pixel: in a coarse image, longer strides would miss a thin limb.
 const MOST_STEPS: f64 = 4.0;
-/// The first look after the axis is at this share of the rim's distance: what lies well inside the limb is no edge.
+/// The first sample after the axis is at this fraction of the rim's distance: far inside the limb there is no edge.
 const FIRST_STEP: f64 = 0.4;
-/// The edge lies between the last look at the body and the first past it; so often is what lies between them halved: to a
-/// sixteenth of a pixel. Else the model would follow where the looks fell, not the edge.
+/// The edge lies between the last sample on the body and the first one past it. This interval is bisected this many times, to a
+/// sixteenth of a pixel; otherwise the fit would depend on the sampling positions.
 const HALVINGS: usize = 5;
-/// Steps are no shorter than those of half a pixel at this depth, meters.
+/// Steps are at least half a pixel at this depth, meters.
 const NEAREST_STEP: f64 = 0.1;
 
-/// One place on the rim of a limb and the edge seen there.
+/// One point on the rim of a limb and the edge observed there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DepthEdge {
-    /// Direction in which the edge was looked for, limb frame, length one: across the limb at right angles to the line of
-    /// sight, or along its axis.
+    /// Direction in which the edge was searched for, limb frame, unit length: perpendicular to the limb and to the line of
+    /// sight, or along the limb's axis.
     pub side: Vec3,
-    /// Distance of the model's rim in that direction from the axis, or from the proximal end, meters.
+    /// Distance of the model's rim in that direction, from the axis or from the proximal end, meters.
     pub rim: f64,
     /// The rim's point nearest to the edge, limb frame.
     pub foot: Vec3,
-    /// Distance of the seen edge, likewise, meters.
+    /// Distance of the observed edge, measured in the same way, meters.
     pub reach: f64,
-    /// The last place seen on the body, working frame.
+    /// The last point observed on the body, working frame.
     pub place: Vec3,
 }
 
-/// Looks for the edges on both sides of a limb, and at its tip when it ends free.
+/// Finds the edges on both sides of a limb, and at its tip if that end is free.
 pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(DepthEdge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
@@ -64,7 +65,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
     for t in STATIONS {
         let section = shape.section(t);
         let Some(facing) = section.facing(&camera_from_limb) else { continue };
-        // Seen nearly end on, a limb has no sides.
+        // The sides of a limb viewed nearly end on are not visible.
         if facing.across.length() < ASLANT * facing.to_camera.length() {
             continue;
         }
@@ -77,7 +78,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
     let sight = camera_from_limb.inverse_transform_vector(-(camera_from_limb * tip)).normalize_or(Vec3::X);
     let across = sight.with_z(0.0).length();
     if limb.match_caps[1] && across > ASLANT {
-        // Seen aslant, the cap's rim stands out beyond its middle.
+        // In an oblique view, the rim of the cap projects beyond its center.
         let ahead = sight.with_z(0.0) / across;
         let radius = (shape.a1() * ahead.x).hypot(shape.b1() * ahead.y);
         let foot = tip - ahead * (radius * sight.z.signum());
@@ -86,7 +87,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
     }
 }
 
-/// A way across an image: from a point along a direction (camera frame), meters.
+/// A search path in an image: from a point along a direction (camera frame), meters.
 struct ContourSearch {
     start: Vec3,
     along: Vec3,
@@ -96,15 +97,15 @@ struct ContourSearch {
 }
 
 impl ContourSearch {
-    /// How far from the start the body ends, and the last place seen on it; `None` when another thing stands before it, when
-    /// the image does not tell, or when no edge comes within reach.
+    /// Distance from the start at which the body ends, and the last point observed on it. Returns `None` when another object
+    /// occludes it, when a pixel is unknown, or when there is no edge within reach.
     #[inline(always)]
     fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
         let [fx, fy] = view.image.camera.focal();
         let focal = fx.max(fy);
         let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
         let deep = self.thickness + DEPTH_REACH;
-        // Long strides as far as the first look past the body, then what lies between is halved.
+        // Long strides up to the first sample past the body, then bisection.
         let stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
         let mut on: Option<(f64, f64)> = None;
         let mut r = 0.0;
@@ -113,7 +114,7 @@ impl ContourSearch {
             match view.at(place) {
                 Pixel::Unknown => return None,
                 Pixel::Foreground(z) if z < place.z - deep => return None,
-                // Where another body begins this one need not end.
+                // Where another person begins, this one may continue behind.
                 Pixel::Other(z) if z < place.z + deep => return None,
                 Pixel::Foreground(z) if z <= place.z + deep => on = Some((r, z)),
                 Pixel::Foreground(_) | Pixel::Background(_) | Pixel::Other(_) => {
@@ -125,7 +126,8 @@ impl ContourSearch {
         None
     }
 
-    /// Where the body ends between a look at it, of which the depth is known, and one past it; and the last place seen on it.
+    /// Bisects between a sample on the body, with known depth, and one past it. Returns where the body ends, and the last point
+    /// observed on it.
     #[inline(always)]
     fn halved(&self, view: &DepthView, (mut on, mut depth): (f64, f64), mut past: f64) -> (f64, Vec3) {
         for _ in 0..HALVINGS {
@@ -152,23 +154,23 @@ pub(crate) struct Contours {
     others: Vec<f32>,
 }
 
-/// The edge of a limb, and where it stands in the working frame.
+/// The edge of a limb, and its position in the working frame.
 #[derive(Clone, Copy, Debug)]
 struct LimbEdge {
     limb: usize,
     edge: DepthEdge,
     target: Vec3,
-    /// Distance of the edge to the nearest other limb, meters.
+    /// Distance from the edge to the nearest other limb, meters.
     others: f32,
 }
 
 impl Contours {
-    /// Forgets all edges.
+    /// Clears all edges.
     pub(crate) fn clear(&mut self) {
         self.edges.clear();
     }
 
-    /// Looks for the edges at `poses`.
+    /// Finds the edges at `poses`.
     pub(crate) fn find<'a>(&mut self, body: &Body, poses: &[Pose], views: impl Iterator<Item = DepthView<'a>>) {
         self.edges.clear();
         self.places.clear();
@@ -187,12 +189,12 @@ impl Contours {
         self.edges.retain_mut(|found| {
             let closest = closest.next();
             found.others = others.next().copied().unwrap_or(f32::INFINITY);
-            // Beyond the rim, the edge may be another limb's.
+            // Outside the rim, the edge may belong to another limb.
             found.edge.reach <= found.edge.rim || closest == Some(&found.limb)
         });
     }
 
-    /// The limb that is nearest to each place, and how near the nearest is that is not the edge's own.
+    /// Finds the limb nearest to each edge position, and the distance to the nearest limb other than the edge's own.
     fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
         self.least.clear();
@@ -216,14 +218,14 @@ impl Contours {
         }
     }
 
-    /// The edges on the sides of a limb that were found apart from other limbs.
+    /// The edges on the sides of a limb that are clear of other limbs.
     pub(crate) fn sides(&self, limb: usize) -> impl Iterator<Item = DepthEdge> {
         let own =
             move |found: &&LimbEdge| found.limb == limb && found.others >= OTHERS_EDGE && found.edge.side != Vec3::Z;
         self.edges.iter().filter(own).map(|found| found.edge)
     }
 
-    /// The rims at `poses` and the edges that were found, as pairs.
+    /// The rim points at `poses` and the edges that were found, as pairs.
     pub(crate) fn pairs(&self, poses: &[Pose], pairs: &mut Vec<ContourPair>) {
         pairs.clear();
         pairs.extend(self.edges.iter().map(|LimbEdge { limb, edge, target, .. }| {
@@ -246,7 +248,7 @@ mod tests {
     const WIDTH: usize = 120;
     const FOCAL: f64 = 400.0;
 
-    /// What the camera sees of one limb before nothing: the exact ray of every pixel.
+    /// What the camera sees of a single limb with nothing behind it: exact ray casting in every pixel.
     fn shoot(shape: &TaperedEllipticCylinder, pose: &Pose) -> Vec<f32> {
         let empty = vec![0.0; WIDTH * WIDTH];
         let camera: DepthImage = image(&empty, WIDTH, FOCAL);
@@ -268,7 +270,7 @@ mod tests {
         ask(views.iter().next().unwrap())
     }
 
-    /// A forearm across the picture, two meters away, at right angles to the line of sight.
+    /// A forearm across the image, two meters away, perpendicular to the line of sight.
     fn forearm() -> (Limb, Pose) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let mut limb = body.limbs()[body.limb_index("l_forearm").unwrap()].clone();
@@ -281,7 +283,7 @@ mod tests {
     fn the_contour_is_found_where_the_limb_ends() {
         let (limb, pose) = forearm();
         let pixel = 2.0 / FOCAL;
-        // The limb in the image is wider and longer than the model by as much.
+        // The limb in the image is wider and longer than the model by this amount.
         for wider in [-0.01, 0.0, 0.015] {
             let [a0, b0, a1, b1] =
                 [limb.shape.a0(), limb.shape.b0(), limb.shape.a1(), limb.shape.b1()].map(|axis| axis + wider);
@@ -323,7 +325,7 @@ mod tests {
         let (limb, pose) = forearm();
         let before = vec![1.5_f32; WIDTH * WIDTH];
         with_view(&before, |view| edges(&view, &limb, &pose, |edge| panic!("{edge:?} before the limb")));
-        // Nearly end on: the far end lies behind the near one.
+        // Nearly end on: the far end is hidden behind the near one.
         let aslant = Pose::new(Vec3::new(0.0, 0.0, 2.0), Vec3::new(0.0, 0.3, 0.0));
         with_view(&shoot(&limb.shape, &aslant), |view| edges(&view, &limb, &aslant, |edge| panic!("{edge:?} end on")));
     }

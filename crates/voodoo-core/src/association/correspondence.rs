@@ -1,11 +1,12 @@
-//! The one currency between measurements and solvers: weighted pairs of a body point and a target.
+//! Correspondences between measurements and the body: weighted pairs of a body point and a target. They are all that solvers
+//! get.
 //!
 //! Everything is in the working frame: world axes, origin near the body.
 
 use crate::math::{LANES, Mat3, Points, Vec3, widest};
 use crate::shape::SurfaceBatch;
 
-/// Surface matches of one limb: measured points and their closest points. Rejected pairs stay with weight zero.
+/// Surface matches of one limb: measured points and their closest points. Rejected pairs are kept with weight zero.
 #[derive(Debug, Default)]
 pub(crate) struct LimbMatches {
     /// Index of each point among the candidates.
@@ -14,13 +15,13 @@ pub(crate) struct LimbMatches {
     pub measured: Points,
     /// Weights of the measurements, before any pair is rejected.
     pub base_weight: Vec<f32>,
-    /// Weights.
+    /// Weights, zero for rejected pairs.
     pub weight: Vec<f32>,
     /// Closest points, normals, signed distances.
     pub surface: SurfaceBatch,
 }
 
-/// A site with a target: a measured position, or the closest point of a ray.
+/// A site with its target: a measured position, or the closest point of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SitePair {
     /// The limb that carries the site.
@@ -29,17 +30,17 @@ pub(crate) struct SitePair {
     pub x: Vec3,
     /// The target.
     pub p: Vec3,
-    /// Scalar weight, as the papers use it, of what is beyond the bias.
+    /// Scalar weight, as in the papers, reduced for the part of the distance within the bias.
     pub weight: f64,
-    /// Scalar weight of the measurement, before its bias is taken off.
+    /// Scalar weight of the measurement, before the reduction for the bias.
     pub base_weight: f64,
-    /// The measurement may always be this far off, meters.
+    /// Bias, meters: the measurement may have a constant error of this size.
     pub bias: f64,
-    /// What of a difference counts: the identity for a position, `I - d d^T` for a ray along `d`.
+    /// Projection of the difference: the identity for a position, `I - d d^T` for a ray along `d`.
     pub across: Mat3,
-    /// Weight times the identity for a position, times `I - d d^T` for a ray along `d` (method: every datum has an information).
+    /// Information: the weight times the identity for a position, times `I - d d^T` for a ray along `d`.
     pub information: Mat3,
-    /// Number of the source.
+    /// Index of the source.
     pub source: u16,
 }
 
@@ -50,48 +51,49 @@ pub(crate) struct ContourPair {
     pub limb: usize,
     /// The rim's point.
     pub x: Vec3,
-    /// Direction across the limb and the line of sight.
+    /// Direction perpendicular to the limb and to the line of sight.
     pub normal: Vec3,
-    /// The edge lies so far out along it, meters; negative when the image shows less than the model.
+    /// Distance of the edge outward along the direction, meters; negative when the observed limb is narrower than the model.
     pub distance: f64,
 }
 
-/// A point of a limb's contour and the edge of its colors in a picture: a distance along one direction.
+/// A point of a limb's contour and the color edge there in an image: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RegionPair {
     /// The limb.
     pub limb: usize,
     /// The contour's point.
     pub x: Vec3,
-    /// Direction in which the point is seen to move across the contour, outward, length one.
+    /// Direction in which the projected point moves perpendicular to the contour, outward, unit length.
     pub normal: Vec3,
-    /// The edge lies so far out along it, meters.
+    /// Distance of the edge outward along the direction, meters.
     pub distance: f64,
-    /// What the colors say of it, 1/m^2.
+    /// Information of the edge from its colors, 1/m^2.
     pub information: f64,
-    /// Number of the source.
+    /// Index of the source.
     pub source: u16,
 }
 
-/// What pictures say of a limb, by its lines: shares of those that can tell.
+/// Color evidence for and against a limb, from its lines: fractions of the lines that are informative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct RegionSupport {
-    /// Its colors end at its contour: of the whole limb, each line weighted with its distance from the proximal joint, and of
-    /// its outer part.
+    /// Fraction of lines on which the limb's colors end at its contour: for the whole limb, each line weighted by its distance
+    /// from the proximal joint; and for its outer part.
     pub own: [f64; 2],
-    /// The colors of its surroundings are seen within it, likewise.
+    /// Fraction of lines on which the colors of the surroundings appear inside the contour, in the same two forms.
     pub against: [f64; 2],
-    /// Lines that can tell, as a share of all.
+    /// Informative lines, as a fraction of all.
     pub visible: f64,
     /// Number of lines.
     pub lines: f64,
-    /// What a limb of an arm or leg explains of the pictures, and no limb of another one or of the trunk, patches.
+    /// For limbs of arms and legs: image area that this limb explains, and that no limb of another arm or leg or of the trunk
+    /// explains, patches.
     pub gained: f64,
-    /// Its area in the pictures, hidden or not, patches.
+    /// Its area in the images, occluded or not, patches.
     pub area: f64,
 }
 
-/// One elastic band: the same point of a joint on the parent and on the child (K07 4.3).
+/// One elastic band: it joins the same point of a joint on the parent and on the child (K07 4.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Band {
     /// Parent limb.
@@ -102,31 +104,31 @@ pub(crate) struct Band {
     pub on_parent: Vec3,
     /// End on the child.
     pub on_child: Vec3,
-    /// Artificial weight towards the parent's own measurements.
+    /// Artificial weight, relative to the parent's measurements.
     pub parent_weight: f64,
-    /// Artificial weight towards the child's own measurements.
+    /// Artificial weight, relative to the child's measurements.
     pub child_weight: f64,
 }
 
 /// All correspondences of one ICP step.
 #[derive(Debug, Default)]
 pub(crate) struct Correspondences {
-    /// Surface matches, limb by limb.
+    /// Surface matches, one entry per limb.
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
     pub sites: Vec<SitePair>,
-    /// Rims of limbs and the contour of the body in depth images.
+    /// Rims of limbs and the depth contour of the body.
     pub contour: Vec<ContourPair>,
-    /// Contours of limbs and edges of colors.
+    /// Contours of limbs and color edges.
     pub regions: Vec<RegionPair>,
-    /// What they say of each limb; empty without pictures.
+    /// Color evidence for each limb; empty without color images.
     pub region_support: Vec<RegionSupport>,
     /// Elastic bands.
     pub bands: Vec<Band>,
 }
 
 impl LimbMatches {
-    /// Makes room for `len` pairs in all.
+    /// Reserves capacity for `len` pairs.
     pub(crate) fn reserve(&mut self, len: usize) {
         self.candidate.reserve(len.saturating_sub(self.candidate.len()));
         self.measured.reserve(len);
@@ -156,13 +158,13 @@ impl LimbMatches {
         total
     }
 
-    /// Number of accepted pairs and weighted sum of their squared distances.
+    /// Sum of the weights and weighted sum of squared distances of accepted pairs.
     pub(crate) fn accepted(&self) -> (usize, f64) {
         (self.weight.iter().filter(|weight| **weight > 0.0).count(), self.weighed().1)
     }
 }
 
-/// Sums of `values` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
+/// Sums `values` over two columns in several lanes: no addition waits for the one before, and the order is always the same.
 #[inline(always)]
 fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, f32) -> [f64; N]) -> [f64; N] {
     let mut sums = [[0.0; LANES]; N];
@@ -184,7 +186,7 @@ fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, 
 }
 
 impl Correspondences {
-    /// Makes as much room for surface matches and edges as `other` has.
+    /// Reserves as much capacity for surface matches and edges as `other` has.
     pub(crate) fn reserve_as(&mut self, other: &Self) {
         self.regions.reserve(other.regions.capacity().saturating_sub(self.regions.len()));
         self.region_support.reserve(other.region_support.capacity().saturating_sub(self.region_support.len()));
@@ -194,13 +196,13 @@ impl Correspondences {
         }
     }
 
-    /// Measured weight of a limb: its points and its sites.
+    /// Total weight of a limb's measurements: its points and its sites.
     pub(crate) fn measured_weight(&self, limb: usize) -> f64 {
         let sites: f64 = self.sites.iter().filter(|pair| pair.limb == limb).map(|pair| pair.weight).sum();
         self.limbs[limb].total_weight() + sites
     }
 
-    /// Mean squared distance of the surface points that fit, meters squared: Geman-McClure's weights of `scale` leave out those
+    /// Mean squared distance of the surface points that fit, meters squared. Geman-McClure weights of `scale` suppress points
     /// that belong to something else.
     pub(crate) fn scatter(&self, scale: f64) -> Option<f64> {
         let (mut weight, mut sum) = (0.0, 0.0);
@@ -237,7 +239,7 @@ impl Correspondences {
         (weight > 0.0).then(|| sum / weight)
     }
 
-    /// Mean of the squared distances of the edges of color regions by what they tell, `None` without any.
+    /// Mean squared distance of the color edges, weighted by their information; `None` without any.
     pub(crate) fn mean_squared_edge(&self) -> Option<f64> {
         let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
         let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();

@@ -5,18 +5,18 @@ use crate::body::Body;
 use crate::math::{Mat3, Pose, Vec3};
 use crate::observation::frame::Frame;
 
-/// Weight of the bands of a limb that nothing measures, in points; only their proportions matter there.
+/// Weight of the bands of a limb without measurements, in points; only their proportions matter there.
 const UNMEASURED: f64 = 1.0;
 
-/// Share of a weight that is left when a datum at this distance may always be `bias` off: the force on the site is then
-/// that of the part of the distance which is no bias, and nothing pulls once the rest of the frame has brought the site
-/// near. What a detector calls a hand is not where the body has its hand, in frame after frame to the same side.
+/// Factor of a weight for a datum at this distance with a constant error of up to `bias`. With it, the force on the site is that
+/// of the part of the distance beyond the bias, and becomes zero once other measurements have brought the site near. A
+/// detector's definition of a hand position differs from the body model's by a nearly constant offset.
 fn beyond(bias: f64, distance: f64) -> f64 {
     if bias <= 0.0 { 1.0 } else { (1.0 - bias / distance.max(bias)).max(0.0) }
 }
 
 impl Correspondences {
-    /// Point-to-point relations, and for every ray the closest point on it (K06 IV-B.4 and 5).
+    /// Point-to-point pairs, and for every ray the closest point on it (K06 IV-B.4 and 5).
     pub(crate) fn add_sites(&mut self, body: &Body, poses: &[Pose], frame: &Frame, origin: Vec3) {
         self.sites.clear();
         let place = |site: usize| {
@@ -43,7 +43,7 @@ impl Correspondences {
             let (limb, x) = place(relation.site);
             let start = relation.origin - origin;
             let direction = relation.direction.normalize();
-            // A site behind the sensor is drawn to the sensor, not to the ray's mirror image.
+            // A site behind the sensor is pulled towards the sensor, not towards the mirror image of the ray.
             let p = start + direction * (x - start).dot(direction).max(0.0);
             let across = Mat3::IDENTITY
                 - Mat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
@@ -62,8 +62,8 @@ impl Correspondences {
         }
     }
 
-    /// The bands of all joints at their current lengths. A limb's bands together weigh `ratio` times its measurements, each
-    /// joint by its own weight (K07 4.3: the ratio of artificial to measured stays constant).
+    /// The bands of all joints at their current lengths. The bands of a limb together weigh `ratio` times its measurements,
+    /// distributed over its joints by joint weight (K07 4.3: the ratio of artificial to measured weight stays constant).
     pub(crate) fn add_bands(&mut self, body: &Body, poses: &[Pose], ratio: f64, measured: &mut Vec<f64>) {
         self.bands.clear();
         measured.clear();
@@ -115,7 +115,7 @@ mod tests {
             body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_count()).sum();
         assert_eq!(all.bands.len(), joints);
         for limb in 0..poses.len() {
-            // Every band counts at both of its ends.
+            // Every band counts at both ends.
             let on_parent = all.bands.iter().filter(|band| band.parent == limb).map(|band| band.parent_weight);
             let on_child = all.bands.iter().filter(|band| band.child == limb).map(|band| band.child_weight);
             let total: f64 = on_parent.chain(on_child).sum();
@@ -138,7 +138,7 @@ mod tests {
             |origin: Vec3, direction: Vec3, bias| RayRelation { site, origin, direction, weight: 2.0, bias, source: 1 };
         let rays = [
             ray(Vec3::new(2.0, 0.5, 1.2), Vec3::new(-1.0, 0.1, -0.2), 0.0),
-            // The site lies behind this one: its start is the nearest point.
+            // The site lies behind the start of this ray, so the start is the nearest point.
             ray(x + Vec3::new(0.3, 0.0, 0.0), Vec3::X, 0.1),
         ];
         let origin = Vec3::new(0.1, -0.2, 0.3);
@@ -147,13 +147,13 @@ mod tests {
         let mut all = Correspondences::default();
         all.add_sites(&body, &working, &Frame { rays: &rays, ..Frame::empty(0.0) }, origin);
         for (pair, ray) in all.sites.iter().zip(&rays) {
-            // A dense search along the ray.
+            // Brute-force search along the ray.
             let steps = (0..400_000).map(|k| ray.origin - origin + ray.direction * (1e-5 * f64::from(k)));
             let nearest = steps.map(|place| place.distance(pair.x)).fold(f64::INFINITY, f64::min);
             assert!((pair.x.distance(pair.p) - nearest).abs() < 1e-5, "{pair:?}");
             assert!((pair.across * ray.direction).length() < 1e-9, "nothing holds along the ray");
         }
-        // A third of 0.3 m may be bias.
+        // A third of the 0.3 m may be bias.
         assert!((all.sites[1].weight - 2.0 * (1.0 - 0.1 / 0.3)).abs() < 1e-9 && all.sites[1].base_weight == 2.0);
     }
 
@@ -169,7 +169,7 @@ mod tests {
         let mut all = Correspondences::default();
         all.add_sites(&body, &poses, &Frame { positions: &positions, ..Frame::empty(0.0) }, Vec3::ZERO);
         assert_eq!(all.sites[0].weight, 0.0);
-        // The force, weight times distance, is that of what is beyond the bias.
+        // The force, weight times distance, is that of the part beyond the bias.
         assert!((all.sites[1].weight * 0.2 - 4.0 * 0.15).abs() < 1e-9);
     }
 }

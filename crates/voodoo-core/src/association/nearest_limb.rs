@@ -1,7 +1,8 @@
-//! Step 2's question (K06 IV-B.2), for many points at once: which limb is nearest, of those whose enlarged boxes hold a point.
+//! The nearest-limb search of step 2 (K06 IV-B.2), for many points at once: the nearest of the limbs whose enlarged boxes
+//! contain a point.
 //!
-//! The bounds of a cluster of points give every limb a distance that none of them can come nearer. Only limbs that can still be
-//! the nearest of one of them are looked at point by point.
+//! The bounding box of a cluster of points gives a lower bound of the distance to every limb. Only limbs that can still be the
+//! nearest of some point are evaluated point by point.
 
 use crate::body::{Body, Limb};
 use crate::math::{LANES, Pose, Vec3, widest};
@@ -11,11 +12,11 @@ use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
 pub(crate) const NONE: u32 = u32::MAX;
 /// Squared distance of a point that lies outside a limb's box.
 const OUTSIDE: f32 = f32::INFINITY;
-/// What single precision may err in the place of a box, meters, and as a share of the coordinates it was computed from; bounds
-/// are that much wider.
+/// Error of single precision in the position of a box, meters, and as a fraction of the coordinates it was computed from; bounds
+/// are widened by this.
 const SINGLE_PRECISION: (f32, f32) = (1e-4, 1e-6);
 
-/// Semi-axes are taken for no less than this, meters, near a tip: their product divides.
+/// Minimum semi-axes, meters: near a pointed tip they become small, and their product is a divisor.
 const THINNEST: f32 = 1e-4;
 
 type LimbLanes = [f32; LANES];
@@ -27,12 +28,14 @@ pub(crate) struct NearestLimb {
     limbs: Vec<LimbBox>,
     groups: Vec<Group>,
     least: Vec<LimbLanes>,
-    /// The limbs that were nearest to two points of each cluster the last time: probably they are again.
+    /// The limbs that were nearest to two points of each cluster in the last call: evaluated first, as they are probably nearest
+    /// again.
     expected: Vec<[u32; 2]>,
 }
 
 impl NearestLimb {
-    /// Puts the limbs where they are, their boxes enlarged by `margin`; those that are `buried` hold no point. Empty: none is.
+    /// Sets the limb poses, with the boxes enlarged by `margin`. `buried` limbs contain no point; an empty slice means that none
+    /// is buried.
     pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
         self.limbs.clear();
         self.limbs.extend(body.limbs().iter().zip(poses).enumerate().map(|(index, (limb, pose))| {
@@ -47,9 +50,10 @@ impl NearestLimb {
         self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
     }
 
-    /// The nearest limb of every point, or [`NONE`], into `nearest`.
+    /// Writes the nearest limb of every point, or [`NONE`], to `nearest`.
     ///
-    /// `inside` gets for every point and limb whether the limb's box holds it, if it has room for that; otherwise it is empty.
+    /// If `inside` has room, it gets for every point and limb whether the limb's box contains the point; otherwise pass it
+    /// empty.
     pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
         self.expected.resize(clusters.iter().len(), [0; 2]);
@@ -73,7 +77,7 @@ impl NearestLimb {
             *least = group.least_squares(cluster.bounds);
         }
         let mut best = Best { limb: [NONE; CLUSTER], square: [OUTSIDE; CLUSTER] };
-        // What the expected limbs leave decides which others are worth a look. After a reset there may be fewer limbs.
+        // The distances to the expected limbs decide which others must be evaluated. After a reset there may be fewer limbs.
         let [first, second] = expected[index].map(|limb| (limb as usize).min(limbs.len() - 1));
         best.offer(first as u32, &limbs[first].squares(cluster));
         if inside.is_empty() {
@@ -90,7 +94,7 @@ impl NearestLimb {
                     best.offer(limb, &limbs[limb as usize].squares(cluster));
                     remaining &= remaining - 1;
                     if remaining != 0 {
-                        // It may have left less to those that follow.
+                        // The bound may now exclude some of the remaining limbs.
                         remaining &= within(least, best.worst());
                     }
                 }
@@ -106,7 +110,7 @@ impl NearestLimb {
         }
         let middle = best.limb[CLUSTER / 2];
         if middle != NONE {
-            // Of the limbs at its ends one that is another, if any is.
+            // A different limb at one end of the cluster, if there is one.
             let other = if best.limb[0] == middle { best.limb[CLUSTER - 1] } else { best.limb[0] };
             expected[index] = [middle, if other == NONE { middle } else { other }];
         }
@@ -114,7 +118,7 @@ impl NearestLimb {
     }
 }
 
-/// Which values are at most `worst`, one bit each; [`OUTSIDE`] never is.
+/// Bit mask of the values that are at most `worst`; [`OUTSIDE`] never is.
 #[inline(always)]
 fn within(values: &LimbLanes, worst: f32) -> u32 {
     let mut bits = 0;
@@ -124,7 +128,7 @@ fn within(values: &LimbLanes, worst: f32) -> u32 {
     bits
 }
 
-/// The nearest limb of every point so far; of two that are as near, the first.
+/// The nearest limb of every point so far; the first one when two are equally near.
 struct Best {
     limb: [u32; CLUSTER],
     square: Squares,
@@ -141,7 +145,7 @@ impl Best {
         }
     }
 
-    /// The greatest of the squared distances, if finite.
+    /// The greatest of the squared distances, if it is finite.
     #[inline(always)]
     fn worst(&self) -> f32 {
         let mut worst = [0.0; LANES];
@@ -154,10 +158,10 @@ impl Best {
     }
 }
 
-/// What several limbs' distances to a box of points are computed from, side by side.
+/// Data of several limbs for lower bounds of their distances to a box of points, side by side.
 #[derive(Debug)]
 struct Group {
-    /// Columns of the rotations, and the shifts, from the working frame to the limbs'.
+    /// Columns of the rotations, and the translations, limb_from_working.
     axes: [[LimbLanes; 3]; 3],
     shift: [LimbLanes; 3],
     low: [LimbLanes; 3],
@@ -175,7 +179,7 @@ impl Group {
         Self {
             axes: [0, 1, 2].map(|from| [0, 1, 2].map(|to| lanes(&|limb| limb.axes[from][to], 0.0))),
             shift: [0, 1, 2].map(|axis| lanes(&|limb| limb.shift[axis], 0.0)),
-            // Where there is no limb, nothing is reached.
+            // A lane without a limb never contains a point.
             low: [0, 1, 2].map(|axis| lanes(&|limb| limb.low[axis], f32::INFINITY)),
             high: [0, 1, 2].map(|axis| lanes(&|limb| limb.high[axis], f32::NEG_INFINITY)),
             length: lanes(&|limb| limb.length, 0.0),
@@ -184,8 +188,8 @@ impl Group {
         }
     }
 
-    /// Squares that [`LimbBox::squares`] does not fall below for any point inside the bounds, [`OUTSIDE`] when no such point
-    /// lies in the limb's box.
+    /// Lower bounds of [`LimbBox::squares`] over all points inside the bounds; [`OUTSIDE`] when no such point lies in the limb's
+    /// box.
     #[inline(always)]
     fn least_squares(&self, bounds: &Bounds) -> LimbLanes {
         let (c, h) = (bounds.center, bounds.half);
@@ -200,8 +204,8 @@ impl Group {
             let (place, reach) = ([place(0), place(1), place(2)], [reach(0), reach(1), reach(2)]);
             let meets = |i: usize| (place[i] + reach[i] >= self.low[i][l]) & (place[i] - reach[i] <= self.high[i][l]);
             let off = |i: usize| at_least(place[i].abs() - reach[i], 0.0);
-            // Beside a slice, (rho - 1) / |grad rho| is at least (rho - 1) times the lesser semi-axis, and rho at least the
-            // distance from the axis over the greater one.
+            // Lateral to a slice, (rho - 1) / |grad rho| is at least (rho - 1) times the smaller semi-axis, and rho is at least
+            // the distance from the axis divided by the larger one.
             let side = at_least((off(0) * off(0) + off(1) * off(1)).sqrt() - self.radius[l], 0.0) * self.flatness[l];
             let beyond = at_least(at_least(-place[2], place[2] - self.length[l]) - reach[2], 0.0);
             let square = side * side + beyond * beyond;
@@ -211,20 +215,20 @@ impl Group {
     }
 }
 
-/// Box test and rough distance of a tapered elliptic cylinder, in single precision for several points at once.
+/// Box test and approximate distance of a tapered elliptic cylinder, in single precision for several points at once.
 #[derive(Debug)]
 struct LimbBox {
-    /// Columns of the rotation, and the shift, from the working frame to the limb's.
+    /// Columns of the rotation, and the translation, limb_from_working.
     axes: [[f32; 3]; 3],
     shift: [f32; 3],
-    /// The enlarged box in the limb's frame.
+    /// The enlarged box in the limb frame.
     low: [f32; 3],
     high: [f32; 3],
     length: f32,
-    /// Semi-axes at the proximal end and their growth along the axis.
+    /// Semi-axes at the proximal end, and their growth along the axis.
     a: [f32; 2],
     b: [f32; 2],
-    /// The greatest semi-axis, and the least ratio of the lesser to the greater one of a slice.
+    /// The greatest semi-axis, and the least ratio of the smaller to the larger semi-axis of a slice.
     radius: f32,
     flatness: f32,
 }
@@ -262,22 +266,22 @@ impl LimbBox {
         squares
     }
 
-    /// A point in the limb's frame.
+    /// A point in the limb frame.
     #[inline(always)]
     fn local(&self, x: f32, y: f32, z: f32) -> [f32; 3] {
         let local = |i: usize| self.axes[0][i] * x + self.axes[1][i] * y + self.axes[2][i] * z + self.shift[i];
         [local(0), local(1), local(2)]
     }
 
-    /// Whether a point in the limb's frame lies in the enlarged box.
+    /// Whether a point in the limb frame lies in the enlarged box.
     #[inline(always)]
     fn holds(&self, local: [f32; 3]) -> bool {
         let inside = |axis: usize| (local[axis] >= self.low[axis]) & (local[axis] <= self.high[axis]);
         inside(0) & inside(1) & inside(2)
     }
 
-    /// Square of about `(rho - 1) / |grad rho|` beside the limb, with `rho^2 = (x/a)^2 + (y/b)^2`, and of the distance beyond
-    /// its ends.
+    /// Approximate squared distance: the square of `(rho - 1) / |grad rho|` beside the limb, with `rho^2 = (x/a)^2 + (y/b)^2`,
+    /// plus the squared distance beyond its ends.
     #[inline(always)]
     fn square(&self, local: [f32; 3]) -> f32 {
         let along = if local[2] > 0.0 { local[2] } else { 0.0 };

@@ -1,9 +1,9 @@
-//! A camera sees only what faces it: points inside a limb that were matched to its far side belong to its near side.
+//! A camera sees only surfaces that face it: points inside a limb that were matched to its far side belong to its near side.
 //!
-//! The closest point of the surface is on the far side as soon as a limb is its radius too near to the camera. Matched there, the
-//! points would hold the limb where it is. They are matched to the point that the camera sees before it in the same slice
-//! instead, and draw the limb back to them. At the contour the two coincide: nothing jumps. Points behind a limb keep their
-//! closest point: they may belong to what lies behind it.
+//! When the model of a limb is too near to the camera by more than its radius, the closest surface point is on the far side, and
+//! such matches would hold the limb where it is. They are replaced by the visible point in front of the measured point in the
+//! same slice, and pull the limb back. At the contour the two points coincide, so the match changes continuously. Points behind
+//! a limb keep their closest point: they may belong to what lies behind it.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use crate::math::{Pose, Vec3, widest};
 use crate::observation::candidates::Candidates;
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
 
-/// Turns the matches of depth pixels inside a limb that face away from their camera to the near side.
+/// Moves matches of depth pixels inside a limb from the side that faces away from the camera to the near side.
 pub(crate) fn match_visible_side(
     shape: &TaperedEllipticCylinder,
     pose: &Pose,
@@ -22,7 +22,7 @@ pub(crate) fn match_visible_side(
 ) {
     let mut start = 0;
     for (end, camera) in &candidates.cameras {
-        // The candidates of a limb ascend.
+        // The candidate indices of a limb are ascending.
         let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
         for first in (start..stop).step_by(MATCHES) {
             let last = stop.min(first + MATCHES);
@@ -41,10 +41,10 @@ pub(crate) fn match_visible_side(
     }
 }
 
-/// Matches looked at together: a whole number of SIMD lanes.
+/// Matches processed together: a whole number of SIMD lanes.
 const MATCHES: usize = 32;
 
-/// Which matches, of points inside, are on the side that faces away from a camera.
+/// Which matches of points inside the limb are on the side that faces away from a camera.
 #[inline(always)]
 fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) -> [bool; MATCHES] {
     let LimbMatches { measured, weight, surface, .. } = matches;
@@ -61,7 +61,7 @@ fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) 
     away
 }
 
-/// Turns one match to the near side.
+/// Moves one match to the near side.
 fn turn_match(
     shape: &TaperedEllipticCylinder,
     pose: &Pose,
@@ -84,8 +84,8 @@ fn turn_match(
     }
 }
 
-/// The other end of the chord through a slice, from a point on the side along the line of sight (limb frame), and the normal
-/// there: in units of the semi-axes the slice is a circle, and the chord's ends mirror each other.
+/// The other end of the chord through a slice, from a surface point along the line of sight (limb frame), and the normal there.
+/// In units of the semi-axes the slice is a circle, and the ends of the chord are mirror images.
 fn near_side(shape: &TaperedEllipticCylinder, point: Vec3, view: Vec3) -> (Vec3, Vec3) {
     let rates = [(shape.a1() - shape.a0()) / shape.length(), (shape.b1() - shape.b0()) / shape.length()];
     let (a, b) = (shape.a0() + rates[0] * point.z, shape.b0() + rates[1] * point.z);
@@ -117,7 +117,7 @@ mod tests {
                 let exact = shape.closest_point(near);
                 assert!(exact.signed_distance.abs() < 1e-12);
                 assert!(exact.normal.distance(normal) < 1e-6 || t < 1e-9, "{normal} is not {}", exact.normal);
-                // On the line of sight, as seen along the axis.
+                // On the line of sight, projected along the axis.
                 let chord = near - far;
                 assert!((chord.x * view.y - chord.y * view.x).abs() < 1e-12);
                 let (back, _) = near_side(&shape, near, view);

@@ -1,11 +1,11 @@
-//! Changing a body between frames (K06 IV: scale, dimensions, adding and removing parts). Each returns a new body.
+//! Edits of a body between frames (K06 IV: scale, dimensions, adding and removing parts). Each returns a new body.
 
 use super::{Body, Joint, Limb, Site};
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Limbs that are of one length: the two of a pair, or one of the trunk.
+/// Limbs of equal length: a left-right pair, or a single limb of the trunk.
 pub(crate) type Pair = Vec<usize>;
 
 impl Body {
@@ -38,7 +38,7 @@ impl Body {
         Ok(body)
     }
 
-    /// The body with another shape for one limb; joints and sites on it move along with the change of length.
+    /// The body with another shape for one limb. Joints and sites on the limb move along with the change of length.
     pub fn with_shape(&self, limb: &str, shape: TaperedEllipticCylinder) -> Result<Self, BodyError> {
         let index = self.limb_index(limb)?;
         let stretch = Vec3::new(1.0, 1.0, shape.length() / self.limbs[index].shape.length());
@@ -49,9 +49,9 @@ impl Body {
         Ok(body)
     }
 
-    /// Moves the surface of a limb across its axis by `shift` (limb frame, meters) and multiplies its semi-axes (a0, b0, a1, b1) by `axes`.
-    /// The limb frame moves with the surface; joints and sites stay where they are in space. A change that makes no solid is
-    /// not made.
+    /// Moves the surface of a limb perpendicular to its axis by `shift` (limb frame, meters) and multiplies its semi-axes (a0,
+    /// b0, a1, b1) by `axes`. The limb frame moves with the surface; joints and sites stay at their world positions. Does nothing
+    /// if the result would not be a valid solid.
     pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, axes: [f64; 4]) -> bool {
         let shape = self.limbs[limb].shape;
         let [fa0, fb0, fa1, fb1] = axes;
@@ -62,7 +62,7 @@ impl Body {
         true
     }
 
-    /// Makes the surface of a limb longer by a factor; joints and sites stay. A change that makes no solid is not made.
+    /// Lengthens the surface of a limb by a factor; joints and sites stay. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
         let shape = self.limbs[limb].shape;
         let (length, a1, b1) = (shape.length() * factor, shape.a1(), shape.b1());
@@ -71,7 +71,7 @@ impl Body {
         }
     }
 
-    /// Limbs that carry others, left and right together: they have one length.
+    /// Limbs that have children, grouped into left-right pairs of equal length.
     pub fn pairs(&self) -> Vec<Pair> {
         let groups = self.roles.groups();
         let mut pairs: Vec<Pair> = Vec::new();
@@ -84,7 +84,7 @@ impl Body {
         pairs
     }
 
-    /// Makes a limb longer by a factor, with all that is fixed to it. A change that makes no solid is not made.
+    /// Lengthens a limb by a factor, with everything fixed to it. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
         let shape = self.limbs[limb].shape;
         let Ok(shape) =
@@ -97,7 +97,7 @@ impl Body {
         true
     }
 
-    /// The body with a further limb joined to `parent`; its joint-facing proximal cap takes no matches.
+    /// The body with a further limb joined to `parent`. No points match the new limb's proximal cap, which faces the joint.
     pub fn with_limb(
         &self,
         name: &str,
@@ -114,7 +114,7 @@ impl Body {
         Self::new(self.name.clone(), limbs, all_sites)
     }
 
-    /// The body without a limb, its sites and all limbs that hang on it, and the indices of the limbs that stay.
+    /// The body without a limb, its sites and its descendants, and the indices of the remaining limbs.
     pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
         let removed = self.limb_index(name)?;
         if removed == 0 {

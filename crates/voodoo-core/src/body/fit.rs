@@ -1,48 +1,50 @@
-//! Pose and sizes of a body from named positions in the world.
+//! Fits pose and sizes of a body to named positions in the world.
 
 use super::{Body, Joint, JointKind};
 use crate::body::kinematics::joint_turn;
 use crate::error::TrackError;
 use crate::math::{Mat3, Moments, Pose, Quat, Vec3, is_place};
 
-/// A hinge bent by less than this does not tell its axis: sine of the angle between its limbs.
+/// A hinge bent by less than this does not determine its axis: sine of the angle between its limbs.
 const BENT: f64 = 0.3;
-/// Squares of coordinates up to these meters leave enough digits for a body; those of a map (UTM) do not.
+/// Squares of coordinates up to this many meters leave enough digits for a body; those of map coordinates (UTM) do not.
 const NEAR_ORIGIN: f64 = 1e4;
-/// Nobody means a body so many times larger or smaller than the reference body: the positions are not in meters.
+/// Maximum plausible scale relative to the reference body, up or down. Beyond it, the positions are probably not in meters.
 const LARGEST: f64 = 10.0;
-/// A landmark this share of a limb's length from its joint shows where the limb points.
+/// A landmark at least this fraction of a limb's length from its joint determines the limb's direction.
 const FAR_END: f64 = 0.5;
-/// A joint whose every range is narrower than this (radians) belongs to the trunk: spine and neck, not shoulder and hip.
+/// A joint whose ranges are all narrower than this (radians) belongs to the trunk: spine and neck, but not shoulder and hip.
 const STEADY: f64 = 2.5;
-/// A limb whose joint turns by less than this about any axis carries its landmarks for its parent: a clavicle for the chest.
+/// A limb whose joint rotates by less than this about every axis counts as rigid on its parent, so its landmarks also determine
+/// the parent: a clavicle for the chest.
 const RIGID: f64 = 1.0;
-/// Nobody's limb is shorter than this share of its pair: it was foreshortened, or one of its joints was set along it.
+/// Minimum plausible length of a limb relative to the other limb of its pair. A shorter one was foreshortened, or one of its
+/// joints was placed wrongly along it.
 const UNEQUAL: f64 = 0.75;
-/// Limbs whose axes are no farther apart than 30 degrees (cosine) are in line: where their joint is along it is hard to see.
+/// Limbs whose axes differ by at most 30 degrees (cosine) are in line: the position of their joint along the line is hard to see.
 const STRAIGHT: f64 = 0.866;
-/// Weight of the prior orientation against landmarks of weight one: it decides only what they leave open.
+/// Weight of the prior orientation relative to landmarks of weight one: it determines only what they leave open.
 const PRIOR_WEIGHT: f64 = 0.01;
-/// Lever of the prior orientation, meters: about the distance of landmarks on a limb.
+/// Lever of the prior orientation, meters: approximately the distance between landmarks on a limb.
 const PRIOR_LEVER: f64 = 0.1;
 
-/// Landmarks that lie this share of a limb's length apart along it tell how long it is.
+/// Landmarks that are at least this fraction of a limb's length apart along its axis determine its length.
 const SPREAD_ALONG: f64 = 0.3;
-/// No limb is stretched by more than this factor, or shrunk by more: it would be another person's, or a wrong landmark.
+/// Maximum factor by which a limb is stretched or shrunk. A larger factor indicates another person or a wrong landmark.
 const MOST_STRETCH: f64 = 2.0;
-/// Points lie on a line when the products of pairs of their scatter's eigenvalues are this share of its squared trace: as broad
-/// as a hundredth of their length.
+/// Points are collinear when the sum of pairwise products of their scatter's eigenvalues is below this fraction of its squared
+/// trace: their width is then a hundredth of their length.
 const ON_A_LINE: f64 = 1e-4;
-/// Points whose scatter has no larger trace than this, square meters, are one point.
+/// Points whose scatter has a trace of at most this, square meters, count as one point.
 const ON_A_POINT: f64 = 1e-8;
 
 impl Body {
-    /// World poses of all limbs, and the body itself in the sizes that the positions tell, from positions of sites.
+    /// Returns world poses of all limbs, and the body with the sizes that the positions determine, from positions of sites.
     ///
-    /// Any subset of sites will do that holds three positions which do not lie on a line. Limbs about which the positions
-    /// say nothing keep their rest orientation to their parent. With `fit_sizes` the body is scaled as a whole by the
-    /// distances between known landmarks of the same limb, then every limb is stretched and its landmarks put where they
-    /// were measured. Positions that make it more than ten times larger or smaller are refused.
+    /// Any subset of sites that contains three non-collinear positions is sufficient. Limbs without position information keep
+    /// their rest orientation relative to their parent. With `fit_sizes` the body is first scaled as a whole by the distances
+    /// between known landmarks of the same limb; then every limb is stretched and its landmarks are moved to the measured
+    /// positions. Positions that require a scale above ten or below a tenth are rejected.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         for (site, position) in positions {
             if !is_place(*position) {
@@ -67,7 +69,7 @@ impl Body {
         Ok((body, poses))
     }
 
-    /// `fit` in a frame in which the body is near.
+    /// `fit` in a frame whose origin is near the body.
     fn fit_near(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         let scale = if fit_sizes { self.scale_to(positions) } else { 1.0 };
         let mut body = self.scaled(scale)?;
@@ -106,12 +108,12 @@ impl Body {
         if fit_sizes {
             body.even_out(self, &poses);
         }
-        // The last limbs may have stretched after their parents were placed; every joint is closed once more.
+        // The last limbs may have been stretched after their parents were placed; all joints are closed once more.
         body.close_joints(&mut poses);
         Ok((body, poses))
     }
 
-    /// Landmarks of a limb, in its frame, that the positions tell, with their measured positions.
+    /// Landmarks of a limb, in its frame, whose positions are known, with their measured positions.
     fn known_landmarks(&self, limb: usize, positions: &[(usize, Vec3)]) -> Vec<(Vec3, Vec3)> {
         let mut pairs: Vec<(Vec3, Vec3)> = Vec::new();
         let mut add = |site: Option<usize>, local: Vec3| {
@@ -143,14 +145,15 @@ impl Body {
         pairs
     }
 
-    /// True when the limb moves little on its parent, which its landmarks then tell about: a clavicle on the chest.
+    /// Whether the limb moves little relative to its parent, so that its landmarks also determine the parent: a clavicle on the
+    /// chest.
     fn carried(&self, limb: usize) -> bool {
         let little =
             |joint: &Joint| joint.limits.is_some_and(|limits| limits.iter().all(|[low, high]| high - low < RIGID));
         self.limbs()[limb].parent.as_ref().is_some_and(|(_, joint)| little(joint))
     }
 
-    /// Scale of the whole body: measured over modeled distances between landmarks of the same limb.
+    /// Scale of the whole body: measured distances divided by model distances between landmarks of the same limb.
     fn scale_to(&self, positions: &[(usize, Vec3)]) -> f64 {
         let (mut measured, mut modeled) = (0.0, 0.0);
         for limb in 0..self.limbs().len() {
@@ -165,8 +168,8 @@ impl Body {
         if modeled > 0.0 && measured > 0.0 { measured / modeled } else { 1.0 }
     }
 
-    /// Orientation of the whole body: the landmarks of the trunk (the root and what its joints hold nearly upright on it)
-    /// where they fix it, else all sites, against the rest pose.
+    /// Orientation of the whole body. It uses the landmarks of the trunk (the root and limbs that move little on it) if they
+    /// determine it, else all sites, against the rest pose.
     fn overall_orientation(&self, positions: &[(usize, Vec3)]) -> Result<Pose, TrackError> {
         let rest = self.rest_pose(Pose::IDENTITY);
         let mut trunk = vec![true];
@@ -206,7 +209,7 @@ impl Body {
         {
             moments.add(1.0, prior * local, position);
         }
-        // A faint wish for the prior orientation: landmarks nearly on a line must not decide the turn about it.
+        // Weak prior orientation: nearly collinear landmarks must not determine the rotation about their line.
         let mean = if moments.weight > 0.0 { moments.p / moments.weight } else { prior.translation };
         let middle = if moments.weight > 0.0 { moments.x / moments.weight } else { prior.translation };
         for axis in Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]) {
@@ -229,7 +232,7 @@ impl Body {
         Pose::from_parts(translation, rotation.normalize())
     }
 
-    /// The axis of a hinge at the far end of a limb: in the limb frame, and as the bent child shows it in the world.
+    /// The axis of a hinge at the distal end of a limb: in the limb frame, and in the world as the bent child determines it.
     fn hinge_axis(&self, limb: usize, positions: &[(usize, Vec3)]) -> Option<(Vec3, Vec3)> {
         for (index, child) in self.limbs().iter().enumerate() {
             let Some((parent, joint)) = &child.parent else { continue };
@@ -240,7 +243,7 @@ impl Body {
             let (start, bend) = (measured(self.roles.joint_site(limb), positions)?, measured(center, positions)?);
             let own = |site: &usize| self.sites()[*site].limb == index && Some(*site) != center;
             let end = (0..self.sites().len()).filter(own).find_map(|site| measured(Some(site), positions));
-            // Without a site of its own, the joint of what hangs on the child shows where it points: a hand's wrist.
+            // If the child has no site of its own, the joint of its own child gives its direction: a hand's wrist.
             let end = end.or_else(|| {
                 let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
                 let landmarks = self.known_landmarks(index, positions).into_iter();
@@ -253,7 +256,7 @@ impl Body {
         None
     }
 
-    /// Puts the landmarks of a limb where they were measured and stretches its shape along.
+    /// Moves the landmarks of a limb to their measured positions and stretches its shape accordingly.
     fn stretch_limb(&mut self, limb: usize, pairs: &[(Vec3, Vec3)], pose: &Pose) {
         if pairs.len() < 2 {
             return;
@@ -291,9 +294,9 @@ impl Body {
         });
     }
 
-    /// A limb far shorter than its pair becomes as long. If the limb that it hangs on or carries is longer than its own pair
-    /// instead, a joint was set along the line of both: on the side that is less like `reference`, if it is straight, they keep
-    /// their length together, in the proportion of the other side.
+    /// Lengthens a limb that is far shorter than the other one of its pair. If the adjacent limb of the same arm or leg is longer
+    /// than its own pair instead, their common joint was placed wrongly along the line of both. The side that is less like
+    /// `reference` then keeps its total length, if it is straight, and divides it in the proportion of the other side.
     fn even_out(&mut self, reference: &Self, poses: &[Pose]) {
         let pairs = self.pairs();
         let length = |limb: usize| self.limbs[limb].shape.length();
@@ -320,7 +323,7 @@ impl Body {
                 if is_unequal(own) < is_unequal(opposite) { (opposite, own) } else { (own, opposite) }
             });
             match sides.filter(|(wrong, _)| straight(*wrong)) {
-                // Both limbs of a side may find this out.
+                // Both limbs of a side may lead to the same correction.
                 Some((wrong, _)) if factors.iter().any(|(limb, _)| wrong.contains(limb)) => {}
                 Some((wrong, right)) => {
                     let ratio = sum(wrong) / sum(right);
@@ -334,8 +337,8 @@ impl Body {
         }
     }
 
-    /// Turns the hinge on a limb so that its measured pose is one the hinge can take: nobody's elbow or knee axis is quite
-    /// square to the limbs (carrying angle). The axis on the parent stays.
+    /// Rotates the hinge on a limb so that the hinge can reach the measured pose: real elbow and knee axes are not exactly
+    /// perpendicular to the limbs (carrying angle). The axis on the parent stays.
     fn align_hinge(&mut self, limb: usize, poses: &[Pose]) {
         let Some((parent, joint)) = &mut self.limbs[limb].parent else { return };
         if joint.kind() == JointKind::Hinge {
@@ -345,7 +348,7 @@ impl Body {
         }
     }
 
-    /// Moves every limb so that the centers of its joint coincide.
+    /// Moves every limb so that the two centers of its joint coincide.
     pub(crate) fn close_joints(&self, poses: &mut [Pose]) {
         for (index, limb) in self.limbs().iter().enumerate() {
             if let Some((parent, joint)) = &limb.parent {
@@ -356,19 +359,19 @@ impl Body {
     }
 }
 
-/// Where a site was measured.
+/// The measured position of a site.
 fn measured(site: Option<usize>, positions: &[(usize, Vec3)]) -> Option<Vec3> {
     positions.iter().find(|(measured, _)| Some(*measured) == site).map(|(_, position)| *position)
 }
 
-/// Turns about the limb's own z axis so that `local` points towards `world` as closely as it can.
+/// Rotates about the limb's own z axis so that `local` points towards `world` as closely as possible.
 fn twist_towards(rotation: Quat, local: Vec3, world: Vec3) -> Quat {
     let target = rotation.inverse() * world;
     let angle = target.y.atan2(target.x) - local.y.atan2(local.x);
     rotation * Quat::from_axis_angle(Vec3::Z, angle)
 }
 
-/// True when the points do not lie on one line: the middle of their scatter's eigenvalues is above zero.
+/// Whether the points are not collinear: the middle eigenvalue of their scatter is above zero.
 fn spans_a_plane(points: impl Iterator<Item = Vec3> + Clone) -> bool {
     let count = points.clone().count() as f64;
     if count < 3.0 {

@@ -1,36 +1,36 @@
-//! The default humans: proportions as shares of the stature, standing with hanging arms at rest.
+//! The default humans: proportions as fractions of the stature, standing with hanging arms at rest.
 
 use super::{Body, Joint, Limb, Site};
 use crate::error::BodyError;
 use crate::math::{Mat3, Pose, Quat, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// How finely the human is divided.
+/// The level of detail of the human model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HumanModel {
-    /// Ten limbs and nine joints, as the papers have it (K06 III-C): torso, head, two limbs each arm and leg.
+    /// Ten limbs and nine joints, as in the papers (K06 III-C): torso, head, two limbs for each arm and leg.
     Papers,
-    /// Eighteen limbs: the torso split at the waist, neck, clavicles, hands and feet besides.
+    /// Eighteen limbs: in addition the torso is split at the waist, and there are neck, clavicles, hands and feet.
     #[default]
     Full,
 }
 
-// Heights of joint centers and segment lengths as shares of the stature: Drillis and Contini as tabulated in Winter,
+// Heights of joint centers and segment lengths as fractions of the stature: Drillis and Contini as tabulated in Winter,
 // "Biomechanics and Motor Control of Human Movement", 4th ed., fig. 4.1. Hip joint centers: Bell, Pedersen and Brand, 1990.
 const HIP: [f64; 2] = [0.052, 0.530];
 const KNEE: f64 = 0.285;
 const ANKLE: f64 = 0.039;
 const SHOULDER: [f64; 2] = [0.112, 0.818];
-/// Forward, outward and height of the sternoclavicular joint's center.
+/// Center of the sternoclavicular joint: forward, outward and height.
 const STERNOCLAVICULAR: [f64; 3] = [0.015, 0.030, 0.800];
-/// Where the slope of the shoulder begins beside the neck, outward and height.
+/// Start of the shoulder's slope beside the neck: outward and height.
 const SLOPE: [f64; 2] = [0.025, 0.838];
 const UPPER_ARM: f64 = 0.186;
-/// The shoulder's muscle rises above the joint's center.
+/// Height of the deltoid muscle above the shoulder joint's center.
 const DELTOID: f64 = 0.022;
 const FOREARM: f64 = 0.146;
 const HAND: f64 = 0.095;
-/// From the wrist to the knuckles.
+/// Distance from the wrist to the knuckles.
 const KNUCKLES: f64 = 0.075;
 const HAND_CENTER: f64 = 0.045;
 const WAIST: f64 = 0.630;
@@ -45,7 +45,7 @@ const TORSO: [f64; 4] = [0.068, 0.098, 0.064, 0.096];
 const PELVIS: [f64; 4] = [0.068, 0.098, 0.064, 0.088];
 const THORAX: [f64; 4] = [0.064, 0.090, 0.060, 0.092];
 const PAPERS_HEAD: [f64; 4] = [0.046, 0.040, 0.050, 0.042];
-/// Up and forward: the trapezius on the shoulder's slope.
+/// The semi-axes point up and forward: the trapezius on the shoulder's slope.
 const CLAVICLE: [f64; 4] = [0.034, 0.040, 0.030, 0.034];
 const NECK: [f64; 4] = [0.036, 0.035, 0.034, 0.033];
 const HEAD: [f64; 4] = [0.050, 0.040, 0.050, 0.042];
@@ -103,7 +103,7 @@ impl Builder {
         self.sites.push((name.into(), limb, position));
     }
 
-    /// Pelvis or torso, and all above the shoulders. Returns the limbs that carry the legs and the arms.
+    /// Adds the pelvis or torso, and the parts of the trunk above it. Returns the limbs that carry the legs and the arms.
     fn trunk(&mut self, model: HumanModel) -> (usize, usize) {
         let up = Quat::IDENTITY;
         let link = |name: &str, height: f64, semi_axes: [f64; 2], limits, motion| JointSpec {
@@ -159,7 +159,7 @@ impl Builder {
         let shoulder = Vec3::new(0.0, side * SHOULDER[0], SHOULDER[1]);
         let elbow = shoulder - Vec3::Z * UPPER_ARM;
         let wrist = elbow - Vec3::Z * FOREARM;
-        // The joint's y axis points backward: the left arm is raised sideways by negative turns about it.
+        // The joint's y axis points backward: negative rotations about it raise the left arm sideways.
         let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
         let carrier = match model {
             HumanModel::Papers => thorax,
@@ -195,7 +195,7 @@ impl Builder {
         self.site(named("hand"), last, wrist - Vec3::Z * HAND_CENTER);
     }
 
-    /// Carries the arm and moves a little on the chest: a raised arm raises its shoulder.
+    /// Adds a clavicle. It carries the arm and moves slightly on the chest: a raised arm raises its shoulder.
     fn clavicle(&mut self, prefix: &str, side: f64, shoulder: Vec3, thorax: usize) -> usize {
         // z outward along the slope of the shoulder, x up.
         let start = Vec3::new(0.0, side * SLOPE[0], SLOPE[1]);
@@ -206,7 +206,7 @@ impl Builder {
         let link = JointSpec {
             name: format!("{prefix}_sternoclavicular"),
             center: Vec3::new(x, side * y, z),
-            // The joint's x axis points forward: the left shoulder is raised by positive turns about it.
+            // The joint's x axis points forward: positive rotations about it raise the left shoulder.
             flexion: Vec3::X,
             along: Vec3::Z,
             semi_axes: [0.0; 2],
@@ -235,7 +235,7 @@ impl Builder {
         };
         let thigh =
             self.limb(named("thigh"), hip, down, HIP[1] - KNEE, THIGH_AXES, Some((pelvis, link_hip)), [false; 2]);
-        // A hanging calf bends backward: about the axis to the left.
+        // A hanging calf bends backward, which is a rotation about the axis to the left.
         let link_knee = JointSpec {
             name: named("knee"),
             center: knee,
@@ -304,7 +304,7 @@ impl Builder {
     }
 }
 
-/// Rotation of a limb that hangs: x stays forward, it is turned about it.
+/// Orientation of a hanging limb: z points down, x stays forward.
 fn hanging() -> Quat {
     Quat::from_axis_angle(Vec3::X, std::f64::consts::PI)
 }
@@ -322,8 +322,8 @@ fn mirrored([low, high]: [f64; 2], side: f64) -> [f64; 2] {
 impl Body {
     /// A human of a stature in meters, standing with hanging arms at rest.
     ///
-    /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges turn about
-    /// the joint frame's x axis; a positive angle is flexion.
+    /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges rotate about the
+    /// joint frame's x axis; a positive angle is flexion.
     pub fn human(stature: f64, model: HumanModel) -> Result<Self, BodyError> {
         if !(0.3..=3.0).contains(&stature) {
             return Err(BodyError::Value {

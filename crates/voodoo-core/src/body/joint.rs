@@ -19,9 +19,9 @@ pub struct Joint {
     pub semi_axes: [f64; 2],
     /// Strength relative to the other joints of a limb.
     pub weight: f64,
-    /// Least and greatest value of each component of the joint's rotation vector (joint frame, radians); `None`: free.
+    /// Minimum and maximum of each component of the joint's rotation vector (joint frame, radians); `None`: free.
     pub limits: Option<[[f64; 2]; 3]>,
-    /// Standard deviation of the joint's unexpected turn in 1/30 s, radians.
+    /// Standard deviation of the joint's unpredicted rotation in 1/30 s, radians.
     pub motion: f64,
 }
 
@@ -37,7 +37,7 @@ pub enum JointKind {
 }
 
 impl Joint {
-    /// Which case the semi-axes make.
+    /// The kind of joint that the semi-axes define.
     pub fn kind(&self) -> JointKind {
         match self.semi_axes.map(|axis| axis > 0.0) {
             [false, false] => JointKind::Universal,
@@ -46,7 +46,7 @@ impl Joint {
         }
     }
 
-    /// Ends of the bands in the joint frame; the same point on both limbs when the joint is closed.
+    /// Ends of the bands in the joint frame. They are the same points on both limbs when the joint is closed.
     pub fn band_points(&self) -> impl Iterator<Item = Vec3> + use<> {
         let [a, b] = self.semi_axes;
         let (points, count) = match self.kind() {
@@ -69,7 +69,7 @@ impl Joint {
         }
     }
 
-    /// Pose of the limb in its parent when the bands have length zero and the joint is not turned.
+    /// Pose of the limb in its parent when the bands have length zero and the joint rotation is zero.
     pub(crate) fn parent_from_limb_at_rest(&self) -> Pose {
         self.parent_from_joint * self.limb_from_joint.inverse()
     }

@@ -1,11 +1,11 @@
-//! The kinematic chain of a body: exact joints, unknowns are the root's twist and the joint angles (R07 section 2.2).
+//! The kinematic chain of a body: exact joints. The unknowns are the root's twist and the joint angles (R07 section 2.2).
 
 use nalgebra::Vector6;
 
 use crate::body::{Body, Joint, JointKind};
 use crate::math::{Pose, Quat, Vec3};
 
-/// Where the unknowns of each limb's joint stand in the vector of all unknowns; the root has six.
+/// Layout of the unknowns of all limbs' joints in the vector of unknowns; the root has six.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Chain {
     /// First unknown of each limb.
@@ -38,12 +38,12 @@ impl Chain {
     }
 }
 
-/// Number of a joint's freedoms: 1 of a hinge, else 3.
+/// Number of a joint's degrees of freedom: 1 for a hinge, else 3.
 pub(crate) fn freedoms(joint: &Joint) -> usize {
     if joint.kind() == JointKind::Hinge { 1 } else { 3 }
 }
 
-/// Below this angle, radians, the series stand in for quotients whose numerators lose all digits.
+/// Below this angle, radians, series replace quotients whose numerators lose all digits.
 const SMALL_ANGLE: f64 = 1e-4;
 
 /// Axis of a hinge in its joint frame.
@@ -51,7 +51,7 @@ pub fn hinge_axis(joint: &Joint) -> Vec3 {
     if joint.semi_axes[0] > 0.0 { Vec3::X } else { Vec3::Y }
 }
 
-/// Axes of a joint's freedoms in the world (`exp` of their combination turns the child), and how many they are.
+/// World axes of a joint's degrees of freedom (`exp` of their combination rotates the child), and their number.
 pub(crate) fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3], usize) {
     let rotation = world_from_parent.rotation * joint.parent_from_joint.rotation;
     match joint.kind() {
@@ -60,13 +60,13 @@ pub(crate) fn joint_axes(joint: &Joint, world_from_parent: &Pose) -> ([Vec3; 3],
     }
 }
 
-/// The spatial twist of a turn about `axis` through `center` (a screw without pitch, R07 eq. 14).
+/// The spatial twist of a rotation about `axis` through `center` (a screw without pitch, R07 eq. 14).
 pub(crate) fn screw(axis: Vec3, center: Vec3) -> Vector6<f64> {
     let v = center.cross(axis);
     Vector6::new(axis.x, axis.y, axis.z, v.x, v.y, v.z)
 }
 
-/// Turn of a joint: joint frame on the parent from joint frame on the limb; for a hinge only the part about its axis.
+/// Rotation of a joint: joint frame on the parent from joint frame on the limb. For a hinge only the part about its axis.
 pub fn joint_turn(joint: &Joint, world_from_parent: &Pose, world_from_limb: &Pose) -> Quat {
     let turn = (world_from_parent.rotation * joint.parent_from_joint.rotation).inverse()
         * (world_from_limb.rotation * joint.limb_from_joint.rotation);
@@ -81,12 +81,12 @@ pub fn joint_turn(joint: &Joint, world_from_parent: &Pose, world_from_limb: &Pos
     }
 }
 
-/// Pose of a limb from its parent's and the joint's turn; the joint is closed.
+/// Pose of a limb from its parent's pose and the joint's rotation; the joint is closed.
 pub fn place(joint: &Joint, world_from_parent: &Pose, turn: Quat) -> Pose {
     *world_from_parent * joint.parent_from_joint * Pose::from_rotation(turn) * joint.limb_from_joint.inverse()
 }
 
-/// `exp` of a spatial twist `(omega, v)` (R07 eq. 4, 5) in its pose form.
+/// `exp` of a spatial twist `(omega, v)` (R07 eq. 4, 5) as a pose.
 pub fn exp(twist: &Vector6<f64>) -> Pose {
     let omega = Vec3::new(twist[0], twist[1], twist[2]);
     let v = Vec3::new(twist[3], twist[4], twist[5]);

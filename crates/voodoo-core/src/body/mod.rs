@@ -1,4 +1,4 @@
-//! What is tracked: a tree of limbs joined by elastic bands, with named sites. Knows nothing of sensors.
+//! The tracked body: a tree of limbs joined by elastic bands, with named sites. Independent of sensors.
 
 mod edit;
 mod fit;
@@ -33,8 +33,8 @@ pub struct Limb {
     pub shape: TaperedEllipticCylinder,
     /// Index of the parent and the joint to it; `None` for the root.
     pub parent: Option<(usize, Joint)>,
-    /// Whether points may match the proximal and the distal cap. By default not where a joint is: the surface there lies
-    /// inside the body and its matches pull wrongly.
+    /// Whether points may match the proximal and the distal cap. By default, caps at joints are excluded: the surface there lies
+    /// inside the body, so its matches are wrong.
     pub match_caps: [bool; 2],
 }
 
@@ -49,7 +49,7 @@ pub struct Site {
     pub position: Vec3,
 }
 
-/// A tree of limbs; a parent always stands before its children.
+/// A tree of limbs; a parent always precedes its children.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     name: String,
@@ -59,7 +59,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// A body from its parts, checked.
+    /// Builds and validates a body from its parts.
     pub fn new(name: impl Into<String>, limbs: Vec<Limb>, sites: Vec<Site>) -> Result<Self, BodyError> {
         let mut body = Self { name: name.into(), limbs, sites, roles: Arc::default() };
         body.check()?;
@@ -82,7 +82,7 @@ impl Body {
         &self.sites
     }
 
-    /// What its limbs, joints and sites are on a human.
+    /// The roles of its limbs, joints and sites on a human.
     pub(crate) fn roles(&self) -> &Roles {
         &self.roles
     }
@@ -104,13 +104,14 @@ impl Body {
         joins(first, second) || joins(second, first)
     }
 
-    /// True when two limbs are neither joined nor joined to the same parent: others overlap at their joints in any pose.
+    /// Whether two limbs are neither joined nor joined to the same parent. Limbs that are joined overlap near their joints in any
+    /// pose.
     pub fn are_apart(&self, first: usize, second: usize) -> bool {
         let parent = |limb: usize| self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
         first != second && !self.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
     }
 
-    /// The limbs that hang on a limb.
+    /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
         let hangs = move |other: &usize| matches!(self.limbs[*other].parent, Some((parent, _)) if parent == limb);
         (0..self.limbs.len()).filter(hangs)
@@ -129,7 +130,7 @@ impl Body {
         poses
     }
 
-    /// Position of a site in the world. A site at the center of a joint lies midway between the two limbs' ends of it.
+    /// Position of a site in the world. A site at the center of a joint lies midway between the joint centers on the two limbs.
     pub fn site_position(&self, world_from_limb: &[Pose], site: usize) -> Vec3 {
         let Site { limb, position, .. } = self.sites[site];
         let position = world_from_limb[limb].transform_point(position);
@@ -141,8 +142,8 @@ impl Body {
         }
     }
 
-    /// The limb whose surface lies nearest to a point (about, see
-    /// [`TaperedEllipticCylinder::approximate_distance`]); the first of equals.
+    /// The limb whose surface is nearest to a point (approximately, see [`TaperedEllipticCylinder::approximate_distance`]); the
+    /// first of equals.
     pub(crate) fn closest_limb(&self, world_from_limb: &[Pose], point: Vec3) -> usize {
         let (mut closest, mut least) = (0, f64::INFINITY);
         for (index, (limb, pose)) in self.limbs.iter().zip(world_from_limb).enumerate() {
@@ -219,7 +220,7 @@ fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
     check_letters(key, name)
 }
 
-/// Tables of results are cut at tabs and line breaks, trees of bones at braces.
+/// Rejects characters that break file formats: tabs and line breaks separate table cells, braces delimit trees of bones.
 fn check_letters(key: &str, name: &str) -> Result<(), BodyError> {
     if name.chars().any(|letter| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}')) {
         let expected = "a name without tabs, line breaks and braces";

@@ -1,4 +1,4 @@
-//! What is tracked: the body in its current sizes, the sizes it was given in, and its arms and legs.
+//! The tracked model: the body with its current sizes, the reference body, and its arms and legs.
 
 use super::two_bone::TwoBone;
 use super::{Body, Joint};
@@ -6,12 +6,12 @@ use crate::error::{BodyError, TrackError};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// The tracked body. It changes when sizes are fitted and when limbs are edited, never with the pose.
+/// The tracked body. It changes when sizes are fitted and when limbs are edited, but not with the pose.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
-    /// The body in its current sizes.
+    /// The body with its current sizes.
     pub body: Body,
-    /// The body in the sizes it was given in: every start is fitted from these.
+    /// The body with the sizes that the user gave: every start is fitted from these.
     pub reference_body: Body,
     /// Arms and legs, with the lengths they had at the last start or edit.
     pub extremities: Vec<TwoBone>,
@@ -23,13 +23,13 @@ impl Model {
         Self { reference_body: body.clone(), extremities: TwoBone::from_body(&body), body }
     }
 
-    /// Takes the body in other sizes, or with other limbs.
+    /// Replaces the body by one with other sizes or other limbs.
     pub(crate) fn adopt(&mut self, body: Body) {
         self.extremities = TwoBone::from_body(&body);
         self.body = body;
     }
 
-    /// Sizes and world poses that put named sites (index, world position) where they are; see [`Body::fit`].
+    /// Fits sizes and world poses so that sites (index, world position) lie at the given positions; see [`Body::fit`].
     pub(crate) fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Body, Vec<Pose>), TrackError> {
         if let Some((site, _)) = positions.iter().find(|(site, _)| *site >= self.body.sites().len()) {
             return Err(TrackError::measurement("joints", "the index of a site", site.to_string()));
@@ -60,14 +60,14 @@ impl Model {
         self.edit(|body| body.with_limb(name, parent, shape, joint.clone(), sites.to_vec()))
     }
 
-    /// Removes a limb with all that hangs on it; returns the indices of those that stay.
+    /// Removes a limb with its descendants; returns the indices of the remaining limbs.
     pub(crate) fn remove_limb(&mut self, name: &str) -> Result<Vec<usize>, BodyError> {
         let (_, kept) = self.body.without_limb(name)?;
         self.edit(|body| body.without_limb(name).map(|(body, _)| body))?;
         Ok(kept)
     }
 
-    /// The same change in both sizes; on error neither changes.
+    /// Applies the same change to the current and the reference body; on error neither changes.
     fn edit(&mut self, change: impl Fn(&Body) -> Result<Body, BodyError>) -> Result<(), BodyError> {
         let (body, reference_body) = (change(&self.body)?, change(&self.reference_body)?);
         self.reference_body = reference_body;

@@ -1,14 +1,14 @@
-//! How people move: how usual the turns of their joints are together.
+//! Pose prior: how probable the joint rotations of a human pose are jointly.
 //!
-//! A normal distribution of the turns of the human's arms, legs and waist, learned from motion capture (`training/pose_prior.py`).
-//! Of other bodies nothing is known.
+//! A normal distribution over the joint rotations of the human's arms, legs and waist, learned from motion capture
+//! (`training/pose_prior.py`). There is no prior for other bodies.
 
 use super::pose_statistics::{MEAN, PRECISION};
 use super::{Body, JointKind, JointRole, Side};
 use crate::body::kinematics::joint_turn;
 use crate::math::{Pose, ShortestAxis};
 
-/// The joints, with the first of their components and how many these are: hinges have one.
+/// The joints, with the index of their first component and the number of components: hinges have one.
 const JOINTS: [(JointRole, usize, usize); 9] = [
     (JointRole::Waist, 0, 3),
     (JointRole::Shoulder(Side::Left), 3, 3),
@@ -22,7 +22,7 @@ const JOINTS: [(JointRole, usize, usize); 9] = [
 ];
 /// Number of components of all joints.
 const SIZE: usize = MEAN.len();
-/// How unusual a pose is: the squared Mahalanobis distance from the mean; 0 for bodies of which nothing is known.
+/// Squared Mahalanobis distance of a pose from the mean; 0 for bodies without a prior.
 pub(crate) fn squared_mahalanobis(body: &Body, poses: &[Pose]) -> f64 {
     let mut off = [0.0; SIZE];
     each_turn(body, poses, |component, value| off[component] = value);
@@ -37,7 +37,7 @@ pub(crate) fn squared_mahalanobis(body: &Body, poses: &[Pose]) -> f64 {
     sum
 }
 
-/// Calls `take` with the number and the difference from its mean of every component.
+/// Calls `take` with the index of every component and its difference from the mean.
 fn each_turn(body: &Body, poses: &[Pose], mut take: impl FnMut(usize, f64)) {
     let roles = body.roles();
     if !roles.is_human() {

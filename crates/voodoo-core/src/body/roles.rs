@@ -1,12 +1,12 @@
-//! What the limbs, joints and sites of a body are on a human, resolved from their names once.
+//! The roles of limbs, joints and sites on a human, resolved from their names once.
 //!
-//! Names are compared here and nowhere else in the core: the rest asks by index. A body without the names of a human has no roles,
-//! and what needs them stays off.
+//! This is the only place in the core that compares names; all other code uses indices. A body without human names has no roles,
+//! and features that need roles are disabled for it.
 
 use super::{Limb, Site};
 use crate::error::BodyError;
 
-/// Side of the body, its own.
+/// Side of the body, as the person's own left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     /// Names that begin with `l_`.
@@ -92,7 +92,7 @@ impl LimbRole {
         })
     }
 
-    /// The side of a limb that there are two of.
+    /// The side of a limb that exists on both sides.
     pub(crate) fn side(self) -> Option<Side> {
         match self {
             Self::Pelvis | Self::Thorax | Self::Neck | Self::Head => None,
@@ -125,7 +125,7 @@ impl JointRole {
         })
     }
 
-    /// The side of a joint that there are two of.
+    /// The side of a joint that exists on both sides.
     pub(crate) fn side(self) -> Option<Side> {
         match self {
             Self::Waist | Self::NeckBase | Self::SkullBase => None,
@@ -139,7 +139,7 @@ impl JointRole {
         }
     }
 
-    /// The joint of the same arm or leg that comes before it, and what that asks of a body.
+    /// The preceding joint of the same arm or leg, and the resulting requirement for the body as a message.
     fn after(self) -> Option<(Self, &'static str)> {
         match self {
             Self::Shoulder(side) => {
@@ -154,27 +154,27 @@ impl JointRole {
     }
 }
 
-/// What the limbs, joints and sites of a body are on a human. It follows from their names; sizes do not change it.
+/// The roles of the limbs, joints and sites of a body on a human. They follow from names and do not depend on sizes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Roles {
     human: bool,
-    /// Limb by limb: what it is, what the joint to its parent is, and the site named like that joint.
+    /// For each limb: its role, the role of the joint to its parent, and the site named like that joint.
     limbs: Vec<Option<LimbRole>>,
     joints: Vec<Option<JointRole>>,
     joint_sites: Vec<Option<usize>>,
     groups: Vec<u16>,
-    /// Site by site.
+    /// For each site: its role.
     sites: Vec<Option<JointRole>>,
     /// Pairs of a clavicle and the upper arm that it carries.
     clavicles: Vec<[usize; 2]>,
 }
 
 impl Roles {
-    /// Resolves the names of a body whose parents stand before their children.
+    /// Resolves the names of a body in which parents precede their children.
     ///
     /// # Errors
-    /// [`BodyError::Role`] when a limb and its joint are named after different sides, or when an arm's or a leg's joint does
-    /// not follow the one before it: detections and statistics of human joints would be taken for the wrong limbs.
+    /// [`BodyError::Role`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
+    /// follow the preceding one. Detections and statistics of human joints would otherwise be applied to the wrong limbs.
     pub(super) fn resolve<'a>(body: &str, limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
         let site = |name: &str| sites.iter().position(|site| site.name == name);
@@ -189,7 +189,7 @@ impl Roles {
         };
         roles.check(limbs, sites)?;
         for (limb, description) in limbs.iter().enumerate() {
-            // What else somebody has hung on a clavicle is no arm.
+            // Other limbs that a user attached to a clavicle are not arms.
             if let (Some((parent, _)), Some(JointRole::Shoulder(_))) = (&description.parent, roles.joint(limb))
                 && roles.is_clavicle(*parent)
             {
@@ -213,7 +213,7 @@ impl Roles {
             if opposite(index, role) {
                 return wrong("a joint of the limb's own side", joint.name.clone());
             }
-            // A second joint of the same name is something else that hangs there.
+            // A second joint of the same name belongs to another limb that is attached there.
             let Some((before, expected)) = role.after().filter(|_| self.limb_at(role) == Some(index)) else { continue };
             let Some(before) = self.limb_at(before) else { continue };
             if !std::iter::successors(Some(*hangs_on), |limb| parent(*limb)).any(|limb| limb == before) {
@@ -232,22 +232,22 @@ impl Roles {
         Ok(())
     }
 
-    /// Whether the body is said to be a human: statistics of human poses hold for it.
+    /// Whether the body has the roles of a human, so that statistics of human poses apply to it.
     pub(crate) fn is_human(&self) -> bool {
         self.human
     }
 
-    /// What a limb is.
+    /// The role of a limb.
     pub(crate) fn limb(&self, limb: usize) -> Option<LimbRole> {
         self.limbs.get(limb).copied().flatten()
     }
 
-    /// What the joint between a limb and its parent is.
+    /// The role of the joint between a limb and its parent.
     pub(crate) fn joint(&self, limb: usize) -> Option<JointRole> {
         self.joints.get(limb).copied().flatten()
     }
 
-    /// The limb that hangs by a joint; the first of several.
+    /// The limb whose joint to its parent has this role; the first of several.
     pub(crate) fn limb_at(&self, joint: JointRole) -> Option<usize> {
         self.joints.iter().position(|role| *role == Some(joint))
     }
@@ -258,12 +258,12 @@ impl Roles {
         self.sites.iter().position(|role| *role == Some(joint))
     }
 
-    /// The site at the center of the joint between a limb and its parent, whatever they are: the one of the joint's name.
+    /// The site at the center of the joint between a limb and its parent, found by the joint's name, whatever its role.
     pub(crate) fn joint_site(&self, limb: usize) -> Option<usize> {
         self.joint_sites.get(limb).copied().flatten()
     }
 
-    /// Whether a limb hangs by a sternoclavicular joint.
+    /// Whether the joint of a limb to its parent is a sternoclavicular joint.
     pub(crate) fn is_clavicle(&self, limb: usize) -> bool {
         matches!(self.joint(limb), Some(JointRole::Sternoclavicular(_)))
     }
@@ -273,13 +273,13 @@ impl Roles {
         &self.clavicles
     }
 
-    /// A number for each limb, the same for a limb and its counterpart on the other side; counted from 0, in any body.
+    /// A group number for each limb, shared by a limb and its counterpart on the other side; counted from 0, for any body.
     pub(crate) fn groups(&self) -> &[u16] {
         &self.groups
     }
 }
 
-/// A name's side, and the rest of it.
+/// Splits a name into its side and the rest.
 fn split(name: &str) -> (Option<Side>, &str) {
     match (name.strip_prefix("l_"), name.strip_prefix("r_")) {
         (Some(stem), _) => (Some(Side::Left), stem),
@@ -288,7 +288,7 @@ fn split(name: &str) -> (Option<Side>, &str) {
     }
 }
 
-/// Numbers of the limbs' names without their sides.
+/// Group numbers from the limbs' names without their sides.
 fn groups<'a>(limbs: &'a [Limb]) -> Vec<u16> {
     let mut stems: Vec<&str> = Vec::new();
     let number = |limb: &'a Limb| {
@@ -314,7 +314,8 @@ mod tests {
         Body::human(1.75, model).unwrap()
     }
 
-    /// A chain of limbs: their names, the names of the joints to the limb before, and sites in the middle of those joints.
+    /// A chain of limbs from pairs of a limb's name and the name of the joint to the limb before, with sites in the middle of
+    /// those joints.
     fn chain(names: &[[&str; 2]]) -> Result<Body, BodyError> {
         let shape = TaperedEllipticCylinder::new(0.3, 0.05, 0.05, 0.05, 0.05).unwrap();
         let joint = |name: &str| Joint {
@@ -382,7 +383,7 @@ mod tests {
         let of = |name: &str| groups[body.limb_index(name).unwrap()];
         assert_eq!([of("l_calf"), of("l_hand")], [of("r_calf"), of("r_hand")]);
         assert_ne!(of("l_calf"), of("l_thigh"));
-        // Four limbs of the trunk and the head, and seven on each side.
+        // Four limbs of the trunk and head, and seven on each side.
         assert_eq!((groups.len(), groups.iter().max()), (18, Some(&10)));
     }
 
@@ -434,7 +435,7 @@ mod tests {
             refused(&[["torso", ""], ["low", "l_elbow"], ["high", "l_shoulder"]]),
             "limbs.low.joint.name: expected an elbow beyond the shoulder of its side, found l_elbow on torso"
         );
-        // Without its shoulder, an elbow may be anywhere.
+        // Without its shoulder, an elbow may be attached anywhere.
         assert!(chain(&[["torso", ""], ["low", "l_elbow"], ["high", "r_shoulder"]]).is_ok());
         let body = human(HumanModel::Papers);
         let mut sites = body.sites().to_vec();

@@ -1,17 +1,17 @@
-//! A raised arm raises its shoulder: the scapulohumeral rhythm (Inman, Saunders and Abbott, "Observations on the function of the
-//! shoulder joint", 1944).
+//! Raises the shoulder of a raised arm: the scapulohumeral rhythm (Inman, Saunders and Abbott, "Observations on the function of
+//! the shoulder joint", 1944).
 //!
-//! A camera hardly sees a clavicle turn. Held where it was, it leaves the shoulder of an arm that is stretched upwards 8 to 13 cm
-//! too low, and the arm with it.
+//! The rotation of a clavicle is hardly visible to a camera. If the clavicle stayed fixed, the shoulder of an arm that is
+//! stretched upwards would be 8 to 13 cm too low, and the arm with it.
 
 use super::Body;
 use crate::math::{Pose, Quat, Vec3};
 
-/// So far does a clavicle turn for an arm that turns by one beyond the horizontal.
+/// Rotation of the clavicle per rotation of the arm above the horizontal.
 const RHYTHM: f64 = 0.3;
 
-/// Turns the clavicles of `predicted` by what arms have risen beyond the horizontal from `previous` to `current`, or sunk again. The
-/// arms keep their directions, and joints stay closed.
+/// Rotates the clavicles of `predicted` by the change in the arms' elevation above the horizontal from `previous` to `current`.
+/// The arms keep their directions, and joints stay closed.
 pub(crate) fn raise_shoulders(body: &Body, previous: &[Pose], current: &[Pose], predicted: &mut [Pose]) {
     let limbs = body.limbs();
     let mut raised = false;
@@ -49,7 +49,7 @@ mod tests {
     use crate::body::HumanModel;
     use crate::testing::farthest;
 
-    /// A body, and its poses with the left arm sideways, so far from hanging down, radians.
+    /// A body, and its poses with the left arm raised sideways by `angle` from hanging, radians.
     fn sideways(angle: f64) -> (Body, Vec<Pose>) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let mut poses = body.rest_pose(Pose::IDENTITY);

@@ -1,30 +1,31 @@
-//! Other configurations of a limb chain, tried when the current one leaves points unexplained or contradicts the images.
+//! Two-bone chains (arms and legs). Other configurations of them are tried when the current one leaves points unexplained or
+//! contradicts the images.
 
 use crate::body::kinematics::{hinge_axis, place};
 use crate::body::{Body, JointKind};
 use crate::math::{Mat3, Pose, Quat, Vec3};
 
-/// The chain ends at this share of what hangs on its lower limb: in the middle of a fist.
+/// The chain ends at this fraction of the length of what is attached to its lower limb: in the middle of a fist.
 const GRASP: f64 = 0.6;
-/// A chain is stretched and folded to within this, meters: at the limit its bend has no direction.
+/// Distance that is kept from a fully stretched and a fully folded chain, meters: there the bend has no direction.
 const SLACK: f64 = 1e-3;
-/// The same as a share of the shorter bone, where that is less: a toy body may be smaller.
+/// The same distance as a fraction of the shorter bone, used where it is smaller, as for a toy body.
 const SLACK_FRACTION: f64 = 0.1;
-/// A chain bent by less than this (sine) is straight and keeps its hinge axis.
+/// A chain bent by less than this (sine) counts as straight and keeps its hinge axis.
 const STRETCHED: f64 = 0.05;
 
-/// A ball joint with a hinge behind it: an arm or a leg.
+/// A ball joint followed by a hinge: an arm or a leg.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TwoBone {
-    /// The limb on the ball joint.
+    /// The limb at the ball joint.
     pub upper: usize,
-    /// The limb on the hinge.
+    /// The limb at the hinge.
     pub lower: usize,
-    /// What hangs on the lower limb.
+    /// Descendants of the lower limb.
     pub ends: Vec<usize>,
-    /// Lengths of the two bones, the second with what hangs on it, meters.
+    /// Lengths of the two bones, meters; the second includes what is attached to it.
     pub lengths: [f64; 2],
-    /// It hangs on the near end of the body's root limb: the body stands on it.
+    /// Whether it is attached to the proximal end of the body's root limb, so that the body stands on it.
     pub leg: bool,
 }
 
@@ -45,7 +46,7 @@ impl TwoBone {
             let first = (hinge.parent_from_joint.translation - ball.limb_from_joint.translation).length();
             let reach = |end: &usize| {
                 let shape = &limbs[*end].shape;
-                // A foot points across the calf: only what goes on along it makes the bone longer.
+                // A foot is perpendicular to the calf: only the component along the calf lengthens the bone.
                 let along = limbs[*end]
                     .parent
                     .as_ref()
@@ -72,13 +73,13 @@ impl TwoBone {
         }
     }
 
-    /// Stretched length.
+    /// Length of the stretched chain.
     pub(crate) fn stretched_length(&self) -> f64 {
         self.lengths[0] + self.lengths[1]
     }
 
-    /// Puts the chain so that its end is at `target` as nearly as it reaches, with the bend turned by `swivel` radians about
-    /// the line to it; the joints stay closed.
+    /// Poses the chain so that its end is as near to `target` as it can reach, with the bend rotated by `swivel` radians about
+    /// the line to the target. The joints stay closed.
     pub(crate) fn reach(&self, body: &Body, poses: &mut [Pose], target: Vec3, swivel: f64) {
         let root = self.root(body, poses);
         let [first, second] = self.lengths;
@@ -94,12 +95,13 @@ impl TwoBone {
         self.place_between(body, poses, bend, end);
     }
 
-    /// Where the chain ends.
+    /// Position of the chain's end.
     pub(crate) fn end(&self, poses: &[Pose]) -> Vec3 {
         poses[self.lower] * (Vec3::Z * self.lengths[1])
     }
 
-    /// Puts the chain so that it bends towards one place and ends in the direction of another one; the joints stay closed.
+    /// Poses the chain so that it bends towards the position `bend` and ends in the direction of the position `end`. The joints
+    /// stay closed.
     pub(crate) fn place_between(&self, body: &Body, poses: &mut [Pose], bend: Vec3, end: Vec3) {
         let root = self.root(body, poses);
         let (Some((_, ball)), Some((_, hinge))) = (&body.limbs()[self.upper].parent, &body.limbs()[self.lower].parent)
@@ -108,7 +110,7 @@ impl TwoBone {
         };
         let (u, f) = ((bend - root).normalize_or_zero(), (end - bend).normalize_or_zero());
         let axis = u.cross(f);
-        // A straight limb keeps the hinge axis it has.
+        // A straight limb keeps its current hinge axis.
         let current = poses[self.upper].rotation * (hinge.parent_from_joint.rotation * hinge_axis(hinge));
         let axis = if axis.length() > STRETCHED { axis } else { current - u * current.dot(u) };
         let local_u = (hinge.parent_from_joint.translation - ball.limb_from_joint.translation).normalize_or_zero();

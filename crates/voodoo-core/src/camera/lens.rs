@@ -1,43 +1,45 @@
-//! Lens models: where a lens puts a direction, and back.
+//! Lens models: distortion of directions and its inverse.
 //!
-//! All work on normalized coordinates, those of a camera with focal length one: `(x/z, y/z)` of a point, and where the lens puts it.
-//! The formulas and the order of coefficients are OpenCV's (documentation of `calib3d` and of `fisheye`).
+//! All functions use normalized coordinates, those of a camera with focal length one: `(x/z, y/z)` of a point, and their
+//! distorted position. The formulas and the order of coefficients are those of OpenCV (documentation of `calib3d` and of
+//! `fisheye`).
 
 use crate::error::CameraError;
 
-/// How a lens distorts.
+/// The distortion model of a lens, with its coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Lens {
-    /// Not at all.
+    /// No distortion.
     #[default]
     Pinhole,
     /// Brown-Conrady: `k1 k2 p1 p2 k3`.
     PlumbBob([f64; 5]),
-    /// The same with a denominator, thin prism and tilted sensor: `k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty`.
+    /// Brown-Conrady with a denominator, thin prism and tilted sensor: `k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx ty`.
     Rational([f64; 14]),
-    /// Kannala-Brandt on the angle to the optical axis: `k1 k2 k3 k4`. All zero is the equidistant lens, no pinhole.
+    /// Kannala-Brandt on the angle to the optical axis: `k1 k2 k3 k4`. With all zero it is the equidistant lens, not a pinhole.
     Fisheye([f64; 4]),
     /// Brown-Conrady from distorted to undistorted coordinates, as RealSense calibrates its color cameras: `k1 k2 p1 p2 k3`.
     InversePlumbBob([f64; 5]),
 }
 
-/// Iterations of Newton's method at most; some ten are needed near the border of a lens's domain, three elsewhere.
-const MOST_STEPS: usize = 60;
-/// A step is halved at most to this share.
+/// Maximum number of Newton iterations; approximately ten are needed near the border of a lens's domain, three elsewhere.
+const NEWTON_STEPS: usize = 60;
+/// Minimum fraction to which a step is halved.
 const LEAST_FRACTION: f64 = 1e-4;
-/// Error up to which an inverse counts as found: a millionth of a pixel at a focal length of 1e6 pixels, of coordinates up to one.
+/// Error below which an inverse counts as found: a millionth of a pixel at a focal length of 1e6 pixels, for coordinates up to
+/// one.
 const ACCEPTED: f64 = 1e-12;
-/// A ray lies so far within the border of the domain, of its squared radius, that it still does when it is rounded to single precision.
+/// Margin of rays inside the domain, as a factor of its squared radius: they are still inside when rounded to single precision.
 const INSIDE: f64 = 1.0 - 1e-6;
 
 impl Lens {
-    /// The lens of a `sensor_msgs/CameraInfo`: its `distortion_model` and `d`; coefficients that are left out at the end are zero.
+    /// The lens of a `sensor_msgs/CameraInfo`: its `distortion_model` and `d`. Missing trailing coefficients are zero.
     ///
-    /// Known are `plumb_bob` (0, 4 or 5 coefficients), `rational_polynomial` (0, 8, 12 or 14), `equidistant` (0 or 4), and
-    /// `inverse_plumb_bob` (0, 4 or 5). Polynomials whose coefficients are all zero make a pinhole.
+    /// Supported are `plumb_bob` (0, 4 or 5 coefficients), `rational_polynomial` (0, 8, 12 or 14), `equidistant` (0 or 4), and
+    /// `inverse_plumb_bob` (0, 4 or 5). Polynomials whose coefficients are all zero give a pinhole.
     ///
     /// # Errors
-    /// [`CameraError`] when the model is not known or the number of coefficients does not fit it.
+    /// [`CameraError`] when the model is unknown or the number of coefficients does not fit it.
     pub fn from_model(model: &str, coefficients: &[f64]) -> Result<Self, CameraError> {
         let counts: (&[usize], &'static str) = match model {
             "plumb_bob" | "inverse_plumb_bob" => (&[0, 4, 5], "0, 4 or 5 coefficients"),
@@ -62,7 +64,7 @@ impl Lens {
         })
     }
 
-    /// The `distortion_model` of [`Lens::from_model`] that makes it.
+    /// The `distortion_model` that [`Lens::from_model`] accepts for this lens.
     pub fn model(&self) -> &'static str {
         match self {
             Self::Pinhole | Self::PlumbBob(_) => "plumb_bob",
@@ -82,8 +84,8 @@ impl Lens {
         }
     }
 
-    /// Square of the radius up to which the radial part grows with the radius: beyond, two directions fall on one place. Of
-    /// undistorted coordinates, of distorted ones for [`Lens::InversePlumbBob`].
+    /// Square of the radius up to which the radial part grows with the radius: beyond it, two directions have the same image. The
+    /// radius is in undistorted coordinates, for [`Lens::InversePlumbBob`] in distorted ones.
     pub(super) fn domain(&self) -> f64 {
         match self {
             Self::Pinhole => f64::INFINITY,
@@ -97,7 +99,7 @@ impl Lens {
         }
     }
 
-    /// Where the lens puts `(x/z, y/z)`; none outside of its domain.
+    /// Distorts `(x/z, y/z)`; `None` outside of its domain.
     #[inline(never)]
     pub(super) fn distorted(&self, at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
         let within = at[0] * at[0] + at[1] * at[1] <= domain;
@@ -110,7 +112,7 @@ impl Lens {
         }
     }
 
-    /// The `(x/z, y/z)` that the lens puts there; none where it puts nothing.
+    /// Inverts the distortion; `None` for positions outside the image of the domain.
     pub(super) fn undistorted(&self, at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
         match self {
             Self::Pinhole => Some(at),
@@ -123,7 +125,7 @@ impl Lens {
         }
     }
 
-    /// Derivative of [`Lens::distorted`]: row by row those of its coordinates.
+    /// Jacobian of [`Lens::distorted`], row by row.
     pub(super) fn derivative(&self, at: [f64; 2], domain: f64) -> Option<[[f64; 2]; 2]> {
         let within = at[0] * at[0] + at[1] * at[1] <= domain;
         match self {
@@ -150,7 +152,7 @@ fn term<const N: usize>(k: &[f64; N], index: usize) -> f64 {
     if index < N { k[index] } else { 0.0 }
 }
 
-/// The polynomial models.
+/// Evaluates the polynomial models.
 #[inline]
 fn bend<const N: usize>(k: &[f64; N], [x, y]: [f64; 2]) -> [f64; 2] {
     let r2 = x * x + y * y;
@@ -176,7 +178,7 @@ fn bend<const N: usize>(k: &[f64; N], [x, y]: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Its derivative.
+/// Jacobian of [`bend`].
 fn bend_derivative<const N: usize>(k: &[f64; N], [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
     let r2 = x * x + y * y;
     let [upper, upper_slope] = cubic([k[0], k[1], k[4]], r2);
@@ -206,28 +208,28 @@ fn cubic([a, b, c]: [f64; 3], s: f64) -> [f64; 2] {
     [1.0 + s * (a + s * (b + s * c)), a + s * (2.0 * b + 3.0 * s * c)]
 }
 
-/// The homography of a tilted sensor; none where it is not tilted.
+/// The homography of a tilted sensor; `None` without tilt.
 fn tilt<const N: usize>(k: &[f64; N]) -> Option<[[f64; 3]; 3]> {
     let (tx, ty) = (term(k, 12), term(k, 13));
     if tx == 0.0 && ty == 0.0 {
         return None;
     }
     let ((sx, cx), (sy, cy)) = (tx.sin_cos(), ty.sin_cos());
-    // Turned about x, then about y, and projected back onto the plane at z = 1.
+    // Rotated about x, then about y, and projected back onto the plane at z = 1.
     let turn = [[cy, sy * sx, -sy * cx], [0.0, cx, sx], [sy, -cy * sx, cy * cx]];
     let depth = turn[2][2];
     let row = |axis: usize| [0, 1, 2].map(|column| depth * turn[axis][column] - turn[axis][2] * turn[2][column]);
     Some([row(0), row(1), turn[2]])
 }
 
-/// Whether neighbors of a place keep their order there.
+/// Whether the mapping preserves orientation at a point.
 fn grows<const N: usize>(k: &[f64; N], at: [f64; 2]) -> bool {
     let [[a, b], [c, d]] = bend_derivative(k, at);
     a > 0.0 && a * d - b * c > 0.0
 }
 
-/// The place within the domain that [`bend`] puts at `target`: Newton's method from `target` on, with steps that are halved until
-/// they lead nearer and stay within the domain.
+/// The point within the domain that [`bend`] maps to `target`: Newton's method starting at `target`, with steps that are halved
+/// until they reduce the error and stay within the domain.
 fn unbend<const N: usize>(k: &[f64; N], target: [f64; 2], domain: f64) -> Option<[f64; 2]> {
     let square = target[0] * target[0] + target[1] * target[1];
     if !square.is_finite() {
@@ -241,7 +243,7 @@ fn unbend<const N: usize>(k: &[f64; N], target: [f64; 2], domain: f64) -> Option
     };
     let size = |off: [f64; 2]| off[0].hypot(off[1]);
     let mut off = miss(at);
-    'newton: for _ in 0..MOST_STEPS {
+    'newton: for _ in 0..NEWTON_STEPS {
         let [[a, b], [c, d]] = bend_derivative(k, at);
         let determinant = a * d - b * c;
         let step = [(d * off[0] - b * off[1]) / determinant, (a * off[1] - c * off[0]) / determinant];
@@ -260,11 +262,11 @@ fn unbend<const N: usize>(k: &[f64; N], target: [f64; 2], domain: f64) -> Option
     (size(off) <= ACCEPTED * (1.0 + square.sqrt()) && grows(k, at)).then_some(at)
 }
 
-/// Square of the radius up to which the radial part of a polynomial model grows, and its denominator is positive.
+/// Square of the radius up to which the radial part of a polynomial model grows and its denominator is positive.
 fn polynomial_domain<const N: usize>(k: &[f64; N]) -> f64 {
     let upper = [1.0, k[0], k[1], k[4]];
     let lower = [1.0, term(k, 5), term(k, 6), term(k, 7)];
-    // The numerator of the derivative of r U(s) / L(s) by r, where s = r^2: U L + 2 s (U' L - U L').
+    // The numerator of the derivative of r U(s) / L(s) with respect to r, where s = r^2: U L + 2 s (U' L - U L').
     let mut growth = [0.0; 7];
     for (i, u) in upper.iter().enumerate() {
         for (j, l) in lower.iter().enumerate() {
@@ -274,15 +276,15 @@ fn polynomial_domain<const N: usize>(k: &[f64; N]) -> f64 {
     first_root(&growth).min(first_root(&lower))
 }
 
-/// The smallest positive root of a polynomial, constant term first, which is positive at zero; infinite without one.
+/// The smallest positive root of a polynomial (constant term first) that is positive at zero; infinite without one.
 fn first_root(polynomial: &[f64]) -> f64 {
     positive_roots(polynomial).first().copied().unwrap_or(f64::INFINITY)
 }
 
-/// Where a polynomial changes its sign, ascending: at most once between neighboring roots of its derivative.
+/// The positive points where a polynomial changes its sign, ascending: at most one between neighboring roots of its derivative.
 fn positive_roots(polynomial: &[f64]) -> Vec<f64> {
-    /// No lens is asked beyond this squared radius: a degree off the camera's plane is 57.
-    const FARTHEST: f64 = 1e9;
+    /// Maximum squared radius for any lens: a direction one degree from the camera plane has a radius of 57.
+    const LARGEST_SQUARED_RADIUS: f64 = 1e9;
     let Some(degree) = polynomial.iter().rposition(|value| *value != 0.0).filter(|degree| *degree > 0) else {
         return Vec::new();
     };
@@ -290,7 +292,7 @@ fn positive_roots(polynomial: &[f64]) -> Vec<f64> {
     let derivative: Vec<f64> = (1..=degree).map(|power| power as f64 * polynomial[power]).collect();
     let mut edges = vec![0.0];
     edges.extend(positive_roots(&derivative));
-    edges.push(FARTHEST);
+    edges.push(LARGEST_SQUARED_RADIUS);
     let mut roots = Vec::new();
     for edge in edges.windows(2) {
         let (mut low, mut high) = (edge[0], edge[1]);
@@ -311,7 +313,7 @@ fn positive_roots(polynomial: &[f64]) -> Vec<f64> {
     roots
 }
 
-/// Angle in the image for one to the optical axis, by Kannala and Brandt, and its derivative.
+/// The angle in the image for an angle to the optical axis (Kannala and Brandt), and its derivative.
 fn image_angle([k1, k2, k3, k4]: &[f64; 4], angle: f64) -> [f64; 2] {
     let s = angle * angle;
     let slope = 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * (7.0 * k3 + s * 9.0 * k4)));
@@ -338,7 +340,7 @@ fn fisheye_derivative(k: &[f64; 4], [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
     [[across + (along - across) * cos * cos, mixed], [mixed, across + (along - across) * sin * sin]]
 }
 
-/// Newton's method on the angle, between bounds that it narrows: the image's angle grows with it.
+/// Newton's method on the angle within a shrinking bracket: the angle in the image grows with it.
 fn fisheye_inverse(k: &[f64; 4], at: [f64; 2], domain: f64) -> Option<[f64; 2]> {
     let target = at[0].hypot(at[1]);
     let (mut low, mut high) = (0.0, domain.sqrt().atan());
@@ -349,7 +351,7 @@ fn fisheye_inverse(k: &[f64; 4], at: [f64; 2], domain: f64) -> Option<[f64; 2]> 
         return Some(at);
     }
     let mut angle = target.min(high);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..NEWTON_STEPS {
         let [value, slope] = image_angle(k, angle);
         if value == target {
             break;
@@ -377,7 +379,7 @@ mod tests {
 
     #[test]
     fn roots_are_found_between_those_of_the_derivative() {
-        // (1 - s)(2 - s)(5 - s), and one without a positive root.
+        // (1 - s)(2 - s)(5 - s), and a polynomial without a positive root.
         let found = positive_roots(&[10.0, -17.0, 8.0, -1.0]);
         assert!(found.len() == 3 && found.iter().zip([1.0, 2.0, 5.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
         assert_eq!(first_root(&[1.0, 3.0, 0.5]), f64::INFINITY);

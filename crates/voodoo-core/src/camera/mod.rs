@@ -1,4 +1,4 @@
-//! A calibrated camera: pixels of points, and the rays behind pixels, through its lens.
+//! A calibrated camera: projects points to pixels through its lens, and returns the rays of pixels.
 
 mod lens;
 
@@ -10,20 +10,22 @@ use crate::math::Vec3;
 
 pub use lens::Lens;
 
-/// Pixels of an image at most, those of an 8K picture: more would be a mistyped size, and memory by the gigabyte.
+/// Maximum number of pixels of an image, those of an 8K image. A larger size is probably a typing error and would need gigabytes
+/// of memory.
 pub(crate) const MOST_PIXELS: usize = 1 << 25;
-/// A place nearer to the camera plane than this, meters, is in no pixel: no sensor measures there, and the projection blows up.
+/// Minimum distance of a point from the camera plane, meters. Nearer points are in no pixel: no sensor measures there, and the
+/// projection diverges.
 pub(crate) const NEAREST_RETURN: f64 = 0.05;
-/// Parts into which a side of a rectangle is cut to follow its picture through a lens.
+/// Number of parts into which each side of a rectangle is divided to follow its image through a lens.
 const SIDE_PARTS: usize = 16;
 
 /// A calibrated camera in its optical frame: x right, y down, z forward, meters. Integer pixel coordinates are pixel centers.
 ///
-/// The one camera model of the tracker: images carry a reference to theirs. A point `(x, y, z)` is seen in the pixel
-/// `(fx X + cx, fy Y + cy)`, where `(X, Y)` is where the [`Lens`] puts `(x/z, y/z)`.
+/// Images carry a reference to their camera. A point `(x, y, z)` is observed in the pixel `(fx X + cx, fy Y + cy)`, where
+/// `(X, Y)` is the position to which the [`Lens`] distorts `(x/z, y/z)`.
 ///
 /// ```
-/// use voodoo_core::camera::{Camera, Lens};
+/// use voodoo_core::{Camera, Lens};
 /// use voodoo_core::math::Vec3;
 ///
 /// # fn main() -> Result<(), voodoo_core::CameraError> {
@@ -43,7 +45,7 @@ pub struct Camera {
     focal: [f64; 2],
     center: [f64; 2],
     lens: Lens,
-    /// Of the lens, see [`Lens::domain`].
+    /// Domain of the lens, see [`Lens::domain`].
     domain: f64,
     table: OnceLock<Arc<RayTable>>,
 }
@@ -52,7 +54,7 @@ pub struct Camera {
 #[derive(Debug)]
 struct RayTable {
     rays: Box<[[f32; 2]]>,
-    /// Least and greatest of them.
+    /// Minimum and maximum of the rays.
     low: [f64; 2],
     high: [f64; 2],
 }
@@ -87,7 +89,7 @@ impl Camera {
         Ok(Self { width, height, focal: [fx, fy], center: [cx, cy], lens, domain: lens.domain(), table })
     }
 
-    /// The same without distortion.
+    /// A camera without distortion.
     ///
     /// # Errors
     /// As [`Camera::new`].
@@ -125,14 +127,14 @@ impl Camera {
         self.lens
     }
 
-    /// Whether straight lines may be seen bent.
+    /// Whether the lens distorts, so that straight lines may appear curved.
     #[inline(always)]
     pub fn distorts(&self) -> bool {
         !matches!(self.lens, Lens::Pinhole)
     }
 
-    /// Column and row in which a point of the camera's frame is seen; inside of the image or not. None at the camera's plane or
-    /// behind it, and where the lens does not put points: beyond the radius at which its distortion stops growing.
+    /// Column and row of a point in the camera frame, inside of the image or not. `None` at or behind the camera plane, and
+    /// outside the lens's domain: beyond the radius at which its distortion stops growing.
     #[inline]
     pub fn project(&self, point: Vec3) -> Option<[f64; 2]> {
         if !(point.z > 0.0) {
@@ -145,35 +147,35 @@ impl Camera {
         Some([fx * point.x / point.z + cx, fy * point.y / point.z + cy])
     }
 
-    /// Column and row in which all points on the ray through `(x/z, y/z)` are seen; none as of [`Camera::project`].
+    /// Column and row of all points on the ray through `(x/z, y/z)`; `None` as for [`Camera::project`].
     #[inline(always)]
     pub fn pixel(&self, ray: [f64; 2]) -> Option<[f64; 2]> {
         let [x, y] = if self.distorts() { self.lens.distorted(ray, self.domain)? } else { ray };
         Some([x * self.focal[0] + self.center[0], y * self.focal[1] + self.center[1]])
     }
 
-    /// Index of the pixel in which a point of the camera's frame is seen, row by row; none outside of the image.
+    /// Row-major index of the pixel of a point in the camera frame; `None` outside of the image.
     #[inline(always)]
     pub fn index_of(&self, point: Vec3) -> Option<usize> {
         let near = 1.0 / point.z;
         let [u, v] = self.pixel([point.x * near, point.y * near])?;
-        // Half a pixel on, so that cutting off rounds.
+        // Adds half a pixel, so that truncation rounds.
         let (column, row) = (u + 0.5, v + 0.5);
         let inside = column >= 0.0 && row >= 0.0 && column < self.width as f64 && row < self.height as f64;
-        // Within the image; a signed cast costs least.
+        // The position is inside the image; a signed cast is the cheapest.
         (inside && point.z > 0.0).then(|| row as i32 as usize * self.width + column as i32 as usize)
     }
 
-    /// `(x/z, y/z)` of the points that are seen at a column and row, whole or not; none where the lens puts nothing.
+    /// `(x/z, y/z)` of the points at a column and row, which may be fractional; `None` outside the image of the lens's domain.
     ///
-    /// Polynomial lenses are inverted by Newton's method in double precision, to 1e-12 in `x/z` and better.
+    /// Polynomial lenses are inverted by Newton's method in double precision, to an error of at most 1e-12 in `x/z`.
     #[inline]
     pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
         let at = [(u - self.center[0]) / self.focal[0], (v - self.center[1]) / self.focal[1]];
         if self.distorts() { self.lens.undistorted(at, self.domain) } else { Some(at) }
     }
 
-    /// `(x/z, y/z)` of a pixel's center; of a distorting lens as in [`Camera::rays`].
+    /// `(x/z, y/z)` of a pixel's center; for a distorting lens as in [`Camera::rays`].
     #[inline(always)]
     pub fn pixel_ray(&self, column: usize, row: usize) -> [f64; 2] {
         if self.distorts() {
@@ -182,7 +184,7 @@ impl Camera {
         [(column as f64 - self.center[0]) / self.focal[0], (row as f64 - self.center[1]) / self.focal[1]]
     }
 
-    /// `(x/z, y/z)` of all pixels' centers, row by row; NaN where the lens puts nothing. Found once.
+    /// `(x/z, y/z)` of all pixels' centers, row by row; NaN outside the image of the lens's domain. Computed once.
     #[inline]
     pub fn rays(&self) -> &[[f32; 2]] {
         &self.table().rays
@@ -209,8 +211,8 @@ impl Camera {
         RayTable { rays: rays.into_boxed_slice(), low, high }
     }
 
-    /// `x/z` and `y/z` of every `stride`th pixel of a row from `start` on, `count` of them, in single precision: whole SIMD registers
-    /// at once. What lies beyond the last of them means nothing.
+    /// `x/z` and `y/z` of every `stride`-th pixel of a row from `start` on, `count` pixels, in single precision, written as whole
+    /// SIMD registers. Values after the last pixel are meaningless.
     #[inline(always)]
     pub(crate) fn row_rays<const N: usize>(
         &self,
@@ -236,8 +238,8 @@ impl Camera {
         [x, y]
     }
 
-    /// How far a point is seen to move along the direction `along` of the image with its place: pixels a meter, camera frame. With the
-    /// image's axes these are the rows of the projection's Jacobian. None where [`Camera::project`] has none.
+    /// Velocity of a point's image along the image direction `along` per velocity of the point: pixels per meter, camera frame.
+    /// For the image axes these are the rows of the projection's Jacobian. `None` where [`Camera::project`] returns `None`.
     #[inline]
     pub fn gradient(&self, point: Vec3, along: [f64; 2]) -> Option<Vec3> {
         if !(point.z > 0.0) {
@@ -252,7 +254,7 @@ impl Camera {
         Some(Vec3::new(x, y, -(x * point.x + y * point.y) / point.z))
     }
 
-    /// Columns and rows that can show anything within the convex hull of `corners`, camera frame: the whole image when one of them is
+    /// Columns and rows that can show a part of the convex hull of `corners`, camera frame; the whole image when a corner is
     /// nearer than [`NEAREST_RETURN`].
     pub fn window(&self, corners: impl IntoIterator<Item = Vec3>) -> [Range<usize>; 2] {
         let whole = [0..self.width, 0..self.height];
@@ -283,16 +285,16 @@ impl Camera {
         [range(0, self.width), range(1, self.height)]
     }
 
-    /// Least and greatest column and row of what a distorting lens shows of a rectangle of rays; none when it does not show all of its
-    /// border. A lens puts the rectangle within the picture of its border.
+    /// Minimum and maximum column and row of the image of a rectangle of rays through a distorting lens; `None` when a part of
+    /// its border is not in the image. A lens maps the rectangle into the image of its border.
     fn bounds(&self, low: [f64; 2], high: [f64; 2]) -> Option<([f64; 2], [f64; 2])> {
-        // What no pixel sees does not matter.
+        // Rays outside all pixels are irrelevant.
         let table = self.table();
         let within = |corner: [f64; 2]| [0, 1].map(|axis| corner[axis].max(table.low[axis]).min(table.high[axis]));
         let [low, high] = [within(low), within(high)];
         let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
         let (mut least, mut most) = ([f64::MAX; 2], [f64::MIN; 2]);
-        // Between two places on a side its picture bulges by less than their second differences.
+        // Between two points on a side, the side's image deviates from a line by less than their second differences.
         let mut bulge = [0.0_f64; 2];
         for side in 0..4 {
             let (from, to) = (corners[side], corners[(side + 1) % 4]);

@@ -1,14 +1,14 @@
-//! A detector that was handed in, bound to a body.
+//! A user-supplied detector, bound to a body.
 
 use super::{Detect, DetectError, Detected, Detection, DetectionQuery, JointMap, Surroundings, place, world_point};
 use crate::body::Body;
 use crate::math::{Aabb, Vec3, is_place};
 use crate::observation::frame::DepthImage;
 
-/// A detection, and where it puts the body.
+/// A detection and the position of the body's root that follows from it.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedDetection {
-    /// Its number among those of its image, for [`Detect::reject`].
+    /// Index among the detections of its image, for [`Detect::reject`].
     pub index: usize,
     /// The body's root, world frame, meters.
     pub root: Vec3,
@@ -16,7 +16,7 @@ pub(crate) struct PlacedDetection {
     pub detection: Detection,
 }
 
-/// No detector, or one with its names resolved on a body. What it reports is checked.
+/// An optional detector with its names resolved on a body. Its reports are validated.
 #[derive(Debug, Default)]
 pub(crate) struct BoundDetector {
     detector: Option<Box<dyn Detect>>,
@@ -26,13 +26,13 @@ pub(crate) struct BoundDetector {
 }
 
 impl BoundDetector {
-    /// Takes a detector for this body.
+    /// Sets the detector for this body.
     pub(crate) fn set(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.detector = detector;
         self.bind(body);
     }
 
-    /// The body has changed.
+    /// Resolves the names again after the body has changed.
     pub(crate) fn bind(&mut self, body: &Body) {
         let detector = self.detector.as_deref();
         self.map = detector
@@ -40,17 +40,17 @@ impl BoundDetector {
         self.knows = detector.is_some_and(|detector| detector.knows(body));
     }
 
-    /// Whether there is a detector, and it can find the body.
+    /// Whether a detector is set and can find the body.
     pub(crate) fn knows(&self) -> bool {
         self.knows
     }
 
-    /// What its joints are on the body.
+    /// The mapping of its joints and lengths to the body.
     pub(crate) fn map(&self) -> &JointMap {
         &self.map
     }
 
-    /// Another detector of the same kind that has seen nothing.
+    /// Another detector of the same kind with no state from images.
     pub(crate) fn fresh(&self) -> Option<Box<dyn Detect>> {
         self.detector.as_ref().map(|detector| detector.fresh())
     }
@@ -60,13 +60,13 @@ impl BoundDetector {
         self.error.as_ref()
     }
 
-    /// Forgets the last error.
+    /// Clears the last error.
     pub(crate) fn clear_error(&mut self) {
         self.error = None;
     }
 
-    /// The persons that it reports of an image; of [`DetectionQuery::Near`] the nearest alone. Nobody where it fails or reports what
-    /// cannot be meant, see [`Self::error`].
+    /// Returns the persons that the detector reports in an image; for [`DetectionQuery::Near`] only the nearest. Returns none
+    /// where the detector fails or reports invalid values, see [`Self::error`].
     pub(crate) fn detect(
         &mut self,
         body: &Body,
@@ -113,7 +113,7 @@ impl BoundDetector {
     }
 }
 
-/// The detection with its pixels: those that lie within its box where the detector does not report them.
+/// Fills in the pixels of a detection: those within its box, where the detector does not report any.
 fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundings) -> Detection {
     if detection.pixels.is_empty() {
         let bounds = Aabb { mins: detection.low, maxs: detection.high };
@@ -125,7 +125,7 @@ fn with_pixels(mut detection: Detection, image: &DepthImage, around: &Surroundin
     detection
 }
 
-/// Refuses a detection that cannot be meant.
+/// Rejects a detection with invalid values.
 fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage) -> Result<(), DetectError> {
     let wrong = |what: &str, expected: String, found: String| -> Result<(), DetectError> {
         Err(format!("detection[{index}].{what}: expected {expected}, found {found}").into())

@@ -1,17 +1,17 @@
-//! A detector's names on a body: resolved once, when the detector or the body is set.
+//! Maps a detector's names to a body. They are resolved once, when the detector or the body is set.
 
 use super::skeleton::Skeleton;
 use super::{DetectedJoint, Detection};
 use crate::body::Body;
 
-/// The site that tells where a body is (H-Anim).
+/// The site that gives a body's position (H-Anim).
 const ROOT: &str = "humanoid_root";
-/// Joints that tell where the trunk is and which way round, by side.
+/// Joints that give the trunk's position and orientation, without their side.
 const TRUNK: [&str; 2] = ["shoulder", "hip"];
 const LEGS: [&str; 2] = ["knee", "ankle"];
 const ARMS: [&str; 2] = ["elbow", "wrist"];
 const ANKLES: [&str; 1] = ["ankle"];
-/// The length of a limb by the joint that it hangs by; what hangs by another joint is a part of the trunk.
+/// The length of a limb, by the joint to its parent. Limbs on other joints belong to the trunk.
 const LENGTH_OF_LIMB: [(&str, &str); 6] = [
     ("sternoclavicular", "shoulder_width"),
     ("shoulder", "upper_arm"),
@@ -23,7 +23,7 @@ const LENGTH_OF_LIMB: [(&str, &str); 6] = [
 const TRUNK_LENGTH: &str = "trunk";
 const STATURE: &str = "stature";
 
-/// What a detector's joints and lengths are on a body. Joints and lengths are numbered as the detector does.
+/// Mapping of a detector's joints and lengths to a body. Joints and lengths are numbered in the detector's order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct JointMap {
     /// The body's site with the name of each joint.
@@ -37,7 +37,7 @@ pub(crate) struct JointMap {
     legs: Vec<usize>,
     arms: Vec<usize>,
     ankles: Vec<usize>,
-    /// Of every limb, the joint that it hangs by, the other joints on it, and its length.
+    /// For every limb: the joint to its parent, the other joints on it, and its length.
     hangs_by: Vec<Option<usize>>,
     on_limb: Vec<Vec<usize>>,
     length_of_limb: Vec<Option<usize>>,
@@ -45,13 +45,13 @@ pub(crate) struct JointMap {
 }
 
 impl JointMap {
-    /// The joints and lengths with these names on a body.
+    /// Resolves joints and lengths with these names on a body.
     pub(crate) fn new(body: &Body, joints: &[String], lengths: &[String]) -> Self {
         let sites: Vec<Option<usize>> = joints.iter().map(|name| body.site_index(name).ok()).collect();
         let number = |name: &str| joints.iter().position(|joint| joint == name);
         let joint = |name: &str| number(name).filter(|index| sites[*index].is_some());
         let length = |name: &str| lengths.iter().position(|length| length == name);
-        // Left before right: sums depend on the order.
+        // Left before right, because sums depend on the order.
         let of_sides = |stems: &[&str]| -> Vec<usize> {
             stems.iter().flat_map(|stem| ["l", "r"].map(|side| joint(&format!("{side}_{stem}")))).flatten().collect()
         };
@@ -88,12 +88,12 @@ impl JointMap {
         }
     }
 
-    /// The body's site of a joint.
+    /// The body's site for a joint.
     pub(crate) fn site(&self, joint: usize) -> Option<usize> {
         self.sites.get(joint).copied().flatten()
     }
 
-    /// Joints that tell where the trunk is and which way round; of a body without shoulders and hips all that it has.
+    /// Joints that give the trunk's position and orientation; for a body without shoulders and hips, all joints that it has.
     pub(crate) fn trunk(&self) -> &[usize] {
         &self.trunk
     }
@@ -108,7 +108,7 @@ impl JointMap {
         &self.arms
     }
 
-    /// The length of every limb of the body, if the detector reports it; the parts of the trunk share one.
+    /// The length of every limb of the body, if the detector reports it. All parts of the trunk share one length.
     pub(crate) fn length_of_limb(&self) -> &[Option<usize>] {
         &self.length_of_limb
     }
@@ -124,37 +124,37 @@ impl JointMap {
     }
 }
 
-/// A detection, and what its joints are on the body.
+/// A detection with the mapping of its joints to the body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Detected<'a> {
     /// The detection.
     pub detection: &'a Detection,
-    /// Its joints and lengths on the body.
+    /// The mapping of its joints and lengths to the body.
     pub map: &'a JointMap,
 }
 
 impl<'a> Detected<'a> {
-    /// A joint by its number.
+    /// The joint with this index.
     pub(crate) fn joint(&self, index: usize) -> Option<&'a DetectedJoint> {
         self.detection.joints.get(index)?.as_ref()
     }
 
-    /// The joint that a limb hangs by.
+    /// The joint between a limb and its parent.
     pub(crate) fn hangs_by(&self, limb: usize) -> Option<&'a DetectedJoint> {
         self.joint(self.map.hangs_by.get(limb).copied().flatten()?)
     }
 
-    /// The first joint found on a limb that is not the one that it hangs by.
+    /// The first detected joint on a limb other than the joint to its parent.
     pub(crate) fn on_limb(&self, limb: usize) -> Option<&'a DetectedJoint> {
         self.map.on_limb.get(limb)?.iter().find_map(|joint| self.joint(*joint))
     }
 
-    /// The ankles that were found.
+    /// The detected ankles.
     pub(crate) fn ankles(&self) -> impl Iterator<Item = &'a DetectedJoint> + '_ {
         self.map.ankles.iter().filter_map(|joint| self.joint(*joint))
     }
 
-    /// A length and its relative standard deviation, by its number.
+    /// The length with this index, and its relative standard deviation.
     pub(crate) fn length(&self, index: usize) -> Option<[f64; 2]> {
         self.detection.lengths.get(index).copied()
     }

@@ -1,4 +1,4 @@
-//! Detections: what a detector reports of the persons in a depth image, and the trait that a detector implements.
+//! Detections: what a detector reports about the persons in a depth image, and the trait that a detector implements.
 //!
 //! The core holds no detector of its own. One is handed in, see [`Tracker::with_detector`](crate::Tracker::with_detector); its
 //! joints go by the names of the body's sites.
@@ -19,18 +19,18 @@ use crate::observation::frame::{DepthImage, Ground};
 use crate::observation::ownership::NO_OWNER;
 use std::fmt::Debug;
 
-/// Why a detector could not look at an image. The frame is processed without detections.
+/// Why a detector could not process an image. The frame is then processed without detections.
 pub type DetectError = Box<dyn std::error::Error + Send + Sync>;
 
-/// A box about joints is this much larger than they span, meters: limbs are thicker than their joints.
+/// Margin of a box around joints, meters: limbs are thicker than their joints.
 const AROUND_JOINTS: f64 = 0.2;
 
 /// Finds persons in depth images.
 ///
 /// ```
-/// use voodoo_core::detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+/// use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 /// use voodoo_core::math::Vec3;
-/// use voodoo_core::observation::frame::DepthImage;
+/// use voodoo_core::DepthImage;
 ///
 /// /// Somebody always stands at the same place.
 /// #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ const AROUND_JOINTS: f64 = 0.2;
 /// }
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use voodoo_core::body::HumanModel;
+/// use voodoo_core::HumanModel;
 /// use voodoo_core::{Body, Config, Tracker};
 ///
 /// let tracker = Tracker::new(Body::human(1.75, HumanModel::Full)?, Config::default())?.with_detector(Box::new(Standing));
@@ -67,31 +67,32 @@ const AROUND_JOINTS: f64 = 0.2;
 /// # }
 /// ```
 pub trait Detect: Debug + Send + Sync {
-    /// Names of the joints that it reports: those of sites of the body, for humans H-Anim's (ISO/IEC 19774). Names that the body
-    /// lacks are ignored.
+    /// Names of the joints that it reports. They match names of the body's sites; for humans these are H-Anim names (ISO/IEC
+    /// 19774). Names that the body lacks are ignored.
     fn joints(&self) -> Vec<String>;
 
-    /// Names of the lengths that it reports, of `upper_arm`, `forearm`, `thigh`, `shank`, `shoulder_width`, `hip_width`, `trunk`
-    /// (`humanoid_root` to `vc7`), `neck` (`vc7` to `head_center`) and `stature`. Other names are ignored.
+    /// Names of the lengths that it reports, out of `upper_arm`, `forearm`, `thigh`, `shank`, `shoulder_width`, `hip_width`,
+    /// `trunk` (`humanoid_root` to `vc7`), `neck` (`vc7` to `head_center`) and `stature`. Other names are ignored.
     fn lengths(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Whether it can find this body. By default: the body has sites with the names of its joints, and they fix its pose.
+    /// Whether it can find this body. By default: whether the body has sites with the names of its joints, and these sites fix
+    /// the body's pose.
     fn knows(&self, body: &Body) -> bool {
         placement::fixes_pose(body, &self.joints())
     }
 
-    /// Another detector of the same kind that has seen no image: one of several persons gets its own.
+    /// Returns another detector of the same kind without state from images. With several persons, each gets its own.
     fn fresh(&self) -> Box<dyn Detect>;
 
-    /// The persons in an image, the most probable first.
+    /// Returns the persons in an image, the most probable first.
     ///
-    /// A detector may leave out whom the `query` does not ask for; it need not.
+    /// A detector may omit persons that the `query` does not ask for, but need not.
     ///
     /// # Errors
     ///
-    /// Whatever keeps it from looking; the tracker then goes on without it in this frame, see
+    /// Any failure to process the image. The tracker then processes the frame without detections, see
     /// [`Tracker::detector_error`](crate::Tracker::detector_error).
     fn detect(
         &mut self,
@@ -100,27 +101,28 @@ pub trait Detect: Debug + Send + Sync {
         query: DetectionQuery,
     ) -> Result<Vec<Detection>, DetectError>;
 
-    /// Log odds that what stands nearest to the place of the last [`DetectionQuery::Near`] is a person, with its box in the world;
-    /// none if nothing of a person's size is there, or where the detector does not tell. A track on what is no person ends by this.
+    /// Log odds that the object nearest to the position of the last [`DetectionQuery::Near`] is a person, with its box in the
+    /// world frame. `None` if there is no object of a person's size, or if the detector does not compute this. Low log odds end a
+    /// track that follows an object.
     fn nearest(&self) -> Option<(f64, Aabb)> {
         None
     }
 
-    /// The detection with this index of the last image is not followed: [`DetectionQuery::Any`] and [`DetectionQuery::New`] may
-    /// look at others first.
+    /// Reports that the detection with this index in the last image is not followed. [`DetectionQuery::Any`] and
+    /// [`DetectionQuery::New`] may then evaluate other candidates first.
     fn reject(&mut self, _index: usize) {}
 }
 
-/// Whom a detector is asked for.
+/// Which persons a detector is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DetectionQuery {
-    /// Everybody.
+    /// All persons in the image.
     All,
-    /// Anybody: one candidate an image will do, those first that were not found to be nobody in the images before.
+    /// Any person: one candidate per image is enough. Candidates that were not rejected in earlier images come first.
     Any,
-    /// Anybody, but nothing that was found to be nobody a few images ago.
+    /// Any person, without candidates that were rejected within the last few images.
     New,
-    /// The person at this place of the world, meters.
+    /// The person at this position, world frame, meters.
     Near(Vec3),
 }
 
@@ -131,7 +133,7 @@ pub struct DetectedJoint {
     pub position: Vec3,
     /// Standard deviation along each axis, meters.
     pub sigma: f64,
-    /// Probability that it is in the image and not hidden.
+    /// Probability that the joint is inside the image and not occluded.
     pub visible: f64,
 }
 
@@ -142,22 +144,23 @@ pub struct Detection {
     pub joints: Vec<Option<DetectedJoint>>,
     /// Length (meters) and relative standard deviation of everything in [`Detect::lengths`], in that order; or empty.
     pub lengths: Vec<[f64; 2]>,
-    /// Log odds that the trunk faces the camera; `None` where the detector does not tell.
+    /// Log odds that the trunk faces the camera; `None` where the detector does not report it.
     pub facing: Option<f64>,
-    /// Log odds that it is a person. About 4, over one look or several, make a person: `ln(p / (1 - p))` of a probability `p`.
+    /// Log odds `ln(p / (1 - p))` that it is a person. A sum of approximately 4, over one or several detections, confirms a
+    /// person.
     pub person: f64,
-    /// What the image shows of it: corners of its box in the world, meters.
+    /// Lower corner of the box around the observed surface, world frame, meters.
     pub low: Vec3,
-    /// The other corner.
+    /// Upper corner.
     pub high: Vec3,
-    /// The floor as the image shows it or as [`Surroundings::ground`] gives it, world frame.
+    /// The ground plane, estimated from the image or given by [`Surroundings::ground`], world frame.
     pub floor: Option<Ground>,
-    /// Indices of the pixels that show it; empty: those that lie within its box.
+    /// Indices of its pixels. If empty, the pixels within its box are used.
     pub pixels: Vec<usize>,
 }
 
 impl Detection {
-    /// A person with these joints, which span its box, and log odds; nothing else is reported.
+    /// A person with these joints and log odds. The joints span its box; nothing else is reported.
     pub fn new(joints: Vec<Option<DetectedJoint>>, person: f64) -> Self {
         let positions = || joints.iter().flatten().map(|joint| joint.position);
         let around = Vec3::splat(AROUND_JOINTS);
@@ -167,37 +170,37 @@ impl Detection {
     }
 }
 
-/// What is known of the place beside the image.
+/// What is known about the scene besides the image.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Surroundings<'a> {
-    /// The floor, world frame.
+    /// The ground plane, world frame.
     pub ground: Option<Ground>,
-    /// Direction upwards where no floor is known, world frame, unit length.
+    /// Upward direction where no ground plane is known, world frame, unit length.
     pub up: Option<Vec3>,
-    /// Depth of the learned background at every pixel, meters; empty where none was learned.
+    /// Depth of the learned background at every pixel, meters; empty if none was learned.
     pub background: &'a [f32],
-    /// Boxes of the world that hold nobody.
+    /// World-frame boxes that contain no persons.
     pub excluded: &'a [Aabb],
-    /// Who explains each pixel, and who does not matter among them; empty where nobody does.
+    /// The owner of each pixel, including owners that are to be ignored; empty if no pixel is owned.
     pub owners: &'a [u16],
-    /// Whose pixels may be the person all the same.
+    /// An owner whose pixels may still belong to the person.
     pub own: Option<u16>,
 }
 
 impl Surroundings<'_> {
-    /// Whether a pixel with a depth of `z` meters shows the background, or somebody who is tracked already.
+    /// Whether a pixel with a depth of `z` meters shows the background or a person who is tracked already.
     pub fn explains(&self, index: usize, z: f32) -> bool {
         let others = self.owners.get(index).is_some_and(|owner| *owner != NO_OWNER && Some(*owner) != self.own);
         others || self.background.get(index).is_some_and(|depth| Background::contains(*depth, z))
     }
 
-    /// Whether a place of the world is in one of the boxes that hold nobody.
+    /// Whether a point of the world lies in one of the excluded boxes.
     pub fn excludes(&self, point: Vec3) -> bool {
         self.excluded.iter().any(|bounds| bounds.contains(point))
     }
 
-    /// The depth of every pixel of an image, meters; 0 where nothing returned, and where it is known that what returned is nobody who
-    /// is asked for.
+    /// Writes the depth of every pixel of an image, meters. It is 0 where there is no return, and where the return is known not
+    /// to belong to a requested person.
     pub fn open_depth(&self, image: &DepthImage, depth: &mut Vec<f32>) {
         depth.clear();
         depth.extend((0..image.pixels.len()).map(|index| {
@@ -209,7 +212,7 @@ impl Surroundings<'_> {
     }
 }
 
-/// The place in the world that a pixel shows at a depth of `z` meters.
+/// World position of a pixel at a depth of `z` meters.
 fn world_point(image: &DepthImage, index: usize, z: f32) -> Vec3 {
     let world_from_sensor: &Pose = &image.world_from_sensor;
     *world_from_sensor * image.back_project(index, z)

@@ -1,17 +1,17 @@
-//! A body where a detector sees a person.
+//! Places a body at a detected person.
 
 use super::Detected;
 use crate::body::{Body, Model};
 use crate::math::{Pose, Vec3};
 
-/// A body of a detected person's sizes, like on both sides, and the pose that fits the joints best, world frame.
+/// Returns a body with a detected person's sizes (equal on both sides), and the pose that fits the joints best, world frame.
 pub(crate) fn fit_body(model: &Model, detected: Detected) -> Option<(Body, Vec<Pose>)> {
     let body = with_sizes(&model.reference_body, detected)?;
     let poses = fit_pose(&body, detected)?;
     Some((body, poses))
 }
 
-/// The pose of a body that fits a detected person's joints best, world frame.
+/// Returns the pose of a body that fits a detected person's joints best, world frame.
 pub(crate) fn fit_pose(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
     let mut joints = positions_of(detected);
     let skeleton = &detected.map.skeleton;
@@ -19,7 +19,7 @@ pub(crate) fn fit_pose(body: &Body, detected: Detected) -> Option<Vec<Pose>> {
     body.fit(&positions(&detected.map.sites, &joints), false).ok().map(|(_, poses)| poses)
 }
 
-/// Where the root of a detected person is, world frame: where the detector sees it, else where the body's would be.
+/// Position of a detected person's root, world frame: the detected root joint, else the root of the fitted body.
 pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
     match detected.map.root().and_then(|root| detected.joint(root)) {
         Some(root) => Some(root.position),
@@ -27,7 +27,7 @@ pub(crate) fn place(body: &Body, detected: Detected) -> Option<Vec3> {
     }
 }
 
-/// Whether a body has the sizes of a detected person, each within so many of its standard deviations.
+/// Whether a body has the sizes of a detected person, each within `sigmas` of its standard deviations.
 pub(crate) fn is_sized_like(body: &Body, detected: Detected, sigmas: f64) -> bool {
     let skeleton = &detected.map.skeleton;
     let own = skeleton.measure(&at_rest(body, &detected.map.sites));
@@ -44,7 +44,8 @@ pub(super) fn fixes_pose(body: &Body, names: &[String]) -> bool {
     body.fit(&positions(&sites, &at_rest(body, &sites)), false).is_ok()
 }
 
-/// The body with a detected person's lengths, like on both sides: those that are reported, or else the joints' distances.
+/// Returns the body with a detected person's lengths, equal on both sides: the reported lengths, or else the distances between
+/// joints.
 fn with_sizes(reference: &Body, detected: Detected) -> Option<Body> {
     let Detected { detection, map } = detected;
     let lengths = match map.lengths {
@@ -59,19 +60,19 @@ fn with_sizes(reference: &Body, detected: Detected) -> Option<Body> {
     reference.fit(&positions(&map.sites, &joints), true).ok().map(|(body, _)| body)
 }
 
-/// Where a detector sees joints that the body has.
+/// Detected positions of the joints that the body has.
 fn positions_of(detected: Detected) -> Vec<Option<Vec3>> {
     let sites = detected.map.sites.iter().enumerate();
     sites.map(|(index, site)| site.and_then(|_| detected.joint(index)).map(|joint| joint.position)).collect()
 }
 
-/// Where a body's sites are at rest.
+/// Positions of a body's sites at rest.
 fn at_rest(body: &Body, sites: &[Option<usize>]) -> Vec<Option<Vec3>> {
     let rest = body.rest_pose(Pose::IDENTITY);
     sites.iter().map(|site| site.map(|site| body.site_position(&rest, site))).collect()
 }
 
-/// Sites with their positions.
+/// Pairs sites with their positions.
 fn positions(sites: &[Option<usize>], joints: &[Option<Vec3>]) -> Vec<(usize, Vec3)> {
     sites.iter().zip(joints).filter_map(|(site, joint)| site.zip(*joint)).collect()
 }

@@ -1,17 +1,17 @@
-//! A person's joints at the distances that their sizes demand: every joint by itself is drawn towards the mean of where it may be,
-//! which makes limbs short.
+//! Moves a person's joints to the distances that their sizes require. A detector that regresses each joint independently reports
+//! the mean of its possible positions, which makes limbs too short.
 
 use crate::math::Vec3;
 
-/// The lengths that joints can be put at, in this order; [`Skeleton::new`] says between which joints they are.
+/// Names of the lengths that constrain joints, in this order. [`Skeleton::new`] maps them to pairs of joints.
 const LENGTHS: [&str; COUNT] =
     ["upper_arm", "forearm", "thigh", "shank", "shoulder_width", "hip_width", "trunk", "neck"];
 const COUNT: usize = 8;
 
-/// Some of [`LENGTHS`], meters.
+/// A value for each of [`LENGTHS`], meters; `None` where unknown.
 pub(super) type OptionalLengths = [Option<f64>; COUNT];
 
-/// Numbers of a detector's joints and lengths; none of those that it does not report.
+/// Indices of a detector's joints and lengths; `None` for those that the detector does not report.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Skeleton {
     root: Option<usize>,
@@ -25,7 +25,7 @@ pub(super) struct Skeleton {
 }
 
 impl Skeleton {
-    /// What has which number, by H-Anim's names of joints and by names of lengths.
+    /// Resolves the indices from H-Anim joint names and from names of lengths.
     pub(super) fn new(joint: impl Fn(&str) -> Option<usize>, length: impl Fn(&str) -> Option<usize>) -> Self {
         let of_side = |side: &str, stem: &str| joint(&format!("{side}_{stem}"));
         Self {
@@ -38,12 +38,12 @@ impl Skeleton {
         }
     }
 
-    /// The lengths that a detector reports in its own order.
+    /// Reorders the reported lengths from the detector's order into that of [`LENGTHS`].
     pub(super) fn reported<T: Copy>(&self, lengths: &[T]) -> [Option<T>; COUNT] {
         self.lengths.map(|index| lengths.get(index?).copied())
     }
 
-    /// The distances of joints: the mean of both sides, or that of the one that is known.
+    /// Measures the lengths between joints: the mean of both sides, or the one side that is known.
     pub(super) fn measure(&self, joints: &[Option<Vec3>]) -> OptionalLengths {
         let at = |index: Option<usize>| joints.get(index?).copied().flatten();
         let apart = |from: Option<usize>, to: Option<usize>| Some(at(from)?.distance(at(to)?));
@@ -65,7 +65,7 @@ impl Skeleton {
         ]
     }
 
-    /// Gives limbs these lengths, in directions that stay. The trunk's middle stays where it is.
+    /// Sets the limbs to these lengths. Limb directions and the middle of the trunk stay.
     pub(super) fn take_lengths(&self, joints: &mut [Option<Vec3>], lengths: &OptionalLengths) {
         let [upper_arm, forearm, thigh, shank, shoulders, hips, trunk, neck] = *lengths;
         let at = |index: Option<usize>| joints.get(index?).copied().flatten();
@@ -94,7 +94,8 @@ fn set(joints: &mut [Option<Vec3>], index: Option<usize>, position: Option<Vec3>
     }
 }
 
-/// Two arms or legs: the distance of their roots, the lengths of their bones, and by how much the trunk's end was moved.
+/// Places two arms or legs from the distance of their roots, the lengths of their bones and the displacement of their end of the
+/// trunk.
 fn limbs<const N: usize>(
     joints: &mut [Option<Vec3>],
     sides: &[[Option<usize>; N]; 2],
@@ -110,7 +111,7 @@ fn limbs<const N: usize>(
     }
     for ((side, before), root) in sides.iter().zip(&before).zip(roots) {
         set(joints, side[0], root);
-        // What is nearest before a joint: where it was, and where it is now.
+        // The last joint before this one that is known: its old and its new position.
         let mut last = before[0].zip(root);
         for number in 1..N {
             let Some(old) = before[number] else { continue };

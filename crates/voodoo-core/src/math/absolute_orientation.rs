@@ -4,7 +4,8 @@ use nalgebra::{Matrix4, SymmetricEigen};
 
 use crate::math::{Mat3, Pose, Quat, Vec3};
 
-/// Weighted moments of point pairs `(x, p)`: everything absolute orientation needs. A multiplicity is one multiplication.
+/// Weighted moments of point pairs `(x, p)`, which are sufficient for absolute orientation. A repeated pair is added once, with a
+/// multiple of its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moments {
     /// Sum of the weights.
@@ -35,9 +36,9 @@ impl Moments {
 
     /// The rigid motion `p_from_x` with the least weighted sum of squared distances, `None` without weight.
     ///
-    /// `stay` (meters) is the lever of a faint wish not to turn: pairs that fix no rotation (one point, points on a line)
-    /// turn the free directions not at all, and the others by less than `1e-6` of their due when the points spread farther
-    /// than `stay`.
+    /// `stay` (meters) is the lever of a weak prior for zero rotation. Directions of rotation that the pairs leave free (one
+    /// point, points on a line) are not rotated at all. The others are reduced by less than `1e-6` of their value when the points
+    /// spread farther than `stay`.
     pub(crate) fn absolute_orientation(&self, stay: f64) -> Option<Pose> {
         if self.weight.is_nan() || self.weight <= 0.0 {
             return None;
@@ -110,7 +111,7 @@ mod tests {
         fn a_line_is_turned_the_shortest_way(direction in vector(1.0), axis in vector(1.0)) {
             prop_assume!(direction.length() > 0.1 && axis.length() > 0.1);
             let direction = direction.normalize();
-            // A turn about an axis square to the line is the shortest that maps it.
+            // A rotation about an axis perpendicular to the line is the shortest one that maps it.
             let square = direction.any_orthonormal_vector();
             let turn = Quat::from_axis_angle(square, axis.length().min(1.2));
             let mut moments = Moments::default();

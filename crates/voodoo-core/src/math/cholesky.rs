@@ -1,17 +1,18 @@
-//! Dense Cholesky of a small symmetric system, in place and without heap.
+//! Dense Cholesky of a small symmetric system, in place and without heap allocation.
 
 use super::simd::widest;
 
-/// Solves `h x = b` for the symmetric `h` (row-major, lower triangle given); `b` becomes `x`. False, and `b` undefined, when
-/// `h` is not positive definite.
+/// Solves `h x = b` for the symmetric `h` (row-major, lower triangle given); `b` becomes `x`. Returns false, with `b` undefined,
+/// when `h` is not positive definite.
 ///
-/// `h = L^T L`, from the last unknown to the first: in a tree whose parents come first nothing fills in (Featherstone, "Rigid
-/// Body Dynamics Algorithms", 2008, section 6.5), so that rows of unknowns on other branches stay zero and are passed over.
+/// Factors `h = L^T L` from the last unknown to the first. In a tree whose parents come first this causes no fill-in
+/// (Featherstone, "Rigid Body Dynamics Algorithms", 2008, section 6.5), so entries between unknowns on different branches stay
+/// zero and are skipped.
 pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
     factor(h, n) && substitute(h, b, n)
 }
 
-/// The first half of [`solve_in_place`], for several right-hand sides: `h` becomes `L`.
+/// The first half of [`solve_in_place`], to be used with several right-hand sides: `h` becomes `L`.
 pub(crate) fn factor(h: &mut [f64], n: usize) -> bool {
     widest(
         #[inline(always)]
@@ -19,8 +20,8 @@ pub(crate) fn factor(h: &mut [f64], n: usize) -> bool {
     )
 }
 
-/// Half of the second half, for every right-hand side: `b` becomes `y` with `L^T y = b`, of what [`factor`] left as `l`. Of two
-/// of them `y_1^T y_2 = b_1^T h^-1 b_2`.
+/// The first of the two substitutions, for every right-hand side: `b` becomes `y` with `L^T y = b`, where `l` is the result of
+/// [`factor`]. For two right-hand sides, `y_1^T y_2 = b_1^T h^-1 b_2`.
 pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
     widest(
         #[inline(always)]
@@ -28,7 +29,7 @@ pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
     );
 }
 
-/// The second half: `l` is what [`factor`] left.
+/// The second half of [`solve_in_place`]: `l` is the result of [`factor`].
 fn substitute(l: &[f64], b: &mut [f64], n: usize) -> bool {
     widest(
         #[inline(always)]
@@ -103,7 +104,7 @@ mod tests {
         for (found, expected) in b.iter().zip(&x) {
             assert!((found - expected).abs() < 1e-8, "{b:?}");
         }
-        // `x^T h^-1 x` by halves.
+        // Computes `x^T h^-1 x` from one substitution.
         let [mut whole, mut half] = [x.clone(), x.clone()];
         assert!(solve_in_place(&mut h.clone(), &mut whole, n));
         half_substitute(&copy, &mut half, n);

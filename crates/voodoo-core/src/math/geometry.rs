@@ -1,4 +1,4 @@
-//! The one vocabulary for 3-D geometry.
+//! The geometry types and conventions of the project.
 //!
 //! Points and rotations are glam's. nalgebra is used for linear algebra only (eigen-problems, Cholesky) and only inside `solver`.
 //!
@@ -14,15 +14,15 @@ use std::ops::Mul;
 pub struct Pose {
     /// A unit quaternion.
     pub rotation: Quat,
-    /// Where the origin goes, meters.
+    /// The position of the transformed origin, meters.
     pub translation: Vec3,
 }
 
 impl Pose {
-    /// Nothing moves.
+    /// The identity transform.
     pub const IDENTITY: Self = Self { rotation: Quat::IDENTITY, translation: Vec3::ZERO };
 
-    /// A pose of its two parts.
+    /// A pose from its rotation and translation.
     #[inline]
     pub fn from_parts(translation: Vec3, rotation: Quat) -> Self {
         Self { rotation, translation }
@@ -40,45 +40,46 @@ impl Pose {
         Self::from_parts(Vec3::ZERO, rotation)
     }
 
-    /// A translation, meters, and a rotation vector, radians.
+    /// A pose from a translation, meters, and a rotation vector, radians.
     #[inline]
     pub fn new(translation: Vec3, rotation_vector: Vec3) -> Self {
         Self::from_parts(translation, Quat::from_scaled_axis(rotation_vector))
     }
 
-    /// The transform back.
+    /// The inverse transform.
     #[inline]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self { rotation, translation: rotation * (-self.translation) }
     }
 
-    /// `self.inverse() * other`, with a rounding error less.
+    /// `self.inverse() * other`, with one rounding error less.
     #[inline]
     pub fn inv_mul(&self, other: &Self) -> Self {
         let rotation = self.rotation.inverse();
         Self { translation: rotation * (other.translation - self.translation), rotation: rotation * other.rotation }
     }
 
-    /// A point, transformed.
+    /// Transforms a point.
     #[inline]
     pub fn transform_point(&self, point: Vec3) -> Vec3 {
         self.rotation * point + self.translation
     }
 
-    /// A point, transformed back.
+    /// Transforms a point by the inverse.
     #[inline]
     pub fn inverse_transform_point(&self, point: Vec3) -> Vec3 {
         self.rotation.inverse() * (point - self.translation)
     }
 
-    /// A direction, rotated back.
+    /// Rotates a direction by the inverse rotation.
     #[inline]
     pub(crate) fn inverse_transform_vector(&self, vector: Vec3) -> Vec3 {
         self.rotation.inverse() * vector
     }
 
-    /// The pose a share `t` of the way to another one: spherical for the rotation, linear for the translation.
+    /// The pose at the fraction `t` of the way to another one: spherical interpolation for the rotation, linear for the
+    /// translation.
     #[inline]
     pub fn lerp(&self, other: &Self, t: f64) -> Self {
         Self {
@@ -87,7 +88,7 @@ impl Pose {
         }
     }
 
-    /// Whether no number of it is NaN or infinite.
+    /// Whether all numbers are finite.
     #[inline]
     pub fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.translation.is_finite()
@@ -131,7 +132,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// Holds nothing: the box about it and another one is the other one.
+    /// The empty box: its union with another box is the other box.
     pub(crate) const EMPTY: Self = Self { mins: Vec3::MAX, maxs: Vec3::MIN };
 
     /// The box between two corners.
@@ -140,13 +141,13 @@ impl Aabb {
         Self { mins, maxs }
     }
 
-    /// The box about points.
+    /// The bounding box of points.
     pub fn from_points(points: impl IntoIterator<Item = Vec3>) -> Self {
         let grow = |all: Self, point| Self { mins: all.mins.min(point), maxs: all.maxs.max(point) };
         points.into_iter().fold(Self::EMPTY, grow)
     }
 
-    /// The middle.
+    /// The center.
     #[inline]
     pub fn center(&self) -> Vec3 {
         self.mins.midpoint(self.maxs)
@@ -174,16 +175,16 @@ impl Aabb {
     }
 }
 
-/// No place lies farther from its origin, meters: three times as far as the Moon. Beyond, squares and products of coordinates
-/// have no digits left for a body, and at last are infinite.
+/// Maximum distance of a position from its origin, meters: three times the distance to the Moon. Beyond it, squares and products
+/// of coordinates have no digits left for a body, and finally overflow.
 pub(crate) const FARTHEST: f64 = 1e9;
 
-/// Whether a place can be meant: no coordinate is NaN or beyond [`FARTHEST`].
+/// Whether a position is valid: no coordinate is NaN or beyond [`FARTHEST`].
 pub(crate) fn is_place(place: Vec3) -> bool {
     place.abs().cmple(Vec3::splat(FARTHEST)).all()
 }
 
-/// Whether a pose can be meant: a place, and a unit quaternion.
+/// Whether a pose is valid: a valid position and a unit quaternion.
 pub(crate) fn is_rigid(pose: &Pose) -> bool {
     is_place(pose.translation) && pose.rotation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-6
 }
@@ -259,9 +260,9 @@ impl Points {
     }
 }
 
-/// Rotation vector of the shorter way round.
+/// Rotation vector of the shorter rotation.
 pub trait ShortestAxis {
-    /// At most pi long.
+    /// The rotation vector, at most pi long.
     fn to_scaled_axis_shortest(self) -> Vec3;
 }
 

@@ -35,10 +35,11 @@ impl CostTable {
     }
 }
 
-/// The pairs (row, column) with the least sum of finite costs, every row or every column once, by rows.
+/// The pairs (row, column) with the least sum of finite costs, sorted by row. Every row or every column occurs once, whichever
+/// are fewer.
 ///
-/// Shortest augmenting paths (Crouse, "On implementing 2D rectangular assignment algorithms", 2016); between assignments of equal
-/// cost the choice is that of SciPy's `linear_sum_assignment`.
+/// Shortest augmenting paths (Crouse, "On implementing 2D rectangular assignment algorithms", 2016). Among assignments of equal
+/// cost it returns the one of SciPy's `linear_sum_assignment`.
 pub fn linear_sum_assignment(cost: &CostTable) -> Vec<(usize, usize)> {
     if cost.columns < cost.rows() {
         let mut pairs: Vec<_> =
@@ -53,7 +54,7 @@ pub fn linear_sum_assignment(cost: &CostTable) -> Vec<(usize, usize)> {
     search.column_of.iter().enumerate().filter_map(|(row, column)| column.map(|column| (row, column))).collect()
 }
 
-/// Rows and columns given to each other so far, and the prices that show it is the cheapest way.
+/// The partial assignment, and the dual prices that prove it optimal.
 struct Search<'a> {
     cost: &'a CostTable,
     row_price: Vec<f64>,
@@ -78,7 +79,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Gives a column to one more row, for which others may change theirs.
+    /// Assigns a column to one more row, reassigning other rows as needed.
     fn add(&mut self, row: usize) {
         let (mut rows, mut columns) = (vec![false; self.row_price.len()], vec![false; self.column_price.len()]);
         let Some((sink, least)) = self.path(row, &mut rows, &mut columns) else { return };
@@ -102,7 +103,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The cheapest way from a row to a column that nobody has, and its length; marks rows and columns that were looked at.
+    /// The shortest augmenting path from a row to an unassigned column, and its length; marks the visited rows and columns.
     fn path(&mut self, row: usize, rows: &mut [bool], columns: &mut [bool]) -> Option<(usize, f64)> {
         let mut remaining: Vec<usize> = (0..columns.len()).rev().collect();
         self.shortest.fill(f64::INFINITY);
@@ -117,7 +118,7 @@ impl<'a> Search<'a> {
                     self.shortest[column] = through;
                 }
                 let away = self.shortest[column];
-                // Between equals one that nobody has ends the search.
+                // Among equals, an unassigned column ends the search.
                 if away < lowest || (away == lowest && self.row_of[column].is_none()) {
                     (lowest, index) = (away, Some(place));
                 }
@@ -137,7 +138,7 @@ impl<'a> Search<'a> {
 mod tests {
     use super::*;
 
-    /// The least sum, by trying out everything; rows are no more than columns.
+    /// The least sum by exhaustive search; there are at most as many rows as columns.
     fn least(cost: &CostTable, row: usize, taken: &mut Vec<bool>) -> f64 {
         if row == cost.rows() {
             return 0.0;

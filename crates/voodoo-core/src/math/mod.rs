@@ -1,4 +1,4 @@
-//! Points, rotations and poses, and the little linear algebra that single-purpose code needs.
+//! Points, rotations and poses, and small linear-algebra routines.
 
 mod absolute_orientation;
 mod cholesky;
@@ -15,7 +15,7 @@ pub use linear_sum_assignment::{CostTable, linear_sum_assignment};
 pub use simd::{LANES, has_avx512, widest};
 pub(crate) use weighted_points::WeightedPoints;
 
-/// The sum of the products of two rows.
+/// The dot product of two rows.
 pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()
 }

@@ -1,11 +1,11 @@
 //! Run-time choice of instruction set for loops that the compiler vectorizes.
 
-/// Values of single precision that one SIMD register holds, in AVX2.
+/// Number of single-precision values in one AVX2 register.
 pub const LANES: usize = 8;
 
 /// Runs `work`, compiled for AVX-512 or AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`.
 ///
-/// Fused multiply-add is left out on purpose: without it the result is the same, bit by bit, on every processor.
+/// Fused multiply-add is disabled on purpose: without it the result is bit-identical on every processor.
 #[inline(always)]
 pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
@@ -38,8 +38,8 @@ pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     work()
 }
 
-/// Whether this processor has the parts of AVX-512 that are used (all with AVX-512 do, but for Xeon Phi); the detection is
-/// cached by the standard library.
+/// Whether this processor has the parts of AVX-512 that are used (all processors with AVX-512 do, except Xeon Phi). The detection
+/// is cached by the standard library.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn has_avx512() -> bool {

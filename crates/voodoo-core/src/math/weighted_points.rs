@@ -1,13 +1,13 @@
-//! Points that weigh differently.
+//! Weighted points.
 
 use super::{Points, Vec3};
 
 /// Points in single precision, each with a weight. Meters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct WeightedPoints {
-    /// Where they are.
+    /// Positions.
     pub points: Points,
-    /// What they weigh.
+    /// Weights.
     pub weights: Vec<f64>,
 }
 
@@ -43,7 +43,7 @@ impl WeightedPoints {
         self.weights.extend_from_slice(&other.weights);
     }
 
-    /// Becomes a set of points with single-precision weights.
+    /// Replaces the contents by a set of points with single-precision weights.
     pub(crate) fn assign(&mut self, points: &Points, weights: &[f32]) {
         self.clear();
         self.points.x.extend_from_slice(&points.x);
@@ -62,7 +62,7 @@ impl WeightedPoints {
         (self.points.get(index), self.weights[index])
     }
 
-    /// Keeps about `most` of the points, evenly, and their total weight.
+    /// Reduces the points to approximately `most`, evenly, and keeps their total weight.
     pub(crate) fn subsample(&mut self, most: usize) {
         let count = self.len();
         if count <= most {

@@ -1,34 +1,36 @@
-//! The still scene behind the body, learned from the depth images of a camera.
+//! The static scene behind the body, learned from the depth images of each camera.
 
 use std::ops::Range;
 
 use crate::math::{Pose, widest};
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
 
-/// A pixel belongs to the background when it lies no more than this before it: meters, and share of the depth, which the noise
-/// of depth cameras grows with.
+/// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
+/// the noise of depth cameras grows with depth.
 const SCENE_MARGIN: (f32, f32) = (0.04, 0.012);
-/// A deeper return by more than this replaces what was learned (something stood before it), meters.
+/// A return deeper than the learned depth by more than this replaces it (something stood in front before), meters.
 const DEEPER: f32 = 0.15;
-/// Two sides of a gap that differ by less, meters, belong to one surface: a wall seen aslant.
+/// The two sides of a gap belong to one surface when their depths differ by less than this, meters: a wall at an oblique angle.
 const ONE_WALL: f32 = 0.30;
-/// Share of a new return in what was learned: about ten looks at a pixel average its noise.
+/// Weight of a new return in the learned depth: approximately ten observations of a pixel average its noise.
 const LEARNING: f32 = 0.1;
-/// One row of this many is learned in a frame, for speed: the scene stands still.
+/// One row in this many is updated per frame, for speed: the scene is static.
 const ROW_STEP: usize = 8;
 
-/// A camera that moved by no more than this stands: meters, and radians; the odometry of a robot that stands wavers by less.
+/// A camera that moved by no more than this counts as static: meters, and radians. The odometry of a stationary robot varies by
+/// less.
 const STANDS: (f64, f64) = (0.003, 0.0015);
-/// Stands for the depth at pixels that show another body: whatever returns there belongs to what is not this one.
+/// Value of the depth at pixels that show another person: any return there does not belong to this person.
 pub(crate) const OTHERS: f32 = f32::MIN_POSITIVE;
 
-/// Depth of the scene behind the body, one value a pixel; 0 where nothing is known.
+/// Depth of the scene behind the body, one value per pixel; 0 where it is unknown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Background {
     pub(super) world_from_sensor: Option<Pose>,
     pub(super) width: usize,
     pub(super) depth: Vec<f32>,
-    /// The ray `(x/z, y/z)` that each depth was seen on; empty while the camera has not moved: through the middle of its pixel.
+    /// The ray `(x/z, y/z)` on which each depth was observed; empty while the camera has not moved: then it is the ray through
+    /// the pixel center.
     pub(super) rays: Vec<[f32; 2]>,
     row: usize,
 }
@@ -37,16 +39,16 @@ pub(crate) struct Background {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Backgrounds {
     pub(super) images: Vec<Background>,
-    /// Of the points of each cloud whether another person explains them; nobody does where there is none.
+    /// For each point of each cloud, whether another person explains it; a missing entry means no.
     others: Vec<Vec<bool>>,
 }
 
-/// How far apart two poses are: meters, and radians.
+/// Distance between two poses: meters, and radians.
 pub(super) fn pose_difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (a.translation.distance(b.translation), a.rotation.angle_between(b.rotation))
 }
 
-/// Whether a camera stands where it was.
+/// Whether a camera is still at its previous pose.
 fn is_static(a: &Pose, b: &Pose) -> bool {
     let (meters, radians) = pose_difference(a, b);
     a == b || (meters <= STANDS.0 && radians <= STANDS.1)
@@ -64,7 +66,7 @@ impl Background {
         depth > 0.0 && z > depth - SCENE_MARGIN.0 - SCENE_MARGIN.1 * depth
     }
 
-    /// Whether it is that of this image: of its camera, where it stands.
+    /// Whether this background belongs to the image: to the same camera at the same pose.
     pub(super) fn fits(&self, image: &DepthImage) -> bool {
         self.is_sized_like(image)
             && self.world_from_sensor.is_some_and(|known| is_static(&known, &image.world_from_sensor))
@@ -74,7 +76,7 @@ impl Background {
         self.width == image.camera.width() && self.depth.len() == image.pixels.len()
     }
 
-    /// Learns from neighboring pixels, without a branch.
+    /// Updates a range of neighboring pixels, without a branch.
     fn learn(&mut self, image: &DepthImage, pixels: Range<usize>) {
         let scale = image.meters_per_unit as f32;
         let depth = &mut self.depth[pixels.clone()];
@@ -95,7 +97,7 @@ impl Background {
     }
 }
 
-/// What is known of a pixel after a return at `z`.
+/// Learned depth of a pixel after a return at `z`.
 #[inline(always)]
 fn learned(depth: f32, z: f32) -> f32 {
     let change = z - depth;
@@ -110,18 +112,18 @@ impl Backgrounds {
         self.images.iter().find(|background| background.fits(image))
     }
 
-    /// What was learned of this image.
+    /// The learned depths of this image.
     pub(crate) fn depth_mut(&mut self, image: &DepthImage) -> Option<&mut [f32]> {
         let known = self.images.iter_mut().find(|background| background.fits(image));
         known.map(|background| background.depth.as_mut_slice())
     }
 
-    /// Whether another person explains a point of a cloud, by their numbers.
+    /// Whether another person explains a point of a cloud, by the indices of cloud and point.
     pub(super) fn is_others(&self, cloud: usize, point: usize) -> bool {
         self.others.get(cloud).is_some_and(|others| others.get(point).copied().unwrap_or(false))
     }
 
-    /// Notes which points of clouds another person explains: those of whose owner `is_others` holds.
+    /// Stores which points of the clouds other persons explain: those for whose owner `is_others` returns true.
     pub(super) fn mark_others_points(&mut self, owners: &[Vec<u16>], is_others: impl Fn(u16) -> bool) {
         self.others.resize_with(owners.len(), Vec::new);
         for (others, owners) in self.others.iter_mut().zip(owners) {
@@ -130,7 +132,7 @@ impl Backgrounds {
         }
     }
 
-    /// Takes up what is known of another's images, and `change`s it.
+    /// Copies the learned depths of another scene for each image of the frame, then lets `change` modify them.
     pub(super) fn adopt(&mut self, frame: &Frame, scene: &Self, mut change: impl FnMut(usize, &mut [f32])) {
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
@@ -144,8 +146,8 @@ impl Backgrounds {
         }
     }
 
-    /// Makes sure that something is known, if only nothing, of every image of a frame; `moved` gets the numbers of those whose
-    /// cameras are not where they were, and whether what they had learned was carried along.
+    /// Gives every image of a frame a background, if only an empty one. `moved` is called with the index of each image whose
+    /// camera moved, and with whether the learned depths were carried over.
     pub(crate) fn register(&mut self, frame: &Frame, mut moved: impl FnMut(usize, bool)) {
         for (number, image) in frame.images.iter().enumerate() {
             if self.of_image(image).is_none() {
@@ -155,7 +157,7 @@ impl Backgrounds {
         }
     }
 
-    /// Whether no depth image was ever seen.
+    /// Whether no depth image has been received yet.
     pub(crate) fn is_empty(&self) -> bool {
         self.images.is_empty()
     }
@@ -165,7 +167,7 @@ impl Backgrounds {
         self.images.clear();
     }
 
-    /// Starts from a frame whose body pose is known: `forget_body` sets those of all depths to 0 that may be the body's, the
+    /// Starts from a frame in which the body pose is known. `forget_body` sets the depths that may be the body's to 0; the
     /// others are scene.
     pub(crate) fn start(&mut self, frame: &Frame, mut forget_body: impl FnMut(&DepthImage, &mut [f32])) {
         self.images.clear();
@@ -183,8 +185,8 @@ impl Backgrounds {
         }
     }
 
-    /// Guesses what lies where the body has hidden the scene since the start: what lies beside it in the same row, linearly
-    /// between its two sides, and the deeper one where they are far apart.
+    /// Guesses the scene that the body has hidden since the start from the pixels beside it in the same row: linearly between
+    /// the two sides, or the deeper one where they are far apart.
     pub(crate) fn fill(&mut self) {
         for background in &mut self.images {
             for row in background.depth.chunks_mut(background.width.max(1)) {
@@ -193,8 +195,8 @@ impl Backgrounds {
         }
     }
 
-    /// Goes on learning outside the window (columns, rows) that can show the body; a few rows a frame. What a
-    /// camera learned that moved since is carried along; one that is silent in this frame is remembered.
+    /// Continues learning outside the window (columns, rows) that can show the body, a few rows per frame. The learned depths of
+    /// a camera that moved are carried over; those of a camera without an image in this frame are kept.
     pub(crate) fn update(&mut self, frame: &Frame, mut window: impl FnMut(&DepthImage) -> [Range<usize>; 2]) {
         for image in frame.images {
             let known = self.images.iter().position(|background| background.fits(image));

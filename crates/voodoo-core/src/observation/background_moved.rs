@@ -1,19 +1,20 @@
-//! A scene that was learned by a camera which has moved since: its surfaces stay where they are in the world.
+//! Carries a learned scene over to a new camera pose: its surfaces are static in the world.
 
 use super::background::{Background, Backgrounds, pose_difference};
 use super::frame::{DepthImage, Frame};
 use crate::math::{Pose, Vec3};
 
-/// A camera that moved by more than this from one image to the next is another one: meters, and radians.
+/// A camera that moved by more than this between two images counts as a different camera: meters, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
-/// Surfaces nearer to the camera plane are not carried along, meters: no sensor measures there.
+/// Surfaces nearer to the camera plane than this are not carried over, meters: no sensor measures there.
 const NEAREST_CARRIED: f32 = 0.1;
-/// Two sides of a crack that differ by less, meters, belong to one surface.
+/// The two sides of a crack belong to one surface when their depths differ by less than this, meters.
 const CRACK_STEP: f32 = 0.15;
 
 impl Backgrounds {
-    /// The number of a background for an image that has none, and whether anything is known there: what the same camera has learned elsewhere is carried to where it is
-    /// now, else nothing is known; in the place of a background that no image of the frame has.
+    /// Returns the index of a background for an image that has none, and whether it contains learned depths. If the same camera
+    /// learned a background at another pose nearby, that one is carried over to the current pose; otherwise the background is
+    /// empty. Reuses the slot of a background that no image of the frame has.
     pub(super) fn carry_over(&mut self, image: &DepthImage, frame: &Frame) -> (usize, bool) {
         let gone = |background: &Background| !frame.images.iter().any(|image| background.fits(image));
         let from = |background: &Background| background.world_from_sensor.filter(|_| background.is_sized_like(image));
@@ -44,16 +45,18 @@ impl Backgrounds {
 }
 
 impl Background {
-    /// Nothing is known behind this image.
+    /// Resets all depths of this image to unknown.
     fn forget(&mut self, image: &DepthImage) {
         self.depth.clear();
         self.depth.resize(image.pixels.len(), 0.0);
         self.rays.clear();
     }
 
-    /// Looks at the learned surfaces from where the camera is now; the nearest that falls into a pixel is what is known there.
+    /// Reprojects the learned surfaces into the camera at its current pose; each pixel keeps the nearest surface that falls into
+    /// it.
     ///
-    /// A surface is kept on the ray it was seen on, not in the middle of its pixel: errors of rounding do not add up.
+    /// A surface stays on the ray on which it was observed instead of moving to the pixel center, so that rounding errors do not
+    /// accumulate.
     fn move_to(&mut self, image: &DepthImage, before: &Pose) {
         let moved = image.world_from_sensor.inverse() * *before;
         let turn = glam_columns(&moved);
@@ -93,7 +96,7 @@ impl Background {
         }
     }
 
-    /// Closes cracks one pixel wide between neighbors `step` apart, which open where a surface comes nearer.
+    /// Closes one-pixel cracks between neighbors `step` apart, which open where a surface comes nearer.
     fn close_cracks(&mut self, step: usize) {
         for index in step..self.depth.len().saturating_sub(step) {
             let (a, b) = (self.depth[index - step], self.depth[index + step]);
@@ -104,7 +107,7 @@ impl Background {
     }
 }
 
-/// Stands for the ray through the middle of a pixel.
+/// Stands for the ray through the pixel center.
 pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
 
 /// Columns of the rotation, then the translation.
@@ -137,7 +140,7 @@ mod tests {
         }
     }
 
-    /// A wall at z = 3 with a step to 4 on the right of x = 0.2.
+    /// A wall at z = 3 with a step to z = 4 at the right of x = 0.2.
     fn view_from(camera: &Camera, world_from_sensor: &Pose) -> Vec<f32> {
         (0..SIZE.0 * SIZE.1)
             .map(|index| {
@@ -169,7 +172,7 @@ mod tests {
         backgrounds.start(&Frame { images: &images, ..Frame::empty(0.0) }, |_, _| {});
         let mut known = 0;
         for step in 1..=80 {
-            // A sixth of a pixel at a time: rounding alone would leave everything where it was in the image.
+            // A sixth of a pixel per move: with rounding to pixels, everything would stay where it was in the image.
             let now = pose(0.002 * f64::from(step), 0.0025 * f64::from(step));
             let pixels = view_from(camera, &now);
             let frame = [image(&pixels, camera, now)];
@@ -177,15 +180,16 @@ mod tests {
             backgrounds.register(&frame, |_, _| {});
             let depth = backgrounds.of_image(&frame.images[0]).map(Background::depth).unwrap_or_default();
             known = depth.iter().filter(|z| **z > 0.0).count();
-            // Within a pixel: the step falls between two of them.
+            // Within one pixel: the step falls between two pixels.
             let beside = |index: usize| pixels[index.saturating_sub(1)..(index + 2).min(pixels.len())].iter();
             let view_from = || depth.iter().enumerate().filter(|(_, z)| **z > 0.0);
             let near = view_from().filter(|(index, z)| beside(*index).all(|view_from| **z < view_from - 0.1)).count();
             let deep = view_from().filter(|(index, z)| beside(*index).all(|view_from| **z > view_from + 0.1)).count();
-            // Too near would hide a body; too deep, where the far wall is seen through cracks of the near one, does not.
+            // Depths that are too near would hide a body. Depths that are too deep, where the far wall is visible through cracks
+            // of the near one, would not.
             assert!(near == 0 && deep * 20 <= known, "step {step}: {near} too near, {deep} too deep of {known}");
         }
-        // A turn of 0.2 rad leaves most of the view, of which surfaces that fall into one pixel are lost.
+        // A rotation of 0.2 rad leaves most of the view; surfaces that fall into one pixel are lost.
         assert!(known * 2 > first.len(), "{known} pixels are left");
     }
 

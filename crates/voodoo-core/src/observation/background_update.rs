@@ -1,4 +1,4 @@
-//! What is not the body: the still scene, learned around it.
+//! Updates the background: learns the static scene around the body.
 
 use super::background::{Background, Backgrounds};
 use super::candidates::image_window;
@@ -7,12 +7,13 @@ use super::observer::{Expectation, Own};
 use crate::math::{Aabb, Points, shifted};
 use crate::shape::SurfaceBatch;
 
-/// In the first frame, what lies within this of the body may be the body, meters: poses that are set are that far off.
+/// In the first frame, returns within this distance of the body may be the body, meters: poses set by the user have errors of
+/// this size.
 const BODY_REACH: f32 = 0.15;
 
 impl Backgrounds {
-    /// In the first frame after a reset the pose is known, and all that is not near the body is scene. While the body is lost,
-    /// nothing of the image is its.
+    /// Updates the background around the body. In the first frame after a reset the pose is known, and everything that is not
+    /// near the body is scene. While the body is lost, the whole image is learned.
     pub(super) fn learn_around(&mut self, frame: &Frame, expected: Expectation, bounds: &Aabb) {
         if expected.first {
             self.learn_first(frame, expected, bounds);
@@ -28,7 +29,7 @@ impl Backgrounds {
         });
     }
 
-    /// Forgets, and returns, what was learned at pixels that show the body.
+    /// Sets the learned depth to unknown at pixels that show the body, and returns the previous values.
     pub(super) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
         let Some(image) = frame.images.get(own.image) else { return Vec::new() };
         let Some(depth) = self.depth_mut(image) else { return Vec::new() };
@@ -36,7 +37,7 @@ impl Backgrounds {
         let forget = |pixel: &usize| {
             let Some(depth) = depth.get_mut(*pixel) else { return 0.0 };
             let learned = *depth;
-            // What was learned behind the body stays.
+            // Depths learned behind the body stay.
             let z = image.pixels.get(*pixel) * scale;
             if !(z > 0.0) || Background::contains(learned, z) {
                 *depth = 0.0;
@@ -46,7 +47,7 @@ impl Backgrounds {
         own.pixels.iter().map(forget).collect()
     }
 
-    /// Learns again what was forgotten.
+    /// Restores the depths that `release` returned.
     pub(super) fn restore(&mut self, frame: &Frame, own: Own, learned: &[f32]) {
         let Some(depth) = frame.images.get(own.image).and_then(|image| self.depth_mut(image)) else { return };
         for (pixel, learned) in own.pixels.iter().zip(learned) {

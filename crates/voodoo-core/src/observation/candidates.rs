@@ -1,4 +1,4 @@
-//! Step 1 (K06 IV-B.1): free points inside the enlarged whole-body box, joined by the points known to be on the body.
+//! Step 1 (K06 IV-B.1): free points inside the enlarged whole-body box, plus the points known to be on the body.
 
 use crate::body::Body;
 use crate::config::Config;
@@ -8,31 +8,31 @@ use crate::observation::clusters::Clusters;
 use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
 use crate::observation::pixels::{Grid, PointGate, STRETCH, Stretch};
 
-/// Mark of a point that may belong to any limb.
+/// Marks a point that may belong to any limb.
 pub(crate) const ANY_LIMB: u16 = u16::MAX;
 
-/// Measured points that may lie on the body, in the working frame: world axes, origin near the body, single precision.
+/// Measured points that may lie on the body, in the working frame (world axes, origin near the body), single precision.
 #[derive(Debug, Default)]
 pub(crate) struct Candidates {
-    /// Where they are.
+    /// Positions.
     pub points: Points,
-    /// What they weigh.
+    /// Weights.
     pub weight: Vec<f32>,
     /// The limb they are known to be on, or [`ANY_LIMB`].
     pub limb: Vec<u16>,
-    /// Which source they come from.
+    /// Index of the source of each point.
     pub source: Vec<u16>,
-    /// The pixels of depth images come first, image after image: the number of points up to the end of each, and where its
-    /// camera stands.
+    /// The pixels of depth images come first, image after image: for each image, the number of points up to its end, and the
+    /// position of its camera.
     pub cameras: Vec<(u32, Vec3)>,
-    /// The points once more, neighbors together.
+    /// The points again, grouped into clusters of neighbors.
     pub(crate) clusters: Clusters,
-    /// What [`Self::rough`] returns, if there are any.
+    /// The points that [`Self::subsampled`] returns, if there are any.
     fewer: Option<Box<Candidates>>,
 }
 
-/// Pixels that rough looks are content with: twice as many of them are thinned, costs time in proportion. With 500 and 800 the
-/// rendered recordings' hypotheses end alike.
+/// Number of pixels that is enough for coarse evaluations: where there are at least twice as many, they are subsampled, because
+/// time grows in proportion. With 500 and with 800, the hypotheses of the rendered recordings have the same outcome.
 const ROUGH_POINTS: usize = 700;
 
 /// Box around the posed body, enlarged by `margin`, in the frame of `poses`.
@@ -57,8 +57,8 @@ impl Candidates {
         self.points.is_empty()
     }
 
-    /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` the enlarged
-    /// whole-body box in the working frame; pixels of the learned backgrounds are left out.
+    /// Gathers the candidates of a frame. `origin` is the working frame's origin in the world, `bounds` is the enlarged
+    /// whole-body box in the working frame. Pixels of the learned backgrounds are left out.
     pub(crate) fn gather(
         &mut self,
         frame: &Frame,
@@ -88,7 +88,8 @@ impl Candidates {
         self.thin();
     }
 
-    /// Where depth images show many, about [`ROUGH_POINTS`] of them that weigh as much together; else all.
+    /// A subset of approximately [`ROUGH_POINTS`] pixels with the same total weight where depth images have many; otherwise all
+    /// points.
     pub(crate) fn subsampled(&self) -> &Self {
         self.fewer.as_deref().filter(|fewer| !fewer.is_empty()).unwrap_or(self)
     }
@@ -101,7 +102,7 @@ impl Candidates {
         self.cameras.clear();
     }
 
-    /// Takes every so manyth pixel, and all other points.
+    /// Subsamples the pixels at a regular stride, and keeps all other points.
     fn thin(&mut self) {
         let mut fewer = self.fewer.take().unwrap_or_default();
         fewer.clear();
@@ -120,7 +121,7 @@ impl Candidates {
         self.fewer = Some(fewer);
     }
 
-    /// Takes one of others, so many times as heavy.
+    /// Copies one point of `others`, with its weight multiplied by `times`.
     fn take(&mut self, others: &Self, index: usize, times: f32) {
         let Points { x, y, z } = &others.points;
         let point = [x[index], y[index], z[index]];
@@ -134,7 +135,7 @@ impl Candidates {
         self.source.push(source);
     }
 
-    /// Drops the points in boxes of the world.
+    /// Drops the points inside the given boxes of the world.
     fn leave_out(&mut self, boxes: &[Aabb], origin: Vec3) {
         if boxes.is_empty() {
             return;
@@ -192,7 +193,7 @@ impl Candidates {
         let [columns, rows] = image_window(image, &working_from_sensor, bounds);
         let m = columns_f32(&working_from_sensor);
         let points = &mut self.points;
-        // A pixel stands for a patch of surface: its size follows from the distance of the body.
+        // A pixel represents a patch of surface: its size follows from the distance of the body.
         let distance = working_from_sensor.inverse_transform_point(bounds.center()).length().max(NEAREST_BODY);
         let [fx, fy] = image.camera.focal();
         let patch = distance * distance / (fx * fy);
@@ -219,12 +220,12 @@ impl Candidates {
     }
 }
 
-/// A body is taken to be no nearer to its camera than this, meters, when a pixel's share of its surface is computed.
+/// Least assumed distance of a body from its camera, meters, for computing the surface area that a pixel represents.
 const NEAREST_BODY: f64 = 0.3;
-/// Area of a person that a camera sees, about, m^2; what stands beside counts as well.
+/// Approximate area of a person that is visible to a camera, m^2; adjacent objects count as well.
 const VISIBLE_AREA: f64 = 0.6;
-/// A depth pixel that stands for this much surface has weight one: 12 mm squared, that of a 160x124 time-of-flight camera
-/// of the papers at 2.4 m. Finer pixels weigh less, coarser ones more: the resolution does not change the balance.
+/// A depth pixel that represents this much surface has weight one: 12 mm squared, a pixel of the papers' 160x124 time-of-flight
+/// camera at 2.4 m. Finer pixels have less weight, coarser ones more: the resolution does not change the balance.
 pub(crate) const REFERENCE_PATCH: f64 = 0.012 * 0.012;
 
 /// Columns and rows that can show anything inside the box, see [`crate::Camera::window`].
@@ -262,14 +263,14 @@ mod tests {
         let ground = Some(Ground { normal: Vec3::Z, offset: 0.5 });
         let frame = Frame { images: &images, ground, ..Frame::empty(0.0) };
         let mut backgrounds = Backgrounds::default();
-        // What is farther than 2.6 m is scene.
+        // Everything farther than 2.6 m is scene.
         backgrounds.start(&frame, |_, depths| depths.iter_mut().for_each(|depth| *depth = 2.6 + 1e-6 * *depth));
         let origin = Vec3::new(2.3, 0.0, 1.0);
         let bounds = Aabb::new(Vec3::new(-0.4, -0.3, -0.6), Vec3::new(0.4, 0.5, 0.4));
         let config = Config { max_points: 1_000_000, ..Config::default() };
         let mut found = Candidates::default();
         found.gather(&frame, origin, &bounds, &backgrounds, &config);
-        // One pixel after the other, in double precision.
+        // The reference: one pixel after the other, in double precision.
         let expected: Vec<Vec3> = (0..pixels.len())
             .filter(|index| pixels[*index] > 0.0)
             .filter(|index| !Background::contains(2.6 + 1e-6 * pixels[*index], pixels[*index]))
@@ -303,7 +304,7 @@ mod tests {
         assert_eq!(rough.cameras, [(250, Vec3::X), (ROUGH_POINTS as u32, Vec3::Y)]);
         assert!((0..ROUGH_POINTS).all(|index| rough.points.x[index] == 4.0 * index as f32));
         assert_eq!((&rough.limb[ROUGH_POINTS..], &rough.source[ROUGH_POINTS..]), (&[7; 3][..], &[2; 3][..]));
-        // Those of a coarse image are all needed.
+        // A coarse image keeps all its points.
         all.cameras = vec![(2 * ROUGH_POINTS as u32 - 1, Vec3::X)];
         all.thin();
         assert_eq!(all.subsampled().len(), all.len());

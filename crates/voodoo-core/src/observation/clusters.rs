@@ -1,40 +1,40 @@
-//! Neighboring candidates together: what is true of all of them is then asked once.
+//! Groups neighboring candidates into clusters, so that a test can be made once for a whole cluster.
 
 use crate::math::{LANES, Points, widest};
 
-/// Points of a cluster: a whole number of SIMD lanes.
+/// Points per cluster: a whole number of SIMD lanes.
 pub(crate) const CLUSTER: usize = 32;
-/// Cells along each axis of the grid that sorts the points: a power of two, so that a mask keeps a cell inside.
+/// Cells along each axis of the grid that sorts the points: a power of two, so that a bit mask keeps an index in range.
 const CELLS: usize = 16;
 /// The last cell along an axis.
 const LAST: u32 = CELLS as u32 - 1;
-/// Single precision has no fractions from here on, and the bits after the leading one are zero.
+/// From here on single precision has no fractions, and the bits after the leading one are zero.
 const WHOLE: f32 = (1 << 23) as f32;
-/// A cell is no smaller than this, meters: about as large as a cluster of a depth image's points.
+/// Least size of a cell, meters: approximately the size of a cluster of depth pixels.
 const SMALLEST_CELL: f32 = 0.08;
 
-/// Points in an order in which neighbors stand together, cut into clusters.
+/// Points in an order that keeps neighbors together, cut into clusters.
 #[derive(Debug, Default)]
 pub(crate) struct Clusters {
-    /// Which point stands where, and the points in this order, the last one repeated to whole clusters.
+    /// The original index of each sorted point, and the sorted points; the last one is repeated to fill the last cluster.
     order: Vec<u32>,
     points: Points,
     bounds: Vec<Bounds>,
-    /// The cell of each point, and where the next point of each cell goes.
+    /// The cell of each point, and where the next point of each cell goes in the sorted order.
     cells: Vec<u32>,
     next: Vec<u32>,
 }
 
-/// A box around points.
+/// An axis-aligned box around points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
-    /// Its middle.
+    /// Center.
     pub center: [f32; 3],
-    /// Half its size.
+    /// Half of the size.
     pub half: [f32; 3],
 }
 
-/// The points of one cluster, with those that repeat the last one.
+/// The points of one cluster, including repetitions of the last one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cluster<'a> {
     /// First coordinates.
@@ -43,9 +43,9 @@ pub(crate) struct Cluster<'a> {
     pub y: &'a [f32; CLUSTER],
     /// Third coordinates.
     pub z: &'a [f32; CLUSTER],
-    /// A box around them.
+    /// Bounding box.
     pub bounds: &'a Bounds,
-    /// Which points they are, without repetitions.
+    /// Indices of the points, without repetitions.
     pub which: &'a [u32],
 }
 
@@ -91,7 +91,8 @@ impl Clusters {
         );
     }
 
-    /// The cell of every point: layer by layer, and in each to and fro, so that one cell lies beside the next.
+    /// The cell of every point. Cells are numbered layer by layer, and back and forth in each layer, so that consecutive cells
+    /// are adjacent.
     #[inline(always)]
     fn find_cells(&mut self, points: &Points) {
         let (x, y, z) = (CellAxis::new(&points.x), CellAxis::new(&points.y), CellAxis::new(&points.z));
@@ -137,7 +138,7 @@ impl Clusters {
     }
 }
 
-/// The cells along an axis.
+/// The grid cells along an axis.
 struct CellAxis {
     low: f32,
     scale: f32,
@@ -150,18 +151,18 @@ impl CellAxis {
         Self { low, scale: 1.0 / ((high - low) / CELLS as f32).max(SMALLEST_CELL) }
     }
 
-    /// The cell of a value; a NaN counts as the least.
+    /// The cell of a value; a NaN counts as the least value.
     #[inline(always)]
     fn cell(&self, value: f32) -> u32 {
         let place = (value - self.low) * self.scale;
         let place = if place > 0.0 { place } else { 0.0 };
         let place = if place < LAST as f32 { place } else { LAST as f32 };
-        // The last bits of the sum are the whole number; unlike a cast, every lane has this.
+        // The last bits of the sum are the integer; unlike a cast, this works in every SIMD lane.
         (place + WHOLE).to_bits() & LAST
     }
 }
 
-/// Least and greatest of some values, in lanes.
+/// Minimum and maximum of some values, in lanes.
 #[inline(always)]
 fn range(values: &[f32]) -> [f32; 2] {
     let (mut low, mut high) = ([f32::MAX; LANES], [f32::MIN; LANES]);

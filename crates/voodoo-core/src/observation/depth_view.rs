@@ -1,56 +1,56 @@
-//! What the pixels of a depth image say about a place in space.
+//! What the pixels of a depth image show at a position in space.
 
 use crate::camera::NEAREST_RETURN;
 use crate::math::{Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds, OTHERS};
 use crate::observation::frame::{DepthImage, Frame};
 
-/// A depth image as a witness: what lies in a pixel.
+/// A depth image that can be queried by position.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DepthView<'a> {
     /// The image.
     pub image: &'a DepthImage<'a>,
-    /// What is known of the scene behind the body.
+    /// The learned depth of the scene behind the body.
     pub background: Option<&'a Background>,
     /// Pose of the camera in the working frame.
     pub working_from_camera: Pose,
-    /// Whoever made the image had the body segmented (cut out): a pixel without return shows that nothing is there.
+    /// Whether the body was segmented (cut out) before the image was passed in: then a pixel without return is free space.
     pub segmented: bool,
 }
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Pixel {
-    /// Outside the image, or no return where that means nothing.
+    /// Outside the image, or no return in an image where that carries no information.
     Unknown,
-    /// The scene behind the body, or nothing where the body was segmented; with its depth, infinite when nothing returned.
+    /// The scene behind the body, with its depth; or free space in a segmented image, with infinite depth.
     Background(f64),
-    /// Something that may be the body, at this depth.
+    /// A return that may be the body, at this depth.
     Foreground(f64),
-    /// Another body, at this depth.
+    /// Another person, at this depth.
     Other(f64),
 }
 
-/// An image with more pixels without return than this share was segmented: a sensor alone loses less of a room.
+/// An image with a larger fraction of pixels without return was segmented: a sensor alone loses less of a room.
 const SEGMENTED_FRACTION: f64 = 0.5;
-/// Every so manyth pixel is asked for that; a prime, so that all columns take part.
+/// Stride of the pixels that are tested for that; a prime, so that all columns take part.
 const SEGMENTED_STEP: usize = 97;
 
-/// The depth images of a frame as witnesses.
+/// The depth images of a frame, for queries by position.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DepthViews<'a> {
     /// The frame.
     pub frame: &'a Frame<'a>,
-    /// What is known of the scene behind the body.
+    /// The learned backgrounds.
     pub backgrounds: &'a Backgrounds,
-    /// In which images the body was segmented, as [`find_segmented`] found it.
+    /// Whether the body was segmented in each image, as [`find_segmented`] found.
     pub segmented: &'a [bool],
     /// The working frame's origin in the world.
     pub origin: Vec3,
 }
 
 impl<'a> DepthViews<'a> {
-    /// One after the other.
+    /// Iterates over the images.
     pub(crate) fn iter(self) -> impl Iterator<Item = DepthView<'a>> {
         let images = self.frame.images.iter().zip(self.segmented);
         images.map(move |(image, segmented)| DepthView {
@@ -63,7 +63,7 @@ impl<'a> DepthViews<'a> {
 }
 
 impl DepthView<'_> {
-    /// What the pixel that a point (camera frame) falls in shows.
+    /// What the pixel shows that a point (camera frame) projects to.
     #[inline(always)]
     pub(crate) fn at(&self, point: Vec3) -> Pixel {
         let image = self.image;
@@ -89,7 +89,7 @@ impl DepthView<'_> {
     }
 }
 
-/// In which images of a frame the body was segmented, into `found`.
+/// Finds in which images of a frame the body was segmented, and writes the result to `found`.
 pub(crate) fn find_segmented(frame: &Frame, found: &mut Vec<bool>) {
     found.clear();
     found.extend(frame.images.iter().map(|image| {
@@ -108,7 +108,7 @@ mod tests {
     use crate::camera::{Camera, Lens};
     use crate::testing::image;
 
-    /// Every pixel of this image has a depth of its own, meters.
+    /// Every pixel of this image has a different depth, meters.
     fn distinct(count: usize) -> Vec<f32> {
         (0..count).map(|index| 1.0 + 0.01 * index as f32).collect()
     }
@@ -143,7 +143,7 @@ mod tests {
         let image = image(&pixels, 24, 20.0);
         let view = DepthView { image: &image, background: None, working_from_camera: Pose::IDENTITY, segmented: false };
         for (index, depth) in pixels.iter().enumerate() {
-            // Anywhere on the pixel, and at any depth: its edges are half a pixel from its center.
+            // Anywhere within the pixel, and at any depth: its borders are half a pixel from its center.
             for (z, u, v) in [(0.3, 0.0, 0.0), (2.0, 0.45, -0.45), (9.0, -0.45, 0.45)] {
                 let aside = Vec3::new(u, v, 0.0) * (f64::from(z) / 20.0);
                 let found = view.at(image.back_project(index, z) + aside);

@@ -1,4 +1,4 @@
-//! What is measured at one instant, from any number of sensors (K06 IV-A). Borrowed: nothing is copied on the way in.
+//! All measurements of one instant, from any number of sensors (K06 IV-A). Data is borrowed: nothing is copied on input.
 
 use crate::body::Body;
 use crate::camera::Camera;
@@ -6,7 +6,7 @@ use crate::error::TrackError;
 use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
-/// Three-dimensional points as they lie in memory, in meters.
+/// Three-dimensional points in the caller's memory layout, in meters.
 #[derive(Clone, Copy, Debug)]
 pub enum PointSlice<'a> {
     /// Single precision.
@@ -38,10 +38,10 @@ impl PointSlice<'_> {
     }
 }
 
-/// What is known beforehand about where 3-D points belong (K06 IV-A, the first three kinds).
+/// What is known in advance about the limb that 3-D points belong to (K06 IV-A, the first three kinds).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// Anywhere: background, or any limb.
+    /// Unknown: background, or any limb.
     Free,
     /// On the tracked body: the whole-body box is not applied.
     Body,
@@ -58,13 +58,13 @@ pub struct Cloud<'a> {
     pub world_from_sensor: Pose,
     /// Weight of each point.
     pub weight: f64,
-    /// Where they belong.
+    /// What is known about the limb that they belong to.
     pub scope: Scope,
-    /// Number of the source they come from, for the report.
+    /// Index of the source, for the report.
     pub source: u16,
 }
 
-/// The pixels of a depth image: distance along the optical axis, 0 (or NaN) = no return, row by row.
+/// The pixels of a depth image, row by row: distance along the optical axis; 0 (or NaN) means no return.
 #[derive(Clone, Copy, Debug)]
 pub enum DepthPixels<'a> {
     /// In units of `meters_per_unit`.
@@ -87,7 +87,7 @@ impl DepthPixels<'_> {
         self.len() == 0
     }
 
-    /// The value of a pixel; not finite or not above zero means no return.
+    /// The value of a pixel; a value that is not finite or not above zero means no return.
     #[inline(always)]
     pub fn get(&self, index: usize) -> f32 {
         match self {
@@ -102,7 +102,7 @@ impl DepthPixels<'_> {
 pub struct DepthImage<'a> {
     /// All pixels of the camera.
     pub pixels: DepthPixels<'a>,
-    /// Its calibration; its lens may distort.
+    /// Its calibration; the lens may have distortion.
     pub camera: &'a Camera,
     /// Length of one unit of the pixels, meters.
     pub meters_per_unit: f64,
@@ -110,19 +110,19 @@ pub struct DepthImage<'a> {
     pub world_from_sensor: Pose,
     /// Weight of each point.
     pub weight: f64,
-    /// Number of the source, for the report.
+    /// Index of the source, for the report.
     pub source: u16,
 }
 
 impl DepthImage<'_> {
-    /// The point of a pixel in the camera's frame for a depth of `z` meters.
+    /// The point of a pixel in the camera frame for a depth of `z` meters.
     pub fn back_project(&self, index: usize, z: f32) -> Vec3 {
         let [x, y] = self.camera.pixel_ray(index % self.camera.width(), index / self.camera.width());
         f64::from(z) * Vec3::new(x, y, 1.0)
     }
 
-    /// The depth that was measured where a place of the world is seen, 0 for none, and that of the place, meters; none outside the
-    /// image.
+    /// Returns the measured depth at the pixel that a world point projects to (0 for no return) and the depth of the point
+    /// itself, meters; `None` outside the image.
     pub fn measured(&self, place: Vec3) -> Option<[f64; 2]> {
         let point = self.world_from_sensor.inverse_transform_point(place);
         let index = self.camera.index_of(point)?;
@@ -130,49 +130,51 @@ impl DepthImage<'_> {
     }
 }
 
-/// A named site was seen at a position (K06 IV-A: 3-D point-to-point relation).
+/// A measured position of a named site (K06 IV-A: 3-D point-to-point relation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionRelation {
     /// Index of the site.
     pub site: usize,
-    /// Where it was seen, world frame.
+    /// Measured position, world frame.
     pub position: Vec3,
-    /// Its weight.
+    /// Weight.
     pub weight: f64,
-    /// It may always be this far off, meters: within, it says nothing; beyond, it pulls with the rest of the distance.
+    /// Bias, meters: the measurement may have a constant error of this size. Within it the measurement has no effect; beyond it,
+    /// the remaining distance pulls.
     pub bias: f64,
-    /// Number of the source, for the report.
+    /// Index of the source, for the report.
     pub source: u16,
 }
 
-/// A named site was seen along a ray (K06 IV-A: 2-D point-to-line relation).
+/// A named site that was observed along a ray (K06 IV-A: 2-D point-to-line relation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayRelation {
     /// Index of the site.
     pub site: usize,
-    /// Where the ray starts (the focal point), world frame.
+    /// Start of the ray (the focal point), world frame.
     pub origin: Vec3,
-    /// Where it goes, world frame, any length above zero.
+    /// Direction of the ray, world frame, of any length above zero.
     pub direction: Vec3,
-    /// Its weight.
+    /// Weight.
     pub weight: f64,
-    /// It may always be this far off, meters: within, it says nothing; beyond, it pulls with the rest of the distance.
+    /// Bias, meters: the measurement may have a constant error of this size. Within it the measurement has no effect; beyond it,
+    /// the remaining distance pulls.
     pub bias: f64,
-    /// Number of the source, for the report.
+    /// Index of the source, for the report.
     pub source: u16,
 }
 
-/// The floor: points `p` with `normal . p < offset` lie below it.
+/// The ground plane: points `p` with `normal . p < offset` lie below it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
-    /// Unit vector upwards, world frame.
+    /// Unit vector pointing up, world frame.
     pub normal: Vec3,
-    /// Height of the floor along it, meters.
+    /// Offset of the ground plane along the normal, meters.
     pub offset: f64,
 }
 
 impl Ground {
-    /// The same floor where `origin`, a place in the world, is the origin.
+    /// The same plane in a frame with its origin at `origin`, a world position.
     pub fn relative_to(self, origin: Vec3) -> Self {
         Self { offset: self.offset - self.normal.dot(origin), ..self }
     }
@@ -185,7 +187,7 @@ impl Ground {
 
 /// All measurements of one instant.
 ///
-/// [`Frame::empty`] makes one without any; what was measured is added with the `with_` methods, or set field by field.
+/// [`Frame::empty`] makes one without measurements; add them with the `with_` methods, or set the fields.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Frame<'a> {
@@ -195,15 +197,15 @@ pub struct Frame<'a> {
     pub clouds: &'a [Cloud<'a>],
     /// Depth images.
     pub images: &'a [DepthImage<'a>],
-    /// Color pictures.
+    /// Color images.
     pub colors: &'a [ColorImage<'a>],
-    /// Sites with positions.
+    /// Sites with measured positions.
     pub positions: &'a [PositionRelation],
-    /// Sites with rays.
+    /// Sites observed along rays.
     pub rays: &'a [RayRelation],
-    /// The floor, where it is known.
+    /// The ground plane, if it is known.
     pub ground: Option<Ground>,
-    /// Boxes of the world in which nothing belongs to anybody: the robot's own arm, a coat stand.
+    /// Boxes of the world whose points belong to no person: the robot's own arm, a coat stand.
     pub excluded: &'a [Aabb],
 }
 
@@ -225,40 +227,40 @@ impl<'a> Frame<'a> {
         Self { images, ..self }
     }
 
-    /// The frame with these color pictures.
+    /// The frame with these color images.
     #[must_use]
     pub fn with_colors(self, colors: &'a [ColorImage<'a>]) -> Self {
         Self { colors, ..self }
     }
 
-    /// The frame with these positions of sites.
+    /// The frame with these site positions.
     #[must_use]
     pub fn with_positions(self, positions: &'a [PositionRelation]) -> Self {
         Self { positions, ..self }
     }
 
-    /// The frame with these rays on which sites were seen.
+    /// The frame with these site rays.
     #[must_use]
     pub fn with_rays(self, rays: &'a [RayRelation]) -> Self {
         Self { rays, ..self }
     }
 
-    /// The frame with this floor, or without one.
+    /// The frame with this ground plane, or without one.
     #[must_use]
     pub fn with_ground(self, ground: impl Into<Option<Ground>>) -> Self {
         Self { ground: ground.into(), ..self }
     }
 
-    /// The frame with these boxes of the world in which nothing belongs to anybody.
+    /// The frame with these boxes of the world whose points belong to no person.
     #[must_use]
     pub fn with_excluded(self, excluded: &'a [Aabb]) -> Self {
         Self { excluded, ..self }
     }
 
-    /// Refuses what cannot be used: nothing of it may reach the tracker's state.
+    /// Returns an error for unusable input, before any of it reaches the tracker's state.
     ///
-    /// Depth images and point clouds may hold NaN only where the sensor had no return; for a cloud that is an error (drop
-    /// such rows before), for a depth image it is tolerated as "no return".
+    /// Depth images and point clouds may hold NaN only where the sensor had no return. In a depth image it counts as "no
+    /// return"; in a cloud it is an error (drop such rows before).
     pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
         if !self.stamp.is_finite() {
             return Err(TrackError::Stamp(self.stamp));
@@ -317,7 +319,7 @@ impl<'a> Frame<'a> {
         self.check_scene()
     }
 
-    /// Refuses a floor or boxes that cannot be meant.
+    /// Rejects invalid ground planes and boxes.
     fn check_scene(&self) -> Result<(), TrackError> {
         if let Some(ground) = self.ground
             && (!ground.offset.is_finite() || !ground.normal.is_normalized())

@@ -1,10 +1,11 @@
-//! What was measured: the frame, what of it may be the body, and what its images say about places in space.
+//! Measurements: the frame, which of its points may be the body, and what its images show at positions in space.
 //!
-//! `frame` is what goes in (K06 IV-A). Step 1 of the method, the choice of points that may lie on the body (K06 IV-B.1), is
-//! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` asks the images about places in
-//! space, `segments` looks for a lost body, `window` for what is near the body, and `registration` brings that into the picture of
-//! another camera, with `far_edges` between surfaces, `chroma` tells colors, `masks` and `mask_regions` where skin's are, and
-//! `still` what stands. `sites` knows where named sites will be, and which measurements of them are believed.
+//! `frame` is the input (K06 IV-A). Step 1 of the method, the selection of points that may lie on the body (K06 IV-B.1), is
+//! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` queries the images by
+//! position. `segments` finds the foreground segments in which a lost body may be. `window` finds what is near the body, and
+//! `registration` transforms it into the image of another camera, with `far_edges` between surfaces. `chroma` compares colors,
+//! `masks` and `mask_regions` find skin, and `still` finds what is static. `sites` predicts named sites and gates their
+//! measurements.
 
 pub(crate) mod background;
 mod background_moved;

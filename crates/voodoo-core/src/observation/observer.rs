@@ -1,4 +1,4 @@
-//! Turns a frame into an observation of the tracked body: what is background, what may be the body, which images were segmented.
+//! Turns a frame into an observation of the tracked body: background, candidates for the body, and which images were segmented.
 
 use super::background::{Backgrounds, OTHERS};
 use super::candidates::{Candidates, body_box};
@@ -14,7 +14,7 @@ use crate::math::{Aabb, Pose, Vec3};
 pub(crate) struct Observation<'a> {
     /// The points that may be on the body.
     pub candidates: &'a Candidates,
-    /// The frame, and its depth images as witnesses.
+    /// The frame, and its depth images for queries by position.
     pub views: DepthViews<'a>,
 }
 
@@ -29,7 +29,7 @@ impl<'a> Observation<'a> {
         self.views.origin
     }
 
-    /// The floor in the working frame, where it is known.
+    /// The ground plane in the working frame, if it is known.
     pub(crate) fn floor(&self) -> Option<Ground> {
         self.frame().ground.map(|ground| ground.relative_to(self.origin()))
     }
@@ -40,7 +40,7 @@ impl<'a> Observation<'a> {
     }
 }
 
-/// Where the body is expected when a frame comes.
+/// Where the body is expected when a frame arrives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Expectation<'a> {
     /// The body.
@@ -49,24 +49,24 @@ pub(crate) struct Expectation<'a> {
     pub poses: &'a [Pose],
     /// The working frame's origin in the world.
     pub origin: Vec3,
-    /// No frame came before this one: the pose was set for it.
+    /// Whether this is the first frame after the pose was set.
     pub first: bool,
-    /// For how many frames the body has been searched; `None` while it is not.
+    /// Number of frames for which the body has been searched; `None` while it is not lost.
     pub searched: Option<usize>,
-    /// Pixels that are known to show it.
+    /// Pixels that are known to show the body.
     pub own: Own<'a>,
 }
 
-/// Pixels of one depth image that show the body: the number of the image in the frame, and their indices.
+/// Pixels of one depth image that show the body: the index of the image in the frame, and the indices of the pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Own<'a> {
-    /// Number of the image.
+    /// Index of the image.
     pub image: usize,
     /// Indices of pixels.
     pub pixels: &'a [usize],
 }
 
-/// Keeps what is learned of the scene, and the candidates of the current frame.
+/// Holds the learned scene, and the candidates of the current frame.
 #[derive(Debug, Default)]
 pub(crate) struct Observer {
     backgrounds: Backgrounds,
@@ -81,12 +81,12 @@ impl Observer {
         self.backgrounds.clear();
     }
 
-    /// Notes which images of a frame are segmented; nothing is learned.
+    /// Finds which images of a frame are segmented; the background is not updated.
     pub(crate) fn find_segmented(&mut self, frame: &Frame) {
         find_segmented(frame, &mut self.segmented);
     }
 
-    /// Step 1 (K06 IV-B.1): learns the background, and keeps the points in the enlarged box of the whole body.
+    /// Step 1 (K06 IV-B.1): updates the background, and keeps the points in the enlarged box of the whole body.
     pub(crate) fn observe(&mut self, frame: &Frame, expected: Expectation, config: &Config) {
         find_segmented(frame, &mut self.segmented);
         let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
@@ -96,7 +96,7 @@ impl Observer {
         self.gather(frame, expected.origin, &bounds, config);
     }
 
-    /// The same for one of several persons: the scene is known, and what others explain is theirs.
+    /// Step 1 for one of several persons: the scene is given, and pixels that other persons explain are left out.
     pub(crate) fn observe_owned(
         &mut self,
         frame: &Frame,
@@ -115,28 +115,28 @@ impl Observer {
         self.gather(frame, expected.origin, &bounds, config);
     }
 
-    /// Pixels that were taken for the scene may show the body; what was learned there, for `restore`.
+    /// Treats background pixels as possibly showing the body. Returns the depths learned there, for `restore`.
     pub(crate) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
         self.backgrounds.release(frame, own)
     }
 
-    /// They do not.
+    /// Undoes `release`.
     pub(crate) fn restore(&mut self, frame: &Frame, own: Own, learned: &[f32]) {
         self.backgrounds.restore(frame, own, learned);
     }
 
-    /// The candidates in another box.
+    /// Selects the candidates again in another box.
     pub(crate) fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, config: &Config) {
         self.candidates.gather(frame, origin, bounds, &self.backgrounds, config);
     }
 
-    /// What was observed of `frame`.
+    /// The observation of `frame`.
     pub(crate) fn observation<'a>(&'a self, frame: &'a Frame<'a>, origin: Vec3) -> Observation<'a> {
         let views = DepthViews { frame, backgrounds: &self.backgrounds, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 
-    /// Whether depth cameras that have been there gave no image this time: no sign that the body went.
+    /// Whether the frame has no depth image although earlier frames had: this is no evidence that the body left.
     pub(crate) fn silent(&self, frame: &Frame) -> bool {
         frame.images.is_empty() && !self.backgrounds.is_empty()
     }
@@ -153,7 +153,7 @@ mod tests {
     use crate::body::Model;
     use crate::testing::{before_wall, moved, put_board, standing, with_frame};
 
-    /// A lamp beside the head: in the body's box, and farther from the body than it may be off.
+    /// A lamp beside the head: inside the body's box, but farther from the body than the pose error allows.
     const LAMP: Vec3 = Vec3::new(0.34, -0.76, 2.6);
     const LAMP_SIZE: f64 = 0.06;
 
@@ -163,7 +163,7 @@ mod tests {
         pixels
     }
 
-    /// Shows a frame; how many candidates lie on the lamp, and how many do not.
+    /// Observes a frame; returns the number of candidates on the lamp, and of those elsewhere.
     fn feed(
         observer: &mut Observer,
         pixels: &[u16],
@@ -198,7 +198,7 @@ mod tests {
             assert_eq!(on_lamp, 0);
             assert!(others > 1000, "{others} points of the body");
         }
-        // A lamp that comes later may be a hand.
+        // A lamp that appears later may be a hand.
         let mut observer = Observer::default();
         feed(&mut observer, &alone, &model, &poses, FIRST);
         assert!(feed(&mut observer, &lamp, &model, &poses, LATER)[0] > 20);

@@ -1,25 +1,25 @@
-//! What of a frame is one person's where several are tracked.
+//! Which pixels and points of a frame belong to which person, where several are tracked.
 
 use super::background::Backgrounds;
 
-/// Mark of a pixel that no person's surface explains.
+/// Marks a pixel that no person's surface explains.
 pub(crate) const NO_OWNER: u16 = u16::MAX;
 
-/// A frame as one of several persons sees it.
+/// A frame from the perspective of one of several persons.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OwnershipMask<'a> {
-    /// Image after image, who explains each pixel: the number of a person, or [`NO_OWNER`].
+    /// The owner of each pixel, image after image: the index of a person, or [`NO_OWNER`].
     pub owners: &'a [Vec<u16>],
-    /// Cloud after cloud, the same of each point.
+    /// The owner of each point, cloud after cloud.
     pub cloud_owners: &'a [Vec<u16>],
-    /// The number of the person.
+    /// Index of this person.
     pub own: u16,
-    /// The still scene, as it was learned where nobody was.
+    /// The static scene, learned where no person was.
     pub scene: &'a Backgrounds,
 }
 
 impl<'a> OwnershipMask<'a> {
-    /// The owners of an image's pixels.
+    /// The owners of the pixels of an image.
     pub(crate) fn owners(&self, image: usize) -> &'a [u16] {
         self.owners.get(image).map_or(&[], Vec::as_slice)
     }

@@ -1,18 +1,18 @@
-//! Color and gray pictures.
+//! Color and grayscale images.
 
 use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{Pose, is_rigid};
 
-/// A picture is taken at most so long before or after its frame, seconds: beyond, nobody knows where the body was.
+/// Maximum time between an image and its frame, seconds: beyond it, the pose at the image's time is unknown.
 const LONGEST_ASIDE: f64 = 0.25;
 
-/// The pixels of a picture, row by row.
+/// The pixels of an image, row by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorPixels<'a> {
-    /// Three channels in any order that is always the same.
+    /// Three channels; any order, as long as it is always the same.
     Color(&'a [[u8; 3]]),
-    /// Brightness alone.
+    /// Grayscale.
     Gray(&'a [u8]),
 }
 
@@ -40,10 +40,11 @@ impl ColorPixels<'_> {
     }
 }
 
-/// A color or gray picture: its regions tell where limbs end (R07 section 3), and clothes tell persons apart.
+/// A color or grayscale image. Its regions locate the contours of limbs (R07 section 3), and colors of clothes distinguish
+/// persons.
 ///
-/// The contours of limbs are straight lines and ellipses in the picture of a pinhole alone: whoever fits regions takes the lens's
-/// distortion out of the picture before, and gives the pinhole camera that is left. Clothes may be seen through any lens.
+/// The contours of limbs are straight lines and ellipses only in the image of a pinhole camera. For fitting color regions,
+/// undistort the image first and pass the resulting pinhole camera. Colors of clothes work with any lens.
 #[derive(Clone, Copy, Debug)]
 pub struct ColorImage<'a> {
     /// All pixels of the camera.
@@ -52,16 +53,16 @@ pub struct ColorImage<'a> {
     pub camera: &'a Camera,
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
-    /// When it was taken, seconds.
+    /// Time of exposure, seconds.
     pub stamp: f64,
-    /// Number of the camera, the same in every frame.
+    /// Index of the camera, the same in every frame.
     pub number: u16,
-    /// Number of the source, for the report.
+    /// Index of the source, for the report.
     pub source: u16,
 }
 
 impl ColorImage<'_> {
-    /// Refuses what cannot be used: `index` is its number in a frame of this `stamp`, after `others`.
+    /// Returns an error for an unusable image; `index` is its index in a frame with this `stamp`, after `others`.
     pub(super) fn check(&self, index: usize, stamp: f64, others: &[Self]) -> Result<(), TrackError> {
         let wrong = |part: &str, expected, found: String| {
             Err(TrackError::measurement(format!("color[{index}].{part}"), expected, found))

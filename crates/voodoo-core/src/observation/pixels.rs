@@ -1,10 +1,10 @@
-//! The pixels of a depth image as points: which are used, and a stretch of a row at a time on SIMD lanes.
+//! Converts the pixels of a depth image to points: selects which are used, and processes part of a row at a time on SIMD lanes.
 
 use crate::math::Points;
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, DepthPixels};
 
-/// An axis-aligned box, half space and shift in single precision, as the per-point test wants them.
+/// An axis-aligned box, a half space and a shift in single precision, in the form that the per-point test needs.
 pub(super) struct PointGate {
     pub low: [f32; 3],
     pub high: [f32; 3],
@@ -20,10 +20,10 @@ impl PointGate {
     }
 }
 
-/// Rows or columns from one that is used to the next at most: no image has more.
+/// Maximum stride of rows or columns: no image has more.
 const MOST_APART: f64 = 65536.0;
 
-/// Which pixels of an image are used: every so manyth row, and in it every so manyth column.
+/// Which pixels of an image are used: rows at a stride, and columns at a stride in each row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
     pub rows: usize,
@@ -31,7 +31,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// About one pixel in `fraction`, as evenly as whole numbers allow.
+    /// Uses approximately one pixel in `fraction`, as evenly as integer strides allow.
     pub(super) fn new(fraction: f64) -> Self {
         let within = |apart: f64| if apart >= 1.0 { apart.min(MOST_APART) } else { 1.0 };
         let rows = within(fraction.sqrt().floor());
@@ -39,16 +39,16 @@ impl Grid {
         Self { rows: rows as usize, columns: columns as usize }
     }
 
-    /// First column of a row: where columns are wider than rows, those of one row stand between those of the next.
+    /// First column of a row. Where the column stride exceeds the row stride, used columns of consecutive rows are staggered.
     pub(super) fn offset(self, row: usize) -> usize {
         if self.columns == self.rows { 0 } else { row / self.rows * (self.columns / 2) % self.columns }
     }
 }
 
-/// Pixels of a row that are looked at together: a whole number of SIMD lanes.
+/// Pixels of a row that are processed together: a whole number of SIMD lanes.
 pub(super) const STRETCH: usize = 32;
 
-/// Visits every `stride`th value with its place in `to`; neighbors fill whole registers.
+/// Visits every `stride`th value together with its slot in `to`; neighbors fill whole registers.
 #[inline(always)]
 fn every<T>(from: &[T], stride: usize, to: &mut [f32], visit: impl Fn(&mut f32, &T)) {
     if stride == 1 {
@@ -96,13 +96,13 @@ impl Stretch {
         Self { x, y, z }
     }
 
-    /// Whether any pixel returned anything that is not the background.
+    /// Whether any pixel has a return that is not background.
     #[inline(always)]
     pub(super) fn returned(&self) -> bool {
         self.z.iter().fold(0, |any, z| any | u8::from(*z > 0.0)) != 0
     }
 
-    /// Appends the points that returned and lie inside the gate, in order.
+    /// Appends the points with a return inside the gate, in order.
     #[inline(always)]
     pub(super) fn gather(&self, m: &[[f32; 3]; 4], gate: &PointGate, points: &mut Points) {
         let mut p = [[0.0; STRETCH]; 3];
@@ -121,7 +121,7 @@ impl Stretch {
         }
         let mut kept = 0;
         for i in 0..STRETCH {
-            // `kept` is at most `i`; the mask only spares the bounds checks.
+            // `kept` is at most `i`; the mask only removes the bounds checks.
             let to = kept % STRETCH;
             (p[0][to], p[1][to], p[2][to]) = (p[0][i], p[1][i], p[2][i]);
             kept += usize::from(passes[i]);

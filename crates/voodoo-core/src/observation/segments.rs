@@ -1,4 +1,4 @@
-//! The foreground of a frame cut into segments: what hangs together and is not background may be a lost body.
+//! Cuts the foreground of a frame into connected segments: each may be a lost body.
 
 use crate::config::Config;
 use crate::math::Vec3;
@@ -6,25 +6,25 @@ use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::{DepthPixels, Frame};
 
-/// Samples taken of one source, about: a search runs while the body is lost, and must keep up with the frames.
+/// Approximate number of samples per source: a search runs while the body is lost, and must keep up with the frame rate.
 const SAMPLES_PER_SOURCE: usize = 5000;
-/// Edge of a cell of space, meters: samples in cells that touch hang together.
+/// Edge length of a cell, meters: samples in adjacent cells are connected.
 const CELL: f64 = 0.12;
-/// A cell with fewer surface patches than this holds stray returns: a surface fills some hundred.
+/// A cell with fewer surface patches than this holds stray returns: a surface fills several hundred.
 const LEAST_PATCHES: f32 = 15.0;
-/// Half of the cells along an axis that a key holds.
+/// Half of the number of cells per axis that a key can represent.
 const HALF_KEY: f64 = (1_u64 << 20) as f64;
 
-/// What hangs together; working frame, meters.
+/// A connected segment; working frame, meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Segment {
-    /// Mean of the samples.
+    /// Centroid of the samples.
     pub center: Vec3,
-    /// Corners of its box.
+    /// Minimum corner of the bounding box.
     pub low: Vec3,
-    /// The other corner.
+    /// Maximum corner of the bounding box.
     pub high: Vec3,
-    /// Surface seen, in patches.
+    /// Visible surface area, in patches.
     pub patches: f64,
 }
 
@@ -39,7 +39,7 @@ struct Sample {
 struct Cell {
     key: u64,
     samples: (u32, u32),
-    /// Another cell of its segment with a smaller index, or itself.
+    /// Union-find parent: another cell of the segment with a smaller index, or itself.
     parent: u32,
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Segments {
     samples: Vec<Sample>,
     cells: Vec<Cell>,
     found: Vec<Segment>,
-    /// The segment of every first cell.
+    /// The segment of every union-find root cell.
     of_cell: Vec<u32>,
 }
 
@@ -59,7 +59,7 @@ impl Segments {
         &self.found
     }
 
-    /// Looks through a whole frame. `origin` is the working frame's origin in the world.
+    /// Segments a whole frame. `origin` is the working frame's origin in the world.
     pub(crate) fn find(&mut self, frame: &Frame, origin: Vec3, backgrounds: &Backgrounds, config: &Config) {
         self.samples.clear();
         self.sample_images(frame, origin, backgrounds);
@@ -82,7 +82,7 @@ impl Segments {
             let height = |point: [f32; 3]| floor.height(Vec3::from_array(point.map(f64::from)));
             self.samples.retain(|sample| height(sample.point) >= config.ground_clearance);
         }
-        // Sorting without memory of its own keeps no order of equals, but sums must be the same on every run.
+        // An unstable sort needs no extra memory but does not keep the order of equal keys; sums must be the same in every run.
         self.samples.sort_unstable_by(|a, b| {
             let [first, second] = [a, b].map(|sample| sample.point.map(f64::from));
             a.key.cmp(&b.key).then_with(|| order(&first, &second))
@@ -142,7 +142,7 @@ impl Segments {
         }
     }
 
-    /// Joins every cell with those that touch it; half of them are enough, the others find this one.
+    /// Joins every cell with its adjacent ones. Testing half of the directions is enough: the other neighbors find this cell.
     fn join_cells(&mut self) {
         for index in 0..self.cells.len() {
             let key = self.cells[index].key;
@@ -157,7 +157,7 @@ impl Segments {
         }
     }
 
-    /// The first cell of a cell's segment; the way there becomes shorter.
+    /// The union-find root of a cell, with path compression.
     fn first(&mut self, mut cell: u32) -> u32 {
         loop {
             let parent = self.cells[cell as usize].parent;
@@ -195,7 +195,7 @@ impl Segments {
         for segment in &mut self.found {
             segment.center /= segment.patches;
         }
-        // No two segments share a center: the order is the same on every run.
+        // No two segments have the same centroid, so the order is the same in every run.
         let place = |segment: &Segment| segment.center.to_array();
         self.found.sort_unstable_by(|a, b| b.patches.total_cmp(&a.patches).then_with(|| order(&place(a), &place(b))));
     }
@@ -218,7 +218,7 @@ mod tests {
             (0..count).map(move |i| [at[0] + 0.01 * (i % 30) as f64, at[1] + 0.01 * (i / 30) as f64, at[2]])
         };
         let mut points: Vec<[f64; 3]> = patch([1.0, 0.0, 0.0], 600).chain(patch([3.0, 0.0, 0.0], 900)).collect();
-        // Single returns, half a meter apart, make no bridge between the two.
+        // Single returns, half a meter apart, do not connect the two.
         points.extend((0..40).map(|i| [0.5 * f64::from(i), 0.5, 1.0]));
         let mut found = Vec::new();
         for _ in 0..2 {
@@ -233,7 +233,7 @@ mod tests {
             let mut segments = Segments::default();
             segments.find(&frame, Vec3::ZERO, &Backgrounds::default(), &Config::default());
             found.push(segments.found().to_vec());
-            // Another order of the same points gives the same segments, bit by bit.
+            // A different order of the same points gives bitwise identical segments.
             points.reverse();
         }
         assert_eq!(found[0], found[1]);

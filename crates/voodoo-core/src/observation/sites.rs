@@ -1,29 +1,29 @@
-//! Named sites from frame to frame: which measurements of them are believed, and rays on which they were seen.
+//! Named sites from frame to frame: gating of their measurements, and the rays on which they were observed.
 
 use std::collections::BTreeMap;
 
 use crate::math::Vec3;
 
-/// Accepts measurements near predicted sites, and opens slowly while nothing is accepted.
+/// Accepts measurements near predicted sites. The gate widens slowly while no measurement is accepted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteGate {
-    /// Meters.
+    /// Initial radius, meters.
     pub radius: f64,
-    /// Of the radius while nothing is accepted, meters a second.
+    /// Growth of the radius while no measurement is accepted, meters per second.
     pub growth: f64,
-    /// It grows up to this, meters.
+    /// Maximum radius, meters.
     pub widest: f64,
-    /// Of each source and site when something was accepted last, or first looked for, seconds.
+    /// For each source and site, the time when a measurement was last accepted, or else first expected, seconds.
     last: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 impl SiteGate {
-    /// Nothing accepted yet.
+    /// Resets the gates: no measurement accepted yet.
     pub fn new(radius: f64, growth: f64, widest: f64) -> Self {
         Self { radius, growth, widest, last: BTreeMap::new() }
     }
 
-    /// Radius of a site's gate at a time, meters.
+    /// Radius of a site's gate at a given time, meters.
     pub fn limit(&mut self, site: &str, source: &str, stamp: f64) -> f64 {
         let known = self.last.get(source).and_then(|sites| sites.get(site)).copied();
         let waited = match known {
@@ -36,7 +36,7 @@ impl SiteGate {
         (self.radius + self.growth * waited).min(self.widest)
     }
 
-    /// Whether a measurement so far from the predicted site, meters, is near enough.
+    /// Whether a measurement at this distance from the predicted site is inside the gate.
     pub fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
         let near = distance <= self.limit(site, source, stamp);
         if near {
@@ -55,7 +55,7 @@ impl SiteGate {
     }
 }
 
-/// A site was seen on a ray.
+/// A named site that was observed along a ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteRay {
     /// Its name.
@@ -64,17 +64,17 @@ pub struct SiteRay {
     pub origin: Vec3,
     /// Unit vector in the world.
     pub direction: Vec3,
-    /// Standard deviation across the ray at the site, meters.
+    /// Standard deviation perpendicular to the ray at the site, meters.
     pub sigma: f64,
-    /// Name of what saw it.
+    /// Name of the source.
     pub source: String,
-    /// Factor of its weight, in [0, 1].
+    /// Factor of the weight, in [0, 1].
     pub trust: f64,
-    /// It may always be this far off, meters.
+    /// Bias, meters: the measurement may have a constant error of this size.
     pub bias: f64,
-    /// Where on the ray the site is, if a depth camera saw it, meters.
+    /// Distance of the site along the ray, if a depth camera measured it, meters.
     pub place: Option<Vec3>,
-    /// Standard deviation of that along the ray, meters.
+    /// Standard deviation of that distance, meters.
     pub place_sigma: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The color of somebody's clothes, above and below the waist.
+//! Color histograms of a person's clothes, above and below the waist.
 
 use crate::body::{Body, LimbRole};
 use crate::math::{Pose, Vec3};
@@ -6,27 +6,28 @@ use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::picture::ColorImage;
 use crate::visibility::surface::surface_rows;
 
-/// Where across a limb colors are taken, in shares of its radius from the middle: the rim may show what is behind.
+/// Positions across a limb at which colors are sampled, as fractions of its radius from the axis. The rim is left out because its
+/// pixels may show the background.
 const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
-/// A depth pixel shows the limb when it lies within this of where the limb's surface is, meters: clothes are thick.
+/// Tolerance between measured and expected depth of a limb's surface, meters: clothes are thick.
 const SURFACE_TOLERANCE: f64 = 0.08;
-/// Bins of brightness and of the two color differences.
+/// Number of bins of brightness and of the two color differences.
 const BINS: [usize; 3] = [5, 9, 9];
-/// Range of the color differences that the bins cover: clothes are seldom more colorful.
+/// Range of the color differences that the bins cover; clothes rarely exceed it.
 const COLORFUL: f32 = 80.0;
-/// A look at fewer places than this tells nothing.
+/// An observation with fewer samples than this is ignored.
 const FEWEST_PLACES: usize = 15;
-/// Share of a new look in what is remembered, at least.
+/// Least weight of a new observation in the running mean.
 const NEW_WEIGHT: f32 = 0.1;
 
-/// How often each color was seen; sums to one.
+/// Relative frequency of each color; the sum is one.
 #[derive(Clone, Debug, Default)]
 struct ClothesHistogram {
     frequencies: Vec<f32>,
     updates: f32,
 }
 
-/// What somebody wears, as far as it was seen.
+/// Color histograms of a person's clothes, as far as observed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clothes {
     worn: [ClothesHistogram; 2],
@@ -34,7 +35,8 @@ pub(super) struct Clothes {
 }
 
 impl Clothes {
-    /// Looks at a posed body, world frame; `own` says of a depth image's number and pixel whether it may be the body's.
+    /// Updates with the colors of a posed body (world frame). `own` returns for the number of a depth image and a pixel whether
+    /// the pixel may show this body.
     pub(super) fn observe(&mut self, frame: &Frame, body: &Body, poses: &[Pose], own: impl Fn(usize, usize) -> bool) {
         let Self { worn, counts } = self;
         for (half, histogram) in worn.iter_mut().enumerate() {
@@ -65,7 +67,8 @@ impl Clothes {
         }
     }
 
-    /// How unlike two persons' clothes are, from 0 to 1, the mean of what was seen of both; none when nothing was.
+    /// Returns the distance between two persons' clothes, from 0 to 1: the mean over the halves of the body that were observed of
+    /// both. `None` if there is none.
     pub(super) fn distance(&self, other: &Self) -> Option<f64> {
         let pairs = self.worn.iter().zip(&other.worn).filter(|(a, b)| a.updates > 0.0 && b.updates > 0.0);
         let (mut sum, mut count) = (0.0, 0.0);
@@ -78,7 +81,7 @@ impl Clothes {
     }
 }
 
-/// Whether a limb shows what is worn above the waist (0) or below it (1).
+/// Returns whether a limb shows clothes above the waist (0) or below it (1).
 fn half_of(limb: LimbRole) -> Option<usize> {
     match limb {
         LimbRole::Thorax | LimbRole::UpperArm(_) => Some(0),
@@ -98,23 +101,23 @@ impl ClothesHistogram {
     }
 }
 
-/// The point that a depth image shows where a limb's surface is expected, camera frame.
+/// Returns the measured point of a limb's surface whose expected position is `place`, camera frame.
 fn surface(image: &DepthImage, place: Vec3, own: impl Fn(usize) -> bool) -> Option<Vec3> {
     let pixel = image.camera.index_of(place)?;
     let z = f64::from(image.pixels.get(pixel)) * image.meters_per_unit;
     ((z - place.z).abs() < SURFACE_TOLERANCE && own(pixel)).then(|| place * (z / place.z))
 }
 
-/// The color of a place of the world in a picture.
+/// Returns a picture's color at a world position.
 fn color_at(picture: &ColorImage, world: Vec3) -> Option<[u8; 3]> {
     let place = picture.world_from_sensor.inverse_transform_point(world);
     Some(picture.pixels.get(picture.camera.index_of(place)?))
 }
 
-/// Counts a color in the bins about it, by how near it is to their middles.
+/// Adds a color to the nearest bins, with trilinear weights.
 fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
     let [x, y, z] = [first, green, last].map(f32::from);
-    // Brightness and color differences; which end is red does not matter as long as it is always the same.
+    // Brightness and color differences. The order of red and blue does not matter as long as it is always the same.
     let brightness = 0.2 * x + 0.6 * y + 0.2 * z;
     let place = |value: f32, bins: usize| (value * (bins - 1) as f32).clamp(0.0, (bins - 1) as f32);
     let difference = |value: f32| (value - brightness) / (2.0 * COLORFUL) + 0.5;
@@ -123,9 +126,9 @@ fn add(counts: &mut [f32], [first, green, last]: [u8; 3]) {
         let (mut index, mut weight) = (0, 1.0);
         for axis in 0..3 {
             let low = at[axis].floor().min((BINS[axis] - 2) as f32);
-            let prune_tracks = at[axis] - low;
+            let fraction = at[axis] - low;
             let high = (corner >> axis) & 1;
-            weight *= if high == 1 { prune_tracks } else { 1.0 - prune_tracks };
+            weight *= if high == 1 { fraction } else { 1.0 - fraction };
             index = index * BINS[axis] + low as usize + high;
         }
         counts[index] += weight;

@@ -1,7 +1,8 @@
-//! Several persons at once, each with a number that lasts: one tracker each, which share every frame between them.
+//! Tracks several persons at once. Each has a persistent number and a tracker of its own, and every frame is divided among the
+//! trackers.
 //!
-//! A pixel belongs to the person whose surface explains it; what nobody explains may be somebody new. Who comes back gets their
-//! number back, where size, place and time agree.
+//! A pixel is assigned to the person whose surface explains it. Pixels that no person explains may show a new person. A person
+//! who returns gets the same number again if size, position and time agree.
 
 mod assign;
 mod clothes;
@@ -30,14 +31,14 @@ use rayon::prelude::*;
 use scene_model::SceneModel;
 use tentative_tracks::{TentativeTrack, TentativeTracks};
 
-/// The detector looks at what nobody explains this often at most, seconds.
+/// Shortest time between two detections in pixels that no person explains, seconds.
 const DETECT_EVERY: f64 = 0.06;
-/// Two bodies whose roots are nearer than this are one, meters.
+/// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.3;
-/// Who was there for less than this is not remembered, seconds.
+/// A track that lasted for less than this is not remembered, seconds.
 const KNOWN_AFTER: f64 = 1.0;
 
-/// Follows several persons through frames.
+/// Tracks several persons through a sequence of frames.
 #[derive(Debug)]
 pub struct People {
     prototype: Body,
@@ -55,7 +56,7 @@ pub struct People {
 }
 
 impl People {
-    /// Everybody who comes gets a copy of `prototype`.
+    /// Returns a tracker of no persons. Every new person gets a copy of `prototype`.
     pub fn new(prototype: Body, config: Config, options: PeopleOptions) -> Result<Self, TrackError> {
         let threads = match config.threads {
             1 => None,
@@ -79,43 +80,43 @@ impl People {
         })
     }
 
-    /// The same with a detector, of which every person's tracker gets one of its own. Without one, nobody is found: who is to be
-    /// followed is [`Self::add`]ed.
+    /// Returns the tracker with a detector; every person's tracker gets one of its own. Without a detector no person is found,
+    /// and each person to be tracked has to be added by [`Self::add`].
     pub fn with_detector(mut self, detector: Box<dyn Detect>) -> Self {
         self.detector.set(Some(detector), &self.prototype);
         self
     }
 
-    /// Why a detector could not look in the last step, if one could not: that of all, else that of a person.
+    /// The error of a detector in the last step, if one failed: that of the shared detector, else that of a person's.
     pub fn detector_error(&self) -> Option<&DetectError> {
         self.detector.error().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
     }
 
-    /// What everybody's body starts from.
+    /// Returns the body that every new person starts from.
     pub fn prototype(&self) -> &Body {
         &self.prototype
     }
 
-    /// Those who are there: their number and their tracker, in the order in which they came.
+    /// Returns number and tracker of every present person, in the order in which they were created.
     pub fn present(&self) -> impl Iterator<Item = (usize, &Tracker)> {
         self.persons.iter().filter(|person| person.present).map(|person| (person.id, &person.tracker))
     }
 
-    /// Whether color pictures would tell something in the next frame: of somebody whose clothes were not looked at for a while,
-    /// or of somebody who may come back.
+    /// Whether the next frame needs color pictures: a person's clothes have not been updated for a while, or an absent person may
+    /// return.
     pub fn needs_colors(&self) -> bool {
         let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
         self.persons.iter().any(|person| !person.is_tracked() || person.are_clothes_due(stamp))
     }
 
-    /// Follows these numbers and nobody else from now on; with `None` everybody.
+    /// Tracks only persons with these numbers from now on; with `None` all persons.
     pub fn restrict_to(&mut self, ids: Option<Vec<usize>>) {
         self.options.only = ids;
         self.prune_tracks();
     }
 
-    /// Somebody is where these positions of named sites say (index of the site, world position): who was lost or away and can have
-    /// come there, or somebody new; their number. On error nobody came.
+    /// Adds a person at positions of named sites (index of the site, world position), and returns their number: that of a lost or
+    /// absent person who may have moved there, or the number of a new one. On error no person is added.
     pub fn add(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<usize, TrackError> {
         let stamp = self.stamp.unwrap_or(f64::NEG_INFINITY);
         let mut person = self.nobody_yet(stamp)?;
@@ -134,13 +135,14 @@ impl People {
         Ok(self.next_id - 1)
     }
 
-    /// Somebody who is not there yet, with the next number.
+    /// Returns a person with the next number, who is not present yet.
     fn nobody_yet(&self, stamp: f64) -> Result<Person, TrackError> {
         let (body, config) = (self.prototype.clone(), self.config.clone());
         Person::new(self.next_id, body, config, self.detector.fresh(), stamp)
     }
 
-    /// The next instant; `own` has the frames of those of whom more was measured than of others. On error everything is as before.
+    /// Updates all persons with the next frame. `own` has the frames of those persons who have measurements that the others lack.
+    /// On error nothing changes.
     pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
         frame.check(&self.prototype, self.stamp)?;
         own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
@@ -156,12 +158,12 @@ impl People {
         Ok(())
     }
 
-    /// Gives every pixel and free point to whose surface explains it.
+    /// Assigns every pixel and free point to the person whose surface explains it.
     fn assign_pixels(&mut self, frame: &Frame) {
         for person in self.persons.iter_mut().filter(|person| person.present) {
             person.tracker.predict(frame.stamp, &mut person.expected);
         }
-        // Who is lost explains nothing.
+        // Lost persons own no pixels.
         let predicted = (0..)
             .zip(&self.persons)
             .filter(|(_, person)| person.is_tracked())
@@ -169,7 +171,7 @@ impl People {
         self.assignment.assign(frame, self.scene.known(), predicted);
     }
 
-    /// Every tracker by its share.
+    /// Steps every tracker with its own pixels and points.
     fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         let (assignment, scene) = (&self.assignment, self.scene.known());
         let work = |(number, person): (usize, &mut Person)| {
@@ -181,13 +183,14 @@ impl People {
             }
         };
         match &self.threads {
-            // Every person is worked on by one thread: the result does not depend on their number.
+            // Each person is processed by a single thread, so the result does not depend on the number of threads.
             Some(pool) => pool.install(|| self.persons.par_iter_mut().enumerate().for_each(work)),
             None => self.persons.iter_mut().enumerate().for_each(work),
         }
     }
 
-    /// Of two on one body the one that explains less of it goes, or the younger; who leaves the region goes, and who is not wanted.
+    /// Prunes tracks: duplicates (the one that explains fewer pixels, or the newer), and tracks outside the region or not
+    /// requested.
     fn prune_tracks(&mut self) {
         for younger in 0..self.persons.len() {
             let place = self.persons[younger].place;
@@ -203,7 +206,7 @@ impl People {
         }
     }
 
-    /// Looks for somebody at what nobody explains.
+    /// Searches for new persons in pixels that no person explains.
     fn detect_new(&mut self, frame: &Frame) {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
@@ -230,7 +233,7 @@ impl People {
                 ground: frame.ground,
                 excluded: frame.excluded,
                 owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
-                // Somebody may have stood there from the start.
+                // A person may have stood there since the camera started, so only an old background is excluded.
                 background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
                 ..Surroundings::default()
             };
@@ -245,21 +248,21 @@ impl People {
         }
     }
 
-    /// Whether somebody where a person is seen is to be followed.
+    /// Whether a person detected at a position is to be tracked.
     fn is_requested(&self, frame: &Frame, place: Vec3) -> bool {
         let others = self.tracked_except(None);
         self.options.allows(place) && self.options.room(frame, place, &others).is_some()
     }
 
-    /// Numbers and places of those who are seen.
+    /// Returns indices and positions of all tracked persons, except one.
     fn tracked_except(&self, one: Option<usize>) -> Vec<(usize, Vec3)> {
         let others =
             (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked() && Some(*number) != one);
         others.map(|number| (number, self.persons[number].place)).collect()
     }
 
-    /// Those who are believed to be persons get a tracker: their own when they are somebody who was there. Who they are is asked
-    /// together with all others who are seen.
+    /// Associates confirmed tentative tracks with absent persons by a linear assignment; spawns new tracks for the others. The
+    /// assignment includes all other tentative tracks of this frame.
     fn associate(&mut self, frame: &Frame, confirmed: &[TentativeTrack]) {
         let absent: Vec<usize> = (0..self.persons.len()).filter(|number| self.may_match(*number, confirmed)).collect();
         if !absent.is_empty() {
@@ -286,14 +289,14 @@ impl People {
                 self.persons[leaves].present = false;
             }
             if came && self.options.limit.is_some_and(|limit| self.present().count() > limit) {
-                // Somebody else takes the place of who is hidden.
+                // With the limit exceeded, the new person replaces those who are hidden.
                 self.persons.iter_mut().for_each(|person| person.present &= person.is_tracked());
             }
         }
     }
 
-    /// Whether one of the strangers may be this person: who is away, and who follows less than what such a stranger shows beside
-    /// them.
+    /// Whether this person may match one of the tentative tracks: an absent or lost person, and one who explains fewer pixels
+    /// than a tentative track near them.
     fn may_match(&self, number: usize, candidates: &[TentativeTrack]) -> bool {
         let person = &self.persons[number];
         let beside = |track: &&TentativeTrack| track.place.distance(person.place) < SAME_PERSON;
@@ -301,12 +304,12 @@ impl People {
         !person.is_tracked() || visible.is_some_and(|visible| self.assignment.count(number) < visible)
     }
 
-    /// What the detector reported of a stranger.
+    /// Returns the detection of a tentative track.
     fn detected<'a>(&'a self, track: &'a TentativeTrack) -> Detected<'a> {
         Detected { detection: &track.detection, map: self.detector.map() }
     }
 
-    /// What a stranger wears.
+    /// Returns the colors of a tentative track's clothes.
     fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
         if let Some((body, poses)) = fit_body(&Model::new(self.prototype.clone()), self.detected(track)) {
@@ -316,7 +319,7 @@ impl People {
         clothes
     }
 
-    /// Somebody new, if they are there.
+    /// Spawns a new person at a tentative track. Returns whether the person is there.
     fn spawn(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
         let full = self.persons.len() >= usize::from(NO_OWNER);
         if full || !self.options.includes(self.next_id) {
@@ -333,7 +336,7 @@ impl People {
         came
     }
 
-    /// Starts a person's tracker where a stranger is seen; whether they are there.
+    /// Starts a person's tracker at a tentative track. Returns whether the person is there.
     fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize) -> bool {
         self.scene.release(frame, track.image, &track.detection.pixels);
         let person = &mut self.persons[number];
@@ -349,14 +352,14 @@ impl People {
             person.update_stature(detected);
         }
         person.update(frame, ownership);
-        // Who was lost may have been found by their own tracker in this very frame.
+        // A lost person's own tracker may have found them in the same frame.
         let place = person.place;
         let twice = self.tracked_except(Some(number)).iter().any(|(_, other)| other.distance(place) < ONE_BODY);
         self.persons[number].present &= !twice;
         came && !twice
     }
 
-    /// Forgets who has been away for too long, and who was there for a moment only.
+    /// Deletes persons who have been absent for too long, and absent ones whose track was short.
     fn delete_expired(&mut self, stamp: f64) {
         let forget_after = self.options.forget_after;
         self.persons.retain(|person| {
@@ -367,23 +370,23 @@ impl People {
     }
 }
 
-/// Cost of somebody new.
+/// Cost of a new person in the assignment, nats.
 const NEW: f64 = 4.0;
-/// How far a person comes at once and in a second, meters.
+/// Distance that a person may move, meters: at once, and in addition per second.
 const COMES: [f64; 2] = [0.4, 1.2];
-/// How unlike the clothes of one person are who is seen twice, and the spread of that.
+/// Mean and standard deviation of the clothes distance between two views of one person.
 const CLOTHES: [f64; 2] = [0.10, 0.07];
-/// What like clothes speak for a person.
+/// Evidence of equal clothes for the same person, nats.
 const LIKE_CLOTHES: f64 = 3.0;
 
-/// What speaks against a person's having come to a place.
+/// Returns the cost of a person's having moved to a position, nats.
 fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
     let reach = COMES[0] + COMES[1] * (stamp - person.last_tracked);
     let far = person.place.distance(place) / reach;
     if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
 }
 
-/// What speaks against a stranger's being this person; `size`: of which their sizes do.
+/// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.
 fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
     let far = distance_cost(person, track.place, stamp);
     let distance = person.clothes.distance(clothes);

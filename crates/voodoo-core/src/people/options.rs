@@ -1,24 +1,25 @@
-//! Who is followed: how many, where, and who of them.
+//! Options for the persons that are tracked: how many, where, and which numbers.
 
 use crate::math::{Aabb, Vec3};
 use crate::observation::frame::Frame;
 
-/// Somebody takes the place of another when they are nearer to a camera by this, meters: two at one distance do not take turns.
+/// A person replaces a tracked one only if they are nearer to a camera by this, meters. The margin keeps two persons at similar
+/// distances from replacing each other in turn.
 const CLEARLY_NEARER: f64 = 0.3;
 
-/// Who is looked for. [`PeopleOptions::default`] is everybody everywhere.
+/// Which persons are tracked. [`PeopleOptions::default`] allows any number of persons everywhere.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PeopleOptions {
-    /// Persons that are followed at the same time, at most; none: any number.
+    /// Largest number of persons tracked at the same time; `None`: any number.
     pub limit: Option<usize>,
-    /// Of more than that the nearest to a camera are followed; else those who came first.
+    /// With more persons than `limit`, track those nearest to a camera; otherwise those who came first.
     pub nearest: bool,
-    /// Who is away for longer is somebody new when they come back, seconds.
+    /// A person who returns after being absent for longer than this gets a new number, seconds.
     pub forget_after: f64,
-    /// Where persons are, world frame; none: everywhere.
+    /// Region in which persons are tracked, world frame; `None`: everywhere.
     pub region: Option<Aabb>,
-    /// Numbers of those who are followed, and nobody else; none: everybody.
+    /// Numbers of the only persons that are tracked; `None`: all persons.
     pub only: Option<Vec<usize>>,
 }
 
@@ -29,17 +30,18 @@ impl Default for PeopleOptions {
 }
 
 impl PeopleOptions {
-    /// Whether persons are followed at a place.
+    /// Whether persons are tracked at a position.
     pub(super) fn allows(&self, place: Vec3) -> bool {
         self.region.is_none_or(|region| region.contains(place))
     }
 
-    /// Whether somebody of this number is followed.
+    /// Whether the person with this number is tracked.
     pub(super) fn includes(&self, id: usize) -> bool {
         self.only.as_ref().is_none_or(|only| only.contains(&id))
     }
 
-    /// Whether there is room for somebody at a place beside those at `others`; who has to go for that.
+    /// Returns `None` if the limit leaves no room for a person at `place` in addition to `others`; otherwise the number of the
+    /// person to be replaced, if one has to be.
     pub(super) fn room(&self, frame: &Frame, place: Vec3, others: &[(usize, Vec3)]) -> Option<Option<usize>> {
         if self.limit.is_none_or(|limit| others.len() < limit) {
             return Some(None);

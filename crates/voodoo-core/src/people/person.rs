@@ -1,4 +1,4 @@
-//! One of several persons: their tracker, and what is remembered of them while they are away.
+//! One of several persons: their tracker, and what is stored while they are absent.
 
 use super::clothes::Clothes;
 use crate::config::Config;
@@ -10,34 +10,34 @@ use crate::observation::ownership::OwnershipMask;
 use crate::tracker::estimate::Status;
 use crate::{Body, Tracker};
 
-/// A lost person of whom nothing hides the place is gone after this, seconds.
+/// A lost person whose position is in view and not hidden becomes absent after this, seconds.
 const LEAVES: f64 = 0.3;
-/// Who is mostly outside of all images is gone after this, seconds.
+/// A lost person who is mostly outside of all images becomes absent after this, seconds.
 const OUTSIDE: f64 = 0.1;
-/// Who is hidden is waited for so long, seconds.
+/// A lost person who is hidden becomes absent after this, seconds.
 const HIDDEN: f64 = 2.0;
-/// Clothes are looked at this often at most, seconds.
+/// Shortest time between two updates of the clothes, seconds.
 const CLOTHES_EVERY: f64 = 0.3;
-/// What is measured so much nearer than a place hides it, and so much farther shows that it is free, meters.
+/// A measurement nearer than a position by this occludes it, meters.
 const HIDES: f64 = 0.08;
 
-/// A person, there or away.
+/// A person, present or absent.
 #[derive(Debug)]
 pub(super) struct Person {
     pub(super) id: usize,
     pub(super) tracker: Tracker,
     pub(super) present: bool,
-    /// When they came the first time, and were last seen, seconds.
+    /// Stamps of the first and of the last tracked frame, seconds.
     pub(super) created: f64,
     pub(super) last_tracked: f64,
-    /// Root where last seen, world frame.
+    /// Last tracked position of the root, world frame.
     pub(super) place: Vec3,
-    /// Natural logarithm of their stature as the detector told it and its variance, the mean of all looks by what each is worth.
+    /// Natural logarithm of the detected stature and its variance: the mean of all detections, weighted by their variances.
     stature: Option<[f64; 2]>,
-    /// What they wear.
+    /// Colors of their clothes.
     pub(super) clothes: Clothes,
     last_clothes: f64,
-    /// Poses expected in this frame, world frame.
+    /// Poses predicted for this frame, world frame.
     pub(super) expected: Vec<Pose>,
 }
 
@@ -65,17 +65,18 @@ impl Person {
         })
     }
 
-    /// Whether their clothes were not looked at for a while.
+    /// Whether the clothes have not been updated for a while.
     pub(super) fn are_clothes_due(&self, stamp: f64) -> bool {
         stamp - self.last_clothes >= CLOTHES_EVERY
     }
 
-    /// There, and not lost.
+    /// Whether the person is present and not lost.
     pub(super) fn is_tracked(&self) -> bool {
         self.present && !matches!(self.tracker.estimate().status, Status::Lost | Status::Searching)
     }
 
-    /// Takes the stature of a look in. What one look has wrong the next one has, too: the best says how sure all are.
+    /// Updates the stature with a detection. The errors of successive detections are correlated, so the variance of the mean is
+    /// that of the best single detection.
     pub(super) fn update_stature(&mut self, detected: Detected) {
         let Some([log_stature, variance]) = stature(detected) else { return };
         self.stature = Some(self.stature.map_or([log_stature, variance], |[known, before]| {
@@ -84,19 +85,19 @@ impl Person {
         }));
     }
 
-    /// What a detected person's stature speaks against being this one, nats.
+    /// Returns the cost of the detected stature for this person, nats.
     pub(super) fn stature_cost(&self, detected: Detected) -> f64 {
         let both = self.stature.zip(stature(detected));
         both.map_or(0.0, |([own, a], [other, b])| 0.5 * (other - own).powi(2) / (a + b))
     }
 
-    /// Notes how they came out of a frame; they are away when they are lost for too long.
+    /// Updates the person after the tracker's step. A person who has been lost for too long becomes absent.
     pub(super) fn update(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let estimate = self.tracker.estimate();
         if self.is_tracked() {
             self.last_tracked = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
-            // Looked at together, all need one picture.
+            // Half the interval makes the updates of all persons coincide, so that they need a single picture.
             if frame.stamp - self.last_clothes >= 0.5 * CLOTHES_EVERY && !frame.colors.is_empty() {
                 self.last_clothes = frame.stamp;
                 if estimate.status == Status::Tracking {
@@ -114,10 +115,10 @@ impl Person {
         self.present &= estimate.status != Status::Searching && frame.stamp - self.last_tracked < patience;
     }
 
-    /// What the images show of most of where they are thought to be.
+    /// Returns whether most sites of the lost person are hidden, outside of the images, or neither.
     fn presence(&self, frame: &Frame, ownership: OwnershipMask) -> Presence {
         if frame.images.is_empty() {
-            // Depth cameras that gave no image this time are no sign that anybody went.
+            // A frame without depth images from known cameras is no evidence that a person left.
             return if ownership.scene.is_empty() { Presence::Gone } else { Presence::Hidden };
         }
         let sites = &self.tracker.estimate().sites;
@@ -135,13 +136,13 @@ impl Person {
     }
 }
 
-/// Natural logarithm of a detected person's stature, and its variance; all sizes follow it.
+/// Returns the natural logarithm of a detected person's stature, and its variance. All sizes scale with the stature.
 fn stature(detected: Detected) -> Option<[f64; 2]> {
     let [length, sigma] = detected.length(detected.map.stature()?)?;
     Some([length.ln(), sigma * sigma])
 }
 
-/// Where somebody is who is not seen.
+/// Why a person is not observed.
 #[derive(Clone, Copy, Debug)]
 enum Presence {
     Hidden,

@@ -1,4 +1,4 @@
-//! Whose surface explains each pixel and each free point of a frame.
+//! Assigns each pixel and each free point of a frame to the person whose surface explains it.
 
 use crate::body::Body;
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
@@ -7,15 +7,15 @@ use crate::observation::candidates::{body_box, image_window};
 use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
 use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
-/// A surface explains what lies within this of where it is expected, meters: as far as candidates are looked for.
+/// Distance from its expected position within which a surface explains a measurement, meters: the reach of the candidate search.
 const REACH: f32 = 0.20;
 
-/// Neighbors in a row stand for one another so that a row has at most about this many.
+/// Limit for the number of sampled pixels in a row: neighboring pixels on one surface are merged.
 const COLUMNS: usize = 106;
-/// On one surface depths of neighbors differ by less, meters.
+/// Depths of neighboring pixels on one surface differ by less than this, meters.
 const LIKE_DEPTH: f32 = 0.05;
 
-/// A body where it is expected.
+/// A body at its predicted poses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PredictedBody<'a> {
     pub(super) number: u16,
@@ -24,40 +24,40 @@ pub(super) struct PredictedBody<'a> {
     pub(super) poses: &'a [Pose],
 }
 
-/// The owners of all pixels and points, and working memory.
+/// The owners of all pixels and free points, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct PixelAssignment {
     owners: Vec<Vec<u16>>,
     cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
-    /// Of every pixel of an image its depth, meters, and whether something returned that is no scene.
+    /// For every pixel of an image its depth, meters, and whether it has a return that is not background.
     depth: Vec<f32>,
     open: Vec<bool>,
     queries: Points,
-    /// The first pixel that each query stands for, and how many.
+    /// For each query its first pixel, and the number of pixels that it represents.
     pixels: Vec<(u32, u32)>,
     nearest: Vec<f32>,
     limb: Vec<f32>,
 }
 
 impl PixelAssignment {
-    /// Image after image, the number of who explains each pixel.
+    /// Returns the owner of each pixel, image after image.
     pub(super) fn owners(&self) -> &[Vec<u16>] {
         &self.owners
     }
 
-    /// The share of a person in the frame.
+    /// Returns the ownership mask of a person for this frame.
     pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
         OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own: number as u16, scene }
     }
 
-    /// How many pixels and free points somebody explains.
+    /// Returns the number of pixels and free points that a person explains.
     pub(super) fn count(&self, number: usize) -> usize {
         let owners = self.owners.iter().chain(&self.cloud_owners).flatten();
         owners.filter(|owner| usize::from(**owner) == number).count()
     }
 
-    /// Gives every pixel that is no scene, and every free point, to the body whose surface is nearest, within reach.
+    /// Assigns every foreground pixel and every free point to the body with the nearest surface, within reach.
     pub(super) fn assign<'a>(
         &mut self,
         frame: &Frame,
@@ -95,7 +95,7 @@ impl PixelAssignment {
         }
     }
 
-    /// Owners of so many pixels or points who are nobody yet, in the memory of earlier ones.
+    /// Returns `count` owners, none assigned yet, in the buffer of the previous frame.
     fn unassigned(&mut self, number: usize, count: usize, of: impl Fn(&mut Self) -> &mut Vec<Vec<u16>>) -> Vec<u16> {
         self.distances.clear();
         self.distances.resize(count, REACH);
@@ -105,7 +105,7 @@ impl PixelAssignment {
         owners
     }
 
-    /// Gives a body what was gathered about `origin` and no other body is nearer to.
+    /// Assigns to a body the gathered points, relative to `origin`, that no other body is nearer to.
     fn assign_nearest(&mut self, number: u16, body: &Body, poses: &[Pose], origin: Vec3, owners: &mut [u16]) {
         let Self { distances, queries, pixels, nearest, limb, .. } = self;
         nearest.clear();
@@ -124,7 +124,7 @@ impl PixelAssignment {
         }
     }
 
-    /// The points within a box of the world, about `origin`.
+    /// Gathers the points of a cloud within a box of the world, relative to `origin`.
     fn gather_cloud(&mut self, cloud: &Cloud, origin: Vec3, bounds: &Aabb) {
         self.queries.clear();
         self.pixels.clear();
@@ -137,7 +137,8 @@ impl PixelAssignment {
         }
     }
 
-    /// Of all pixels of an image the depth, meters, and of those that are no scene whether something returned; what all bodies ask.
+    /// Computes the depth of every pixel of an image, meters, and whether the pixel has a return that is not background. Both are
+    /// used for all bodies.
     fn measure(&mut self, image: &DepthImage, background: &[f32]) {
         let Self { depth, open, .. } = self;
         let scale = image.meters_per_unit as f32;
@@ -153,8 +154,8 @@ impl PixelAssignment {
         }
     }
 
-    /// The returns within a box of the world that are no scene, about `origin`: of neighbors on one surface the first stands for
-    /// all.
+    /// Gathers the foreground returns within a box of the world, relative to `origin`. Of neighboring pixels on one surface the
+    /// first represents all.
     fn gather(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb) {
         let [columns, rows] = image_window(image, &image.world_from_sensor, bounds);
         let together = (image.camera.width() / COLUMNS).max(1);

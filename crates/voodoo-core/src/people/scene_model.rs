@@ -1,24 +1,25 @@
-//! The still scene that all persons stand in, learned where nobody is.
+//! Model of the static scene shared by all persons, learned in pixels that no person owns.
 
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::ownership::NO_OWNER;
 
-/// One row of this many is learned in a frame, for speed: the scene stands still.
+/// One row in this many is learned per frame, for speed; the scene is static.
 const LEARNED_ROWS: usize = 8;
-/// A deeper return by more than this replaces what was learned, and a nearer one by less is taken in, meters.
+/// Depth step, meters: a return deeper by more than this replaces the learned depth; other returns not nearer by this are
+/// averaged into it.
 const DEPTH_STEP: f32 = 0.15;
-/// Share of a new return in what was learned.
+/// Weight of a new return in the learned depth.
 const NEW_DEPTH: f32 = 0.1;
-/// Where nothing was known, or something deeper, a return is the scene when it was there in so many looks in a row: a person who
-/// was not found yet stands still for less.
+/// Number of consecutive observations after which a return becomes part of the scene, where no depth was known and where a deeper
+/// one was. The second number is large so that a standing person who has not been detected yet is not learned.
 const STILL_FRAMES: [u8; 2] = [4, 60];
-/// What a camera has seen for longer than this was looked at for persons, seconds.
+/// Time after which a camera's background has been searched for persons, seconds.
 const OLD: f64 = 3.0;
-/// Looks are alike within this, meters.
+/// Largest difference between equal depths, meters.
 const SAME: f32 = 0.05;
 
-/// What is known of the scene, and what may become so.
+/// The learned depth of the scene, and pending depths that may become part of it.
 #[derive(Debug, Default)]
 pub(super) struct SceneModel {
     known: Backgrounds,
@@ -26,24 +27,24 @@ pub(super) struct SceneModel {
     row: usize,
 }
 
-/// What was seen lately where the scene is not known, pixel by pixel, and in how many looks in a row.
+/// Recent depth of each pixel where the scene is not known, and the number of consecutive observations.
 #[derive(Debug, Default)]
 struct PendingDepth {
     depth: Vec<f32>,
     frames: Vec<u8>,
-    /// Since when the camera has been there, seconds; none in the first frame.
+    /// Stamp since which the camera has been at its position, seconds; `None` in the first frame.
     since: Option<f64>,
-    /// What it showed in the second frame was learned.
+    /// Whether the whole image of the second frame was learned.
     filled: bool,
 }
 
 impl SceneModel {
-    /// What is known.
+    /// Returns the learned scene.
     pub(super) fn known(&self) -> &Backgrounds {
         &self.known
     }
 
-    /// Takes up the images of a frame whose cameras were not there before: nothing is known of them, unless they came from near by.
+    /// Registers the images of a frame. For a new camera, or one that moved far, the scene is unknown.
     pub(super) fn register(&mut self, frame: &Frame) {
         self.images.resize_with(frame.images.len(), PendingDepth::default);
         for (image, tentative) in frame.images.iter().zip(&mut self.images) {
@@ -58,12 +59,12 @@ impl SceneModel {
         });
     }
 
-    /// Whether the camera of an image has been where it is for long enough: what stood there was looked at.
+    /// Whether the camera of an image has been at its position for long enough that its view was searched for persons.
     pub(super) fn is_old(&self, image: usize, stamp: f64) -> bool {
         self.images.get(image).and_then(|image| image.since).is_some_and(|since| stamp - since > OLD)
     }
 
-    /// Learns some rows where nobody is; all of them where the camera has stood still for the first time.
+    /// Learns some rows in pixels that no person owns; the whole image in the second frame of a camera at its position.
     pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
         self.row = (self.row + 1) % LEARNED_ROWS;
         for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
@@ -87,7 +88,7 @@ impl SceneModel {
         }
     }
 
-    /// Whether most of these pixels of an image show what is known to be still.
+    /// Whether most of these pixels of an image show the learned scene.
     pub(super) fn is_still(&self, frame: &Frame, image: usize, pixels: &[usize]) -> bool {
         let Some((image, known)) = frame.images.get(image).and_then(|image| Some((image, self.known.of_image(image)?)))
         else {
@@ -100,8 +101,8 @@ impl SceneModel {
         2 * pixels.iter().filter(still).count() > pixels.len()
     }
 
-    /// These pixels of an image show a person: where the scene was thought to be there, nothing is known of it. What was learned
-    /// behind the person stays; forgotten, it would stand out as a flat body when the person is gone.
+    /// Releases pixels of an image that show a person: where they agree with the learned depth, that depth is deleted. Learned
+    /// depth behind the person is kept; without it, the background would look like a flat body once the person is gone.
     pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
         let Some(image) = frame.images.get(image) else { return };
         let Some(known) = self.known.depth_mut(image) else { return };
@@ -130,7 +131,7 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
     }
 }
 
-/// Depth of a pixel, if anything returned.
+/// Returns the depth of a pixel, meters, if it has a return.
 fn meters(image: &DepthImage, index: usize) -> Option<f32> {
     let z = image.pixels.get(index) * image.meters_per_unit as f32;
     (z > 0.0 && z.is_finite()).then_some(z)

@@ -1,38 +1,39 @@
-//! Who was seen by a detector and is not tracked yet.
+//! Tentative tracks: persons that were detected and are not tracked yet.
 
 use crate::detect::{Detection, PlacedDetection};
 use crate::math::Vec3;
 use crate::relocalize::{DETECTION_COST, ENOUGH_ODDS, SAME_PERSON};
 
-/// The same of what has stood there from the start: plants get up to 4, persons who show more than half 8.
+/// Cost of a detection of something that has stood there from the start, subtracted from its log odds in place of
+/// `DETECTION_COST`. Plants reach log odds of up to 4; persons of whom more than half is visible reach 8.
 const STILL_COSTS: f64 = 5.0;
-/// Who was not seen for so long is forgotten, seconds.
+/// A tentative track without a detection for this long is deleted, seconds.
 const FORGOTTEN: f64 = 0.5;
 
-/// Somebody at a place.
+/// Detections of a possible person at one position.
 #[derive(Debug)]
 pub(super) struct TentativeTrack {
     pub(super) place: Vec3,
     pub(super) detection: Detection,
-    /// The image that shows it.
+    /// Number of the image with the detection.
     pub(super) image: usize,
     sum: f64,
     stamp: f64,
 }
 
-/// All of them.
+/// All tentative tracks.
 #[derive(Debug, Default)]
 pub(super) struct TentativeTracks {
     tracks: Vec<TentativeTrack>,
 }
 
 impl TentativeTracks {
-    /// Forgets who was not seen lately.
+    /// Deletes tracks without a recent detection.
     pub(super) fn prune(&mut self, stamp: f64) {
         self.tracks.retain(|track| stamp - track.stamp < FORGOTTEN);
     }
 
-    /// Takes a look in; `still`: what is seen has stood there all the time.
+    /// Updates with a detection. `still`: the detected object has been part of the scene all the time.
     pub(super) fn update(&mut self, stamp: f64, placed: PlacedDetection, image: usize, still: bool) {
         let PlacedDetection { root: place, detection, .. } = placed;
         let gain = detection.person - if still { STILL_COSTS } else { DETECTION_COST };
@@ -43,18 +44,18 @@ impl TentativeTracks {
         self.tracks.push(TentativeTrack { place, detection, image, sum, stamp });
     }
 
-    /// Those seen in the frame of this time.
+    /// Returns the tracks that were detected in the frame with this stamp.
     pub(super) fn updated_at(&self, stamp: f64) -> impl Iterator<Item = &TentativeTrack> {
         self.tracks.iter().filter(move |track| track.stamp == stamp)
     }
 
-    /// Forgets those who are somebody else of these.
+    /// Deletes the tracks that coincide with one of `others`.
     pub(super) fn discard(&mut self, others: &[TentativeTrack]) {
         let same = |a: &TentativeTrack, b: &TentativeTrack| a.place.distance(b.place) < SAME_PERSON;
         self.tracks.retain(|track| !others.iter().any(|other| same(track, other)));
     }
 
-    /// Takes out those seen in the frame of this time who are persons for sure.
+    /// Removes and returns the tracks that were detected in the frame with this stamp and are confirmed.
     pub(super) fn take_confirmed(&mut self, stamp: f64) -> Vec<TentativeTrack> {
         let sure = |track: &mut TentativeTrack| track.stamp == stamp && track.sum >= ENOUGH_ODDS;
         self.tracks.extract_if(.., sure).collect()

@@ -1,28 +1,28 @@
-//! What a camera sees without anybody: a color for every pixel, and how likely another one is that of the scene.
+//! The empty scene of a camera: a background color per pixel, and the likelihood of another color there.
 
 use super::histogram::Kind;
 use crate::error::TrackError;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
-/// Least standard deviation of a channel, of 255: noise, and what compression makes of it.
+/// Minimum standard deviation of a channel, of 255: sensor noise and compression.
 const LEAST_SIGMA: f32 = 6.0;
-/// How likely a pixel without the body shows what it did before, and how likely anything of the surroundings' colors: shadows
-/// and lamps change many.
+/// Probability that a pixel without the body has its background color, and probability that it has any color of the surroundings
+/// instead: shadows and lamps change many pixels.
 const CHANGED: f32 = 0.5;
 
-/// The scene as one camera sees it.
+/// The background colors of one camera.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EmptyScene {
     size: [usize; 2],
     kind: Kind,
     mean: Vec<[u8; 3]>,
-    /// Logarithm of the greatest share of a bin, and one over twice the variance of a channel.
+    /// Logarithm of the greatest probability of a bin, and one over twice the variance of a channel.
     most: f32,
     narrow: f32,
 }
 
 impl EmptyScene {
-    /// The mean of pictures of one size (height, width) and kind, and how they differ.
+    /// The mean and variance of images of one size (height, width) and kind.
     pub(super) fn from_pictures(pictures: &[(ColorPixels, [usize; 2])]) -> Result<Self, TrackError> {
         let wrong = |index: usize, found: String| {
             let expected = "pictures of the empty scene, all of one size and kind";
@@ -64,7 +64,7 @@ impl EmptyScene {
         Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })
     }
 
-    /// Refuses a picture that cannot be compared.
+    /// Returns an error for an image that cannot be compared with the empty scene.
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
         if self.size == [picture.camera.height(), picture.camera.width()] && self.kind == Kind::new(&picture.pixels) {
             return Ok(());
@@ -75,7 +75,8 @@ impl EmptyScene {
         Err(TrackError::measurement(what, "a picture like those of the empty scene", found))
     }
 
-    /// Logarithm of how likely a pixel that shows no body has this color, where `around` is that of the surroundings.
+    /// Log-likelihood of this color at a pixel that does not show the body; `around` is the log-likelihood under the colors of
+    /// the surroundings.
     #[inline]
     pub(super) fn log(&self, index: usize, pixel: [u8; 3], around: f32) -> f32 {
         let (here, value) = (self.mean[index].map(f32::from), pixel.map(f32::from));

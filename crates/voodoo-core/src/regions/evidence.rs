@@ -1,13 +1,13 @@
-//! What the lines of a limb say of it.
+//! Color evidence for and against a limb, accumulated over its lines.
 
 use crate::association::correspondence::RegionSupport;
 
-/// A mean log ratio beside the contour that is told from none.
+/// Least absolute mean log ratio beside the contour that counts as evidence.
 const DECISIVE: f32 = 0.15;
-/// The outer part of a limb begins at this share of its length.
+/// The outer part of a limb begins at this fraction of its length.
 const OUTER_FROM: f64 = 0.6;
 
-/// A limb is in doubt when a smaller share of what can tell speaks for it.
+/// The evidence for a limb is weak when a smaller fraction of its informative lines supports it.
 const WEAK: f64 = 0.15;
 
 /// Sums over the lines of a limb.
@@ -15,13 +15,14 @@ const WEAK: f64 = 0.15;
 pub(super) struct Evidence {
     lines: f64,
     decided: f64,
-    /// Weights of the lines that can tell, of those that speak for the limb and of those against it: of the whole, of the outer
-    /// part.
+    /// Weights of the informative lines, of those that support the limb, and of those that contradict it: for the whole limb and
+    /// for its outer part.
     sums: [[f64; 2]; 3],
 }
 
 impl Evidence {
-    /// Takes a line at a share of the length: mean log ratios inside and outside of the contour, where it can tell.
+    /// Adds a line at fraction `t` of the length; `beside` are the mean log ratios inside and outside of the contour, if the
+    /// line is informative.
     pub(super) fn take(&mut self, t: f64, beside: Option<[f32; 2]>) {
         self.lines += 1.0;
         let Some([inside, outside]) = beside else { return };
@@ -36,7 +37,7 @@ impl Evidence {
         }
     }
 
-    /// The limb may not be where it is thought to be: too little speaks for it.
+    /// Whether the color evidence for the limb's pose is weak.
     pub(super) fn is_weak(&self) -> bool {
         self.decided > 0.0 && self.support().own[0] < WEAK
     }

@@ -1,23 +1,23 @@
-//! How often colors are seen: 16 x 16 x 16 bins of colors, or 256 of gray, smoothed.
+//! Smoothed color histograms: 16 x 16 x 16 bins for color images, 256 for grayscale.
 
 use crate::math::widest;
 use crate::observation::picture::ColorPixels;
 
-/// Bits of each channel that tell its bin.
+/// Leading bits of each channel that select its bin.
 const BITS: u32 = 4;
-/// Bins of each channel.
+/// Bins per channel.
 const SIDE: usize = 1 << BITS;
-/// Share of a count that its neighbor gets on either side: a Gaussian of 0.7 bins.
+/// Fraction of a count that spreads to the neighbor on either side: a Gaussian of 0.7 bins.
 const SPREAD: f32 = 0.21;
-/// Gray has finer bins: it is smoothed so many times.
+/// Number of smoothing passes for grayscale, which has finer bins.
 const GRAY_PASSES: usize = 40;
-/// Share of colors that may be any.
+/// Weight of a uniform distribution mixed into the histogram.
 const UNIFORM: f32 = 0.05;
 
-/// Log ratios are held to this: a color never seen before proves little.
+/// Bound of the absolute log ratio: a color that was never observed before is weak evidence.
 pub(super) const MOST_RATIO: f32 = 2.0;
 
-/// What the pixels of a picture are: it tells the bins.
+/// Kind of an image, which determines its bins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Kind {
     #[default]
@@ -57,20 +57,20 @@ pub(super) fn bin_of(pixels: &ColorPixels, index: usize) -> usize {
     }
 }
 
-/// A log ratio as it counts.
+/// Clamps a log ratio to the bound.
 #[inline(always)]
 pub(super) fn clamped(ratio: f32) -> f32 {
     ratio.clamp(-MOST_RATIO, MOST_RATIO)
 }
 
-/// Shares of colors, and their logarithms.
+/// Relative frequencies of colors, and their logarithms.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ColorHistogram {
     frequency: Vec<f32>,
     pub log: Vec<f32>,
     counts: Vec<f32>,
     counted: f32,
-    /// Something was learned.
+    /// Whether any color was learned.
     pub known: bool,
 }
 
@@ -86,14 +86,15 @@ impl ColorHistogram {
         (self.counted, self.known) = (0.0, false);
     }
 
-    /// Counts a color; it is learned with the next [`ColorHistogram::learn`].
+    /// Counts a color for the next [`ColorHistogram::learn`].
     #[inline(always)]
     pub(super) fn count(&mut self, bin: usize) {
         self.counts[bin] += 1.0;
         self.counted += 1.0;
     }
 
-    /// Learns what was counted, if it is as much as `least`; the first time all of it, then at `rate`. Counts anew.
+    /// Updates the histogram with the counts if there are at least `least`: the first time it takes them over, later it mixes
+    /// them in at `rate`. Resets the counts.
     pub(super) fn learn(&mut self, kind: Kind, rate: f32, least: f32, room: &mut Vec<f32>) {
         if self.counted >= least {
             match kind {
@@ -128,7 +129,8 @@ fn smooth_color(values: &mut [f32], room: &mut Vec<f32>) {
     }
 }
 
-/// Spreads values to their neighbors at a stride, in rows of so many; those at the ends keep what would leave.
+/// Spreads values to their neighbors at a stride, within rows of the given length; values at the ends keep what would leave the
+/// row.
 fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
     room.clear();
     room.extend_from_slice(values);
@@ -137,7 +139,7 @@ fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
         #[inline(always)]
         || {
             for (values, before) in values.chunks_exact_mut(length).zip(room.chunks_exact(length)) {
-                // What flows between each and the next at the stride.
+                // Flow between each value and the next one at the stride.
                 for ((value, own), next) in values.iter_mut().zip(before).zip(&before[stride..]) {
                     *value += SPREAD * (next - own);
                 }
@@ -149,13 +151,13 @@ fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
     );
 }
 
-/// Natural logarithm of a number above zero that is no subnormal one, to 2e-5: many at once.
+/// Natural logarithm of a positive normal number, to 2e-5; vectorizes.
 #[inline(always)]
 fn ln(value: f32) -> f32 {
     const HALF: u32 = 0x3f35_04f3;
     let bits = value.to_bits().wrapping_sub(HALF);
     let exponent = (bits as i32) >> 23;
-    // The rest lies between the root of a half and that of two: the series of the inverse hyperbolic tangent.
+    // The mantissa lies between the square roots of a half and of two: series of the inverse hyperbolic tangent.
     let rest = f32::from_bits((bits & 0x007f_ffff).wrapping_add(HALF));
     let s = (rest - 1.0) / (rest + 1.0);
     let square = s * s;

@@ -1,7 +1,7 @@
-//! Which limb a camera sees where: the limbs' outlines, filled, at a part of the picture's size.
+//! Label images: which limb a camera sees in each cell. Filled silhouettes of the limbs, drawn at reduced resolution.
 //!
-//! What lies before what is all that region lines ask of it, so the outline is the convex hull of the two ends, and depth runs
-//! linearly along the axis.
+//! The lines across the contour only need the order of occlusion. So the silhouette is the convex hull of the two ends, and
+//! depth is linear along the axis.
 
 use std::ops::Range;
 
@@ -9,18 +9,18 @@ use crate::body::Body;
 use crate::camera::Camera;
 use crate::math::{Pose, Vec3};
 
-/// Corners of an end's outline: cosines and sines.
+/// Corners of an end's silhouette: cosines and sines.
 const CORNERS: [[f64; 2]; 8] = {
     use std::f64::consts::FRAC_1_SQRT_2 as H;
     [[1.0, 0.0], [H, H], [0.0, 1.0], [-H, H], [-1.0, 0.0], [-H, -H], [0.0, -1.0], [H, -H]]
 };
-/// A limb with an end nearer than this to the camera's plane is not drawn, meters.
+/// A limb with an end nearer than this to the camera plane is not drawn, meters.
 pub(super) const NEAREST_END: f64 = 0.1;
 
-/// No limb is seen there.
+/// Label of a cell without a limb.
 pub(super) const NOTHING: u16 = u16::MAX;
 
-/// A picture of limbs.
+/// A label image of limbs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LimbLabels {
     /// A cell is two to this power pixels wide and high.
@@ -28,17 +28,17 @@ pub(super) struct LimbLabels {
     columns: usize,
     rows: usize,
     limb: Vec<u16>,
-    /// Infinite where nothing is seen.
+    /// Depth of each cell; infinite where there is no limb.
     depth: Vec<f32>,
-    /// Columns and rows that may show a limb, ends excluded.
+    /// Ranges of columns and rows that may contain a limb.
     drawn: [Range<usize>; 2],
     hull: Vec<[f32; 2]>,
     corners: Vec<[f32; 2]>,
-    /// Ends of the hull in every row that it spans.
+    /// Left and right end of the hull in every row that it spans.
     sides: Vec<[f32; 2]>,
 }
 
-/// Depth along the picture of an axis.
+/// Depth along the projection of an axis.
 struct DepthAxis {
     start: [f32; 2],
     along: [f32; 2],
@@ -46,7 +46,7 @@ struct DepthAxis {
 }
 
 impl LimbLabels {
-    /// Draws the limbs that are `visible` as a camera sees them, in cells of two to the power of `bits` pixels.
+    /// Draws the `visible` limbs from a camera's viewpoint, in cells of two to the power of `bits` pixels.
     pub(super) fn draw(
         &mut self,
         body: &Body,
@@ -83,7 +83,7 @@ impl LimbLabels {
         }
     }
 
-    /// Makes room for pictures of a size.
+    /// Reserves memory for images of the given size.
     pub(super) fn make_room(&mut self, bits: u32, width: usize, height: usize) {
         let size = [width, height].map(|size| size.div_ceil(1 << bits));
         self.clear(bits, size);
@@ -92,7 +92,7 @@ impl LimbLabels {
         self.hull.reserve(2 * CORNERS.len() + 1);
     }
 
-    /// Wipes what was drawn.
+    /// Clears what was drawn.
     fn clear(&mut self, bits: u32, [columns, rows]: [usize; 2]) {
         if (self.bits, self.columns, self.rows) == (bits, columns, rows) {
             let [across, down] = self.drawn.clone();
@@ -111,7 +111,7 @@ impl LimbLabels {
         self.drawn = [0..0, 0..0];
     }
 
-    /// The limb that a pixel shows and its depth, meters.
+    /// The label of a pixel and its depth, meters.
     #[inline(always)]
     pub(super) fn at(&self, column: usize, row: usize) -> (u16, f32) {
         let (column, row) = (column >> self.bits, row >> self.bits);
@@ -148,7 +148,7 @@ impl LimbLabels {
         hull.pop();
     }
 
-    /// Fills the hull where nothing nearer is.
+    /// Fills the hull where nothing nearer was drawn.
     fn fill(&mut self, limb: u16, axis: &DepthAxis) {
         let Self { columns, rows, hull, depth, limb: limbs, sides, drawn, .. } = self;
         let (low, high) =
@@ -163,7 +163,7 @@ impl LimbLabels {
         for (index, from) in hull.iter().enumerate() {
             let to = &hull[(index + 1) % hull.len()];
             let ([x0, y0], [x1, y1]) = if from[1] <= to[1] { (from, to) } else { (to, from) };
-            // The rows after the upper end, as far as the lower one.
+            // The rows below the upper end, down to the lower one.
             let from = (y0.floor() + 1.0).max(first as f32) as usize;
             let to = (y1.floor() + 1.0).clamp(0.0, end as f32) as usize;
             let slope = (x1 - x0) / (y1 - y0);

@@ -1,4 +1,4 @@
-//! Lines across the contour of limbs: where they stand in a picture and what borders the limb there.
+//! Lines across the contour of limbs: their positions in an image, and what borders the limb there.
 
 use super::labels::{LimbLabels, NOTHING};
 use crate::body::{Body, Limb};
@@ -8,13 +8,13 @@ use crate::observation::depth_view::{DepthView, Pixel};
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
 
-/// Points on the rim of an end that no other limb is joined to.
+/// Points on the rim of a free end.
 const RIM: usize = 8;
-/// So far inside and outside of the contour one looks which limb is seen, units: labels are coarse.
+/// Distance inside and outside of the contour at which the label is read, units: label images are coarse.
 pub(super) const BESIDE: f32 = 3.0;
-/// A limb that lies behind by less than this is no background to one that it is joined to, meters.
+/// A limb that lies behind an adjacent limb by less than this is not its background, meters.
 const FAR_BEHIND: f32 = 0.10;
-/// A limb this much nearer than another hides it, meters.
+/// A limb nearer than another by more than this occludes it, meters.
 pub(super) const NEARER_BY: f32 = 0.03;
 
 /// A line across the contour.
@@ -23,31 +23,31 @@ pub(super) struct Line {
     pub limb: u16,
     /// The contour's point, limb frame.
     pub foot: Vec3,
-    /// Where it is seen, pixels, and the unit vector outward.
+    /// Its projection, pixels, and the unit vector outward.
     pub place: [f32; 2],
     pub normal: [f32; 2],
-    /// How far the foot is seen to move outward with its place: pixels a meter, camera frame.
+    /// Gradient of the outward image motion with respect to the position of the foot: pixels per meter, camera frame.
     pub motion: Vec3,
     /// Depth of the limb's surface there, meters.
     pub depth: f32,
-    /// Width of the limb along the line, units; infinite where it does not end.
+    /// Width of the limb along the line, units; infinite where the limb does not end.
     pub width: f32,
-    /// What is seen outside of the limb on this side and on the other: a limb, or nothing.
+    /// The label outside of the limb on this side, and on the opposite side: a limb, or nothing.
     pub outside: u16,
     pub opposite: u16,
-    /// The limb is seen here and what is outside is none that hides it; and on the other side.
+    /// Whether the limb is visible here and not occluded by what is outside; and whether that holds on both sides.
     pub clear: bool,
     pub both: bool,
-    /// Something that is not the body stands before it.
+    /// Whether something other than the body occludes it.
     pub hidden: bool,
 }
 
-/// A depth camera this near to another camera sees what that one sees, meters.
+/// A depth camera within this distance of another camera has the same view, meters.
 const SAME_VIEW: f64 = 0.15;
-/// What is measured this much nearer than a limb hides it, meters: limbs may not have been found yet.
+/// A measurement nearer than a limb by more than this occludes it, meters: the limbs may not have converged yet.
 const BEFORE_BY: f64 = 0.15;
 
-/// A depth camera beside a camera: it sees what stands before the body.
+/// A depth camera beside a color camera: it measures what occludes the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OcclusionDepth<'a> {
     view: DepthView<'a>,
@@ -55,7 +55,7 @@ pub(super) struct OcclusionDepth<'a> {
 }
 
 impl<'a> OcclusionDepth<'a> {
-    /// That of a picture, if the frame has one.
+    /// The depth camera beside the camera of an image, if the frame has one.
     pub(super) fn new(frame: &Frame<'a>, picture: &ColorImage) -> Option<Self> {
         let place = picture.world_from_sensor.translation;
         let near = |pose: &Pose| pose.translation.distance(place) < SAME_VIEW;
@@ -65,24 +65,24 @@ impl<'a> OcclusionDepth<'a> {
         Some(Self { view, depth_from_camera: working_from_camera.inverse() * picture.world_from_sensor })
     }
 
-    /// Whether something stands before a point of the camera's frame.
+    /// Whether something occludes a point in the camera frame.
     fn is_occluded(&self, point: Vec3) -> bool {
         let point = self.depth_from_camera * point;
         matches!(self.view.at(point), Pixel::Foreground(depth) if depth < point.z - BEFORE_BY)
     }
 }
 
-/// Where lines of a limb are looked for.
+/// Data for placing the lines of a limb.
 pub(super) struct Viewer<'a> {
     pub body: &'a Body,
     pub camera: &'a Camera,
     pub labels: &'a LimbLabels,
-    /// Pixels a unit.
+    /// Pixels per unit.
     pub unit: f32,
     pub beside: Option<OcclusionDepth<'a>>,
 }
 
-/// What borders a limb at a place of its contour.
+/// What borders a limb at a point of its contour.
 struct Border {
     outside: u16,
     depth: f32,
@@ -90,7 +90,7 @@ struct Border {
 }
 
 impl Viewer<'_> {
-    /// Adds so many lines on each side of a limb, and those on its free ends.
+    /// Adds the given number of lines on each side of a limb, and the lines at its free ends.
     pub(super) fn add(&self, index: usize, camera_from_limb: &Pose, a_side: usize, lines: &mut Vec<Line>) {
         let limb = &self.body.limbs()[index];
         let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
@@ -133,7 +133,7 @@ impl Viewer<'_> {
             let Some([point, along]) = limb.shape.rim_contour(distal, [c, s], camera) else { continue };
             let place = *camera_from_limb * point;
             let along = camera_from_limb.rotation * along;
-            // The picture of the rim's direction; the normal is at right angles to it, away from the limb.
+            // The projection of the rim's direction; the normal is perpendicular to it, away from the limb.
             let motion = [[1.0, 0.0], [0.0, 1.0]].map(|axis| self.camera.gradient(place, axis));
             let ([Some(x), Some(y)], Some(projected)) = (motion, self.camera.project(place)) else { continue };
             let [x, y] = [x.dot(along), y.dot(along)];
@@ -171,7 +171,7 @@ impl Viewer<'_> {
         })
     }
 
-    /// What borders a limb at a place; `None` outside of the picture.
+    /// What borders a limb at a pixel; `None` outside of the image.
     fn border(&self, limb: usize, place: [f32; 2], normal: [f32; 2]) -> Option<Border> {
         let inside = |u: f32, v: f32| {
             (u >= 0.0 && v >= 0.0 && u < self.camera.width() as f32 && v < self.camera.height() as f32)

@@ -1,9 +1,9 @@
-//! Color regions: where the contour of limbs lies in pictures, by what limbs and their surroundings look like (R07 section 3).
+//! Color regions: locates the contour of limbs in color images by the colors of limbs and their surroundings (R07 section 3).
 //!
-//! R07 alternates between a segmentation of the whole picture with the projected body as prior and a pose from its border. Here
-//! only short lines across the body's contour are segmented, with the same two ingredients: how likely each pixel is the limb's
-//! or the surroundings', and where the body is thought to be. A line's edge is a distance along one direction, as any other
-//! correspondence.
+//! R07 alternates between segmenting the whole image, with the projected body as prior, and fitting the pose to the border. Here
+//! only short lines across the body's contour are segmented, with the same two ingredients: the likelihood of each pixel under
+//! the colors of the limb and of the surroundings, and the predicted contour. The edge on a line gives a distance along one
+//! direction, as any other correspondence does.
 
 mod empty_scene;
 mod evidence;
@@ -32,8 +32,8 @@ use models::ColorModel;
 pub(crate) use pixel_gain::{Backdrop, PixelGain};
 use scan::{EdgeSearch, Scanner};
 
-/// How the edge is looked for in the steps of a frame: farther at first, and less closely. The first two where nobody knows how the
-/// body moves.
+/// The edge search of each step of a frame: wide and coarse at first, then narrower and finer. The first two are only used when
+/// the motion of the body is unknown.
 const SEARCHES: [EdgeSearch; 6] = [
     EdgeSearch { reach: 10, every: 4.0 },
     EdgeSearch { reach: 8, every: 4.0 },
@@ -42,52 +42,52 @@ const SEARCHES: [EdgeSearch; 6] = [
     EdgeSearch { reach: 6, every: 1.0 },
     EdgeSearch { reach: 5, every: 1.0 },
 ];
-/// How it is looked for where the limb's girth is asked for.
+/// The edge search for estimating a limb's girth.
 const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: 10, every: 1.0 };
 const WIDE_SEARCHES: usize = 2;
-/// Which limb is seen where is drawn in cells of two to this power pixels.
+/// Label images are drawn in cells of two to this power pixels.
 const CELL_BITS: u32 = 1;
-/// Lines stand about so far apart along a limb, meters, and so many on each side at least and at most.
+/// Approximate spacing of lines along a limb, meters; and the least and greatest number of lines on each side.
 const SPACING: f64 = 0.035;
 const LEAST_LINES: usize = 3;
 const MOST_LINES: usize = 16;
-/// With more limbs in doubt than this none is frozen.
+/// When color evidence is weak for more limbs than this, colors of all limbs are learned.
 const MANY: usize = 4;
-/// A unit is a pixel of a lens with this focal length, pixels.
+/// A unit is one pixel of a camera with this focal length, pixels.
 const FOCAL: f64 = 520.0;
-/// Standard deviation of the body's own contour, units: limbs are no cones.
+/// Standard deviation of the model's contour, units: real limbs are not cones.
 const MODEL_ERROR: f32 = 2.0;
 
-/// What the pictures of one camera have taught, and working memory.
+/// What was learned from the images of one camera, and working memory.
 #[derive(Debug, Default)]
 struct Learned {
     number: u16,
-    /// Pixels a unit in the last picture.
+    /// Pixels per unit in the last image.
     unit: f32,
     model: ColorModel,
     scene: Option<EmptyScene>,
     labels: LimbLabels,
     lines: Vec<Line>,
-    /// What was found on each of them.
+    /// The edge found on each line.
     edges: Vec<Option<scan::LineEdge>>,
     camera_from_limb: Vec<Pose>,
     known: bool,
 }
 
-/// So many steps are enough where nothing but edges is measured, and where nobody knows how the body moves.
+/// Number of steps that is enough where only color edges are measured; more when the motion is unknown.
 pub(crate) fn steps(unknown_motion: bool) -> usize {
     SEARCHES.len() - if unknown_motion { 0 } else { WIDE_SEARCHES }
 }
 
-/// Colors of the body and its surroundings, camera by camera, and the lines of the last look.
+/// Colors of the body and its surroundings for each camera, and the lines of the last search.
 #[derive(Debug, Default)]
 pub(crate) struct ColorRegions {
     cameras: Vec<Learned>,
-    /// Group of every limb: those of one group have the same colors.
+    /// Group of every limb: the limbs of one group have the same colors.
     groups: Vec<u16>,
     /// Time of the last frame, seconds.
     stamp: Option<f64>,
-    /// The first camera that teaches next.
+    /// Offset of the cameras that learn in the next frame.
     turn: usize,
     scanner: Scanner,
     evidence: Vec<Evidence>,
@@ -101,35 +101,35 @@ pub(crate) struct Posed<'a> {
     pub body: &'a Body,
     /// Its poses.
     pub poses: &'a [Pose],
-    /// Its poses in the frame before; empty where they are not known.
+    /// Its poses in the previous frame; empty where they are not known.
     pub previous: &'a [Pose],
     /// The working frame's origin in the world.
     pub origin: Vec3,
 }
 
-/// A line across the contour of a limb in a picture, and the edge of its colors there; pixels.
+/// A line across the contour of a limb in an image, and the color edge on it; pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionLine {
     /// The limb.
     pub limb: usize,
-    /// Where the contour is seen.
+    /// Pixel of the contour.
     pub place: [f32; 2],
     /// Unit vector outward.
     pub normal: [f32; 2],
-    /// How far outward the edge lies.
+    /// Distance of the edge outward.
     pub offset: f32,
-    /// Its standard deviation; infinite where nothing is told.
+    /// Standard deviation of that distance; infinite where there is no information.
     pub sigma: f32,
 }
 
 impl ColorRegions {
-    /// Forgets what bodies and surroundings look like.
+    /// Resets the learned colors of bodies and surroundings.
     pub(crate) fn clear(&mut self) {
         (self.stamp, self.turn) = (None, 0);
         self.cameras.iter_mut().for_each(|camera| camera.known = false);
     }
 
-    /// Keeps what a camera sees without anybody: pictures with their heights and widths; none: forgets it.
+    /// Sets the empty scene of a camera from images with their heights and widths; without images, removes it.
     pub(crate) fn set_background(
         &mut self,
         camera: u16,
@@ -140,7 +140,7 @@ impl ColorRegions {
         Ok(())
     }
 
-    /// Refuses pictures with distortion, and those that cannot be compared with those of the empty scene.
+    /// Returns an error for images with distortion, and for those that cannot be compared with the empty scene.
     pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
             if picture.camera.distorts() {
@@ -154,7 +154,7 @@ impl ColorRegions {
         Ok(())
     }
 
-    /// Learns the colors of cameras that are new at the pose where the body is thought to be.
+    /// Learns the colors of new cameras at the initial pose.
     pub(crate) fn begin(&mut self, frame: &Frame, posed: Posed) {
         if self.groups != posed.body.roles().groups() {
             posed.body.roles().groups().clone_into(&mut self.groups);
@@ -175,7 +175,7 @@ impl ColorRegions {
         }
     }
 
-    /// The edges of the limbs that are `is_requested` in all pictures, in a step of a frame after which so many are `left`.
+    /// Finds the edges of the limbs that are `is_requested` in all images, in a step of a frame that `left` more steps follow.
     pub(crate) fn find(
         &mut self,
         frame: &Frame,
@@ -192,12 +192,12 @@ impl ColorRegions {
         found.region_support.extend(self.evidence.iter().map(Evidence::support));
     }
 
-    /// The same, every edge by itself: where a limb is wider than thought, both sides lie outward.
+    /// Finds every edge on its own, for all limbs: where a limb is wider than modeled, the edges of both sides lie outward.
     pub(crate) fn find_single_edges(&mut self, frame: &Frame, posed: Posed, pairs: &mut Vec<RegionPair>) {
         self.find_within(frame, posed, SINGLE_EDGES, None, pairs);
     }
 
-    /// Edges of limbs that are wanted as a whole, or of all limbs one by one.
+    /// Finds edges: of the requested limbs, with both sides searched together; or of all limbs, each edge on its own.
     fn find_within(
         &mut self,
         frame: &Frame,
@@ -246,7 +246,7 @@ impl ColorRegions {
         }
     }
 
-    /// The lines of the last look at a camera's picture.
+    /// The lines of the last search in a camera's image.
     pub(crate) fn lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         let camera = self.cameras.iter().find(|known| known.number == camera);
         camera.into_iter().flat_map(|camera| {
@@ -264,7 +264,7 @@ impl ColorRegions {
         })
     }
 
-    /// Learns colors where the body was found: of every second camera in turn, a frame is like the one before.
+    /// Learns colors at the fitted pose: from every second camera in turn, because consecutive frames are similar.
     pub(crate) fn learn(&mut self, frame: &Frame) {
         let turn = self.turn;
         frame.colors.iter().skip(turn).step_by(2).for_each(|picture| self.teach(picture));
@@ -280,7 +280,7 @@ impl ColorRegions {
         &mut self.cameras[index]
     }
 
-    /// Places the lines of one picture.
+    /// Places the lines of one image.
     fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
         let viewpoint = self.viewpoint(frame, picture, posed);
         let camera = self.camera(picture.number);
@@ -290,7 +290,7 @@ impl ColorRegions {
         let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
         lines.clear();
-        // Room at once: how many there are differs from pose to pose.
+        // Reserves the full capacity at once: the number of lines differs from pose to pose.
         lines.reserve(2 * MOST_LINES * camera_from_limb.len());
         let beside = OcclusionDepth::new(frame, picture);
         let viewer = Viewer { body, camera: picture.camera, labels, unit: *unit, beside };
@@ -300,12 +300,12 @@ impl ColorRegions {
         }
     }
 
-    /// Learns the colors along the lines of one picture, of limbs that are not in doubt.
+    /// Learns the colors along the lines of one image, except those of limbs with weak evidence.
     fn teach(&mut self, picture: &ColorImage) {
         let Self { cameras, groups, evidence, .. } = self;
         let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number) else { return };
         let unit = camera.unit;
-        // Where many limbs are in doubt at once, it is the light that has changed.
+        // When the evidence is weak for many limbs at once, the light has changed.
         let light = evidence.iter().filter(|evidence| evidence.is_weak()).count() > MANY;
         for line in &camera.lines {
             let weak = evidence.get(usize::from(line.limb)).is_some_and(Evidence::is_weak);
@@ -317,13 +317,13 @@ impl ColorRegions {
     }
 }
 
-/// Pixels a unit.
+/// Pixels per unit.
 fn unit_of(camera: &Camera) -> f32 {
     let [fx, fy] = camera.focal();
     (0.5 * (fx + fy) / FOCAL) as f32
 }
 
-/// Where a limb is a share of the last motion later.
+/// Extrapolates a limb's pose by a fraction of the last motion.
 fn moved_on(before: &Pose, now: &Pose, fraction: f64) -> Pose {
     let turn = (now.rotation * before.rotation.inverse()).to_scaled_axis_shortest();
     let shift = now.translation - before.translation;

@@ -1,25 +1,25 @@
-//! What colors limbs and their surroundings have in one camera's pictures.
+//! Color models of limbs and their surroundings in the images of one camera.
 
 use super::histogram::{ColorHistogram, Kind, clamped};
 
-/// Share of what two frames bring in what is known of a limb's colors, and of those around it: a body keeps its clothes.
+/// Weight of the new colors of two frames in the model of a limb, and in that of its surroundings: clothes stay the same.
 const RATES: [f32; 2] = [0.19, 0.36];
-/// Fewer pixels than this teach nothing.
+/// Fewer pixels than this are not learned from.
 const LEAST_PIXELS: f32 = 15.0;
 
-/// Colors by group of limbs: the two of a pair have the same.
+/// Colors by group of limbs: the left and the right limb of a pair share one model.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ColorModel {
     pub kind: Kind,
     pub limbs: Vec<ColorHistogram>,
     pub around: Vec<ColorHistogram>,
-    /// Log ratios of each group's colors and of those around it, as they count.
+    /// Clamped log ratios between each group's colors and those of its surroundings.
     ratios: Vec<f32>,
     room: Vec<f32>,
 }
 
 impl ColorModel {
-    /// Forgets all colors.
+    /// Clears all colors.
     pub(super) fn clear(&mut self, kind: Kind, groups: usize) {
         self.kind = kind;
         for histograms in [&mut self.limbs, &mut self.around] {
@@ -30,7 +30,7 @@ impl ColorModel {
         self.ratios.resize(groups * kind.bins(), 0.0);
     }
 
-    /// Learns what was counted.
+    /// Updates the models with the counted colors.
     pub(super) fn learn(&mut self) {
         let Self { kind, limbs, around, ratios, room } = self;
         for (histograms, rate) in [&mut *limbs, &mut *around].into_iter().zip(RATES) {
@@ -42,14 +42,14 @@ impl ColorModel {
         }
     }
 
-    /// Log ratios of a group's colors and of those around it.
+    /// Log ratios between a group's colors and those of its surroundings.
     #[inline(always)]
     pub(super) fn ratios(&self, group: usize) -> &[f32] {
         let bins = self.kind.bins();
         &self.ratios[group * bins..(group + 1) * bins]
     }
 
-    /// Whether a group's colors and those around it are known.
+    /// Whether the colors of a group and of its surroundings are known.
     pub(super) fn knows(&self, group: usize) -> bool {
         self.limbs[group].known && self.around[group].known
     }

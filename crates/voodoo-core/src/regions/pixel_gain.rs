@@ -1,6 +1,7 @@
-//! How much of pictures only one limb explains: each pixel is the limb's that shows there, and no other one's.
+//! How much of the images only one limb explains: each pixel is assigned to the limb that is visible there.
 //!
-//! Two legs on the contour of one both lie on its colors. What a limb adds to what is seen without it tells them apart.
+//! When both legs are fitted to the contour of one leg, both match its colors. What a limb explains in addition to the other
+//! limbs distinguishes this case.
 
 use super::histogram::bin_of;
 use super::labels::{LimbLabels, NOTHING};
@@ -14,19 +15,19 @@ use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
 use crate::shape::TaperedEllipticCylinder;
 
-/// Where a limb is looked at: in shares of its length, and of its radius as it is seen.
+/// Sample positions on a limb: fractions of its length, and of its projected radius.
 const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
-/// One cell of what is drawn is two to this power pixels wide.
+/// Backdrops are drawn in cells of two to this power pixels.
 const BACKDROP_BITS: u32 = 2;
 
-/// What pictures say of a limb, in patches, the mean of all cameras.
+/// Color evidence for a limb, in patches, averaged over all cameras.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PixelGain {
-    /// What it explains better than what would be seen without it, less what it explains worse: of a limb whose colors are
-    /// certain, all that shows.
+    /// Area that the limb explains better than what would be visible without it, minus the area that it explains worse. For a
+    /// limb with unambiguous colors this is its whole visible area.
     pub gained: f64,
-    /// Its area in the pictures, hidden or not.
+    /// Its area in the images, occluded or not.
     pub area: f64,
 }
 
@@ -37,7 +38,7 @@ impl std::ops::AddAssign for PixelGain {
     }
 }
 
-/// What each camera sees of some limbs.
+/// Label images of selected limbs, one per camera.
 #[derive(Debug, Default)]
 pub(crate) struct Backdrop {
     planes: Vec<LimbLabels>,
@@ -45,7 +46,7 @@ pub(crate) struct Backdrop {
 }
 
 impl Backdrop {
-    /// Makes room for the pictures of a frame and so many limbs.
+    /// Reserves memory for the images of a frame and the given number of limbs.
     pub(crate) fn make_room(&mut self, frame: &Frame, limbs: usize) {
         self.planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (labels, picture) in self.planes.iter_mut().zip(frame.colors) {
@@ -57,7 +58,7 @@ impl Backdrop {
 }
 
 impl ColorRegions {
-    /// Draws the limbs that are `visible` before what the cameras see.
+    /// Draws the `visible` limbs into the backdrop of each camera.
     pub(crate) fn draw(&self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
         let Backdrop { planes, camera_from_limb } = backdrop;
         planes.resize_with(frame.colors.len(), LimbLabels::default);
@@ -69,14 +70,14 @@ impl ColorRegions {
         }
     }
 
-    /// What a limb, which is not drawn, would explain of what is seen.
+    /// What a limb that is not in the backdrop would explain in addition to it.
     pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> PixelGain {
         self.sum_over_limb(frame, posed, limb, backdrop, |(label, behind), depth| {
             (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
         })
     }
 
-    /// What every limb of the arms and legs explains that nothing else does, into `supports`.
+    /// Writes to `supports` what every limb of the arms and legs explains that no limb outside its own arm or leg does.
     pub(crate) fn pixel_gains(
         &mut self,
         frame: &Frame,
@@ -97,7 +98,7 @@ impl ColorRegions {
         self.backdrop = backdrop;
     }
 
-    /// How well a body explains what is seen, every pixel by the limb that shows there; all of it is drawn.
+    /// How well a body explains the images, each pixel counted for the limb visible there; the backdrop contains the whole body.
     pub(crate) fn explained(&self, frame: &Frame, posed: Posed, backdrop: &Backdrop) -> f64 {
         let own = |limb: usize| {
             let nothing_behind = |(label, _): (u16, f64), _| (usize::from(label) == limb).then_some(NOTHING);
@@ -106,8 +107,8 @@ impl ColorRegions {
         (0..posed.poses.len()).map(own).sum()
     }
 
-    /// Sums over the places of a limb; `behind` says what would be seen there without it, given what is drawn there and its
-    /// depth, and the limb's.
+    /// Sums over the sample positions of a limb. `behind` returns what would be visible there without the limb, given the label
+    /// and depth of the backdrop, and the depth of the limb; `None` where the limb is occluded.
     fn sum_over_limb(
         &self,
         frame: &Frame,
@@ -150,7 +151,8 @@ impl ColorRegions {
     }
 }
 
-/// Places on a limb as a camera sees it: pixels (the first one's corner is the origin), depth in meters, and area in patches.
+/// Sample positions on a limb in a camera's image: pixels (the corner of the first pixel is the origin), depth in meters, and
+/// area in patches.
 fn places(
     shape: &TaperedEllipticCylinder,
     camera_from_limb: &Pose,
@@ -182,10 +184,10 @@ fn places(
     }
 }
 
-/// Where a camera saw the limbs: those of the moment it looked.
+/// A camera's view of the limbs at the time of its image.
 pub(super) struct PictureViewpoint<'a> {
     pub(super) posed: Posed<'a>,
-    /// How much of the last motion lies between the frame and the picture.
+    /// Time from the frame to the image, as a fraction of the interval of the last motion.
     pub(super) fraction: f64,
     pub(super) camera_from_working: Pose,
 }
@@ -199,7 +201,7 @@ impl PictureViewpoint<'_> {
 }
 
 impl ColorRegions {
-    /// How a camera sees a body.
+    /// A camera's view of a body.
     pub(super) fn viewpoint<'a>(
         &self,
         frame: &Frame,

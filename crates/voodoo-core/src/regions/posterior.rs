@@ -1,27 +1,27 @@
-//! Where along a line the edge of a limb is, from the log ratios of limb and surroundings at its samples.
+//! Posterior of a limb's edge along a line, from the log ratios of limb and surroundings at its samples.
 
-/// Log ratios of neighboring pixels err alike: so many of them tell as much as one.
+/// Log ratios of neighboring pixels are correlated: this many of them count as one.
 const TEMPERATURE: f32 = 8.0;
-/// Greatest distance from the expected edge at which one is looked for, samples.
+/// Greatest distance of the search from the expected edge, samples.
 pub(super) const MOST_REACH: usize = 10;
 
-/// An edge's place, in samples outward from where it is expected.
+/// Position of an edge, in samples outward from the expected edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct ColorEdge {
     /// Mean.
     pub mean: f32,
-    /// What the colors say of it: one over the variance, less what the bounds of the search alone would say.
+    /// One over the variance of the posterior, minus the information of the search bounds alone.
     pub information: f32,
 }
 
-/// The edge within `reach` samples of the middle. `near` are the log ratios of samples half a step beside whole ones, from
-/// `-reach` to `reach`; where the limb is known to end on its other side as well, `far` are those from there, else the limb goes on.
-/// What lies between the two is the limb's wherever its edge is. A sample stands for as many as one is looked at `every`.
+/// Estimates the edge within `reach` samples of the middle. `near` are the log ratios halfway between the integer positions from
+/// `-reach` to `reach`. If the opposite contour of the limb is visible too, `far` are the log ratios there; otherwise the limb
+/// continues. Samples between the two ranges belong to the limb for any displacement. A sample represents `every` pixels.
 pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) -> ColorEdge {
     let count = 2 * reach + 1;
     let mut sums = [0.0_f32; 2 * MOST_REACH + 1];
     let sums = &mut sums[..count];
-    // The limb ends at the displacement d: what lies inwards of it, as far as the limb goes, is the limb's.
+    // The limb ends at displacement d: the samples inward of it, up to the opposite contour, belong to the limb.
     let (mut sum, mut most) = (0.0_f32, 0.0_f32);
     for index in 1..count {
         sum += near[index - 1] - far.map_or(0.0, |far| far[index - 1]);
@@ -44,7 +44,7 @@ pub(super) fn edge(near: &[f32], far: Option<&[f32]>, reach: usize, every: f32) 
     if information <= 0.0 {
         return ColorEdge::default();
     }
-    // The bounds of the search draw the mean to the middle; what is left without them lies farther out.
+    // The search bounds pull the mean to the middle; without their effect it lies farther out.
     let most = reach as f32;
     ColorEdge { mean: (mean / (variance * information)).clamp(-most, most), information }
 }

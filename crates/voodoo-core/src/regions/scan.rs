@@ -1,4 +1,4 @@
-//! Looks along lines: log ratios of limb and surroundings, and what colors there are.
+//! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
 use std::ops::Range;
 
@@ -10,29 +10,29 @@ use super::models::ColorModel;
 use super::posterior::{ColorEdge, MOST_REACH, edge};
 use crate::observation::picture::{ColorImage, ColorPixels};
 
-/// A limb wider than this is looked for by one edge alone, units.
+/// On a limb wider than this, each edge is searched for alone, units.
 const WIDEST: f32 = 48.0;
-/// How far from the contour brightness is compared, units.
+/// Distance from the contour within which local brightness is compared, units.
 const LOCAL: f32 = 12.0;
-/// Least standard deviation of brightness beside the contour, of 255.
+/// Minimum standard deviation of brightness beside the contour, of 255.
 const LEAST_SPREAD: f32 = 6.0;
-/// What is beside the contour is so many samples wide.
+/// Number of samples on each side that count as beside the contour.
 const NEXT_TO: usize = 5;
-/// Colors are learned from this far inside and outside of the contour, units.
+/// Colors are learned from this distance inside and outside of the contour on, units.
 const LEARN_FROM: f32 = 2.0;
-/// Neighboring pixels are alike: one is learned from in so many units.
+/// Spacing of the samples for learning, units: neighboring pixels are similar.
 const LEARN_EVERY: f32 = 2.0;
-/// As far outside of it the surroundings are learned, units.
+/// The surroundings are learned up to this distance outside, units.
 const SURROUND: f32 = 30.0;
 
-/// How an edge is looked for: within so many samples on either side of the contour, so many units apart.
+/// An edge search: `reach` samples on either side of the contour, `every` units apart.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgeSearch {
     pub reach: usize,
     pub every: f32,
 }
 
-/// What a line is looked along in.
+/// The data that a line is sampled in.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScanView<'a> {
     pub picture: &'a ColorImage<'a>,
@@ -55,7 +55,7 @@ impl Default for Scanner {
     }
 }
 
-/// What is found on a line.
+/// Result of the search on a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineEdge {
     pub edge: ColorEdge,
@@ -64,7 +64,7 @@ pub(super) struct LineEdge {
 }
 
 impl Scanner {
-    /// The edge on a line; `None` where it cannot be told.
+    /// Finds the edge on a line; `None` where there is no evidence.
     pub(super) fn edge(
         &mut self,
         view: &ScanView,
@@ -78,7 +78,7 @@ impl Scanner {
         }
         let EdgeSearch { reach, every } = search;
         let width = if together && line.both && line.width < WIDEST { (line.width / every + 0.5) as usize } else { 0 };
-        // The samples about this edge and those about the other one, which may overlap.
+        // The samples around this edge and those around the opposite one may overlap.
         let span = 2 * reach;
         let far = width.min(span);
         let start = 0.5 - reach as f32;
@@ -100,7 +100,7 @@ impl Scanner {
         })
     }
 
-    /// Fills a range of ratios with those of samples outward, from so many of them on.
+    /// Fills a range of ratios with log ratios at samples outward, `every` units apart, the first at `start` samples.
     fn fill_ratios(&mut self, view: &ScanView, line: &Line, [start, every]: [f32; 2], range: Range<usize>) {
         let ratios = &mut self.ratios[range];
         match view.picture.pixels {
@@ -113,7 +113,7 @@ impl Scanner {
     }
 }
 
-/// Brightness beside the contour: a Gaussian (R07).
+/// Distribution of brightness beside the contour: a Gaussian (R07).
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
     count: f32,
@@ -138,7 +138,8 @@ impl Local {
     }
 }
 
-/// Gray alone says little of a whole limb: the ratios become the mean of theirs and of those of what is beside the contour.
+/// Gray values alone hardly identify a whole limb: each ratio is averaged with the log ratio of the local brightness beside the
+/// contour.
 fn compare_locally(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
     let picture = view.picture;
     let side = |from: f32, to: f32| {
@@ -174,12 +175,12 @@ impl ScanView<'_> {
         usize::from(self.groups[usize::from(limb)])
     }
 
-    /// Whether what borders the limb has its colors.
+    /// Whether the neighbor outside the contour has the same colors as the limb.
     fn outside_is(&self, line: &Line, group: usize) -> bool {
         line.outside != NOTHING && self.group(line.outside) == group
     }
 
-    /// Log ratios of samples outward, from so many of them on; `bin` is that of a pixel.
+    /// Fills `ratios` with log ratios at samples outward, the first at `start` samples; `bin` returns the bin of a pixel.
     #[inline(always)]
     fn fill(&self, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32], bin: impl Fn(usize) -> usize) {
         let (model, group) = (self.model, self.group(line.limb));
@@ -204,7 +205,7 @@ impl ScanView<'_> {
         }
     }
 
-    /// Log ratio of a pixel, whose bin is given, between a group's colors and those of what else would be there.
+    /// Log ratio of a pixel with the given bin, between a group's colors and those of what would be visible without the limb.
     #[inline(always)]
     pub(super) fn ratio(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
         let own = self.model.limbs[group].log[bin];
@@ -220,12 +221,12 @@ impl ScanView<'_> {
         clamped(own - self.model.limbs[other].log[bin])
     }
 
-    /// The same as a share of the most it can be.
+    /// The log ratio as a fraction of its bound.
     pub(super) fn certainty(&self, group: usize, other: u16, pixel: usize, bin: usize) -> f32 {
         self.ratio(group, other, pixel, bin) / MOST_RATIO
     }
 
-    /// What would be seen at `r` units outward if the limb were not there; `None` where something hides it.
+    /// What would be visible at `r` units outward without the limb; `None` where something occludes it.
     #[inline(always)]
     fn other(&self, line: &Line, r: f32, column: usize, row: usize) -> Option<u16> {
         if r.abs() < BESIDE {
@@ -247,27 +248,27 @@ impl ScanView<'_> {
     }
 }
 
-/// Goes along a line, in parts of a pixel.
+/// Steps along a line, in fixed-point pixel coordinates.
 struct Walk {
     place: [i64; 2],
     step: [i64; 2],
 }
 
-/// So many bits of a walk's places are parts of a pixel.
+/// Fractional bits of the fixed-point coordinates.
 const FRACTION_BITS: u32 = 32;
 
 impl Walk {
-    /// From `from` pixels outward, `step` pixels a step.
+    /// Starts `from` pixels outward, with `step` pixels per step.
     fn new(line: &Line, from: f32, step: f32) -> Self {
         let part = |value: f32| (f64::from(value) * (1_i64 << FRACTION_BITS) as f64) as i64;
         let place = [0, 1].map(|axis| part(line.place[axis] + from * line.normal[axis] + 0.5));
         Self { place, step: line.normal.map(|n| part(step * n)) }
     }
 
-    /// Column and row of the pixel there, if it is in the picture.
+    /// Column and row of the current pixel, if it is inside the image.
     #[inline(always)]
     fn pixel(&self, picture: &ColorImage) -> Option<(usize, usize)> {
-        // What lies left of the picture, or above it, is beyond any size as a number without sign.
+        // Negative coordinates become huge unsigned numbers, so the bounds check rejects them.
         let [column, row] = self.place.map(|place| (place >> FRACTION_BITS) as usize);
         (column < picture.camera.width() && row < picture.camera.height()).then_some((column, row))
     }
@@ -278,7 +279,7 @@ impl Walk {
     }
 }
 
-/// Counts the colors along a line, of the limb as far as its middle and of what is around it.
+/// Counts the colors along a line: of the limb up to its middle, and of its surroundings.
 pub(super) fn count(
     picture: &ColorImage,
     labels: &LimbLabels,

@@ -1,7 +1,7 @@
-//! Which pixels of a picture are the body: colors, with the body where it is thought to be as the shape prior (R07 section 3.1).
+//! Segments the body in an image from colors, with the predicted body as the shape prior (R07 section 3.1).
 //!
-//! The log odds of a pixel are those of its colors, the mean of its neighbors' as well, and a prior that falls with the
-//! distance from the projected contour.
+//! The log odds of a pixel are the sum of its color log ratio, the mean log ratio of its neighborhood, and a prior that falls
+//! with the distance from the projected contour.
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
@@ -10,16 +10,16 @@ use crate::association::correspondence::Correspondences;
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
 
-/// Log odds fall by one in so many units outward from the contour.
+/// Log odds fall by one per this many units outward from the contour.
 const FALL: f32 = 3.0;
-/// Farther outside than this, units, nothing is the body.
+/// Farther outside than this, units, the probability is zero.
 const FARTHEST: f32 = 20.0;
-/// Colors of so many pixels on every side count as well: noise is no region.
+/// Radius of the neighborhood, pixels: it suppresses noise.
 const NEIGHBORS: usize = 2;
-/// Steps to a neighbor of a side and of a corner in the distance transform (Borgefors 1986), cells.
+/// Costs of a step to a side neighbor and to a corner neighbor in the distance transform (Borgefors 1986), cells.
 const CHAMFER: [f32; 2] = [1.0, 1.414];
 
-/// A grid of cells about the body: the nearest limb, and how far outside of the contour it lies, units; negative inside.
+/// A grid of cells around the body: the nearest limb, and the signed distance outside of the contour, units.
 struct Near {
     columns: usize,
     limb: Vec<u16>,
@@ -27,14 +27,14 @@ struct Near {
 }
 
 impl ColorRegions {
-    /// How likely each pixel of a frame's pictures shows the body, picture after picture, row by row: 0 to 1. Cameras that are
-    /// new learn its colors at this pose first.
+    /// Probability that each pixel of a frame's images shows the body, image after image, row by row, in [0, 1]. New cameras
+    /// first learn its colors at this pose.
     pub(crate) fn segment(&mut self, frame: &Frame, posed: Posed) -> Vec<Vec<f32>> {
         self.begin(frame, posed);
         frame.colors.iter().map(|picture| self.segment_picture(frame, picture, posed)).collect()
     }
 
-    /// Learns the body's colors and those about it where it is.
+    /// Learns the colors of the body and its surroundings at this pose.
     pub(crate) fn learn_at(&mut self, frame: &Frame, posed: Posed) {
         self.begin(frame, posed);
         self.find(frame, posed, 0, |_| true, &mut Correspondences::default());
@@ -50,7 +50,7 @@ impl ColorRegions {
         let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
         let cell = 1_usize << super::CELL_BITS;
         let near = distances(labels, [picture.camera.width(), picture.camera.height()], cell as f32 / unit);
-        // Log ratios, and then sums of them along rows.
+        // Log ratios, and then their means along rows and columns.
         let mut ratios = vec![0.0_f32; likely.len()];
         for (index, ratio) in ratios.iter_mut().enumerate() {
             let (column, row) = (index % picture.camera.width(), index / picture.camera.width());
@@ -77,7 +77,7 @@ impl ColorRegions {
     }
 }
 
-/// Means of so many values on both sides, at a stride; beyond a row's end there are none.
+/// Means over a neighborhood along one axis, at a stride; values beyond the end of a row are left out.
 fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
     let reach = NEIGHBORS * stride;
     let mean = |index: usize| {
@@ -94,7 +94,7 @@ fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
     (0..values.len()).map(mean).collect()
 }
 
-/// Distances of all cells from the contour of what is drawn; a cell is `side` units wide.
+/// Signed distances of all cells from the contour of what is drawn; a cell is `side` units wide.
 fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Near {
     let cell = 1_usize << super::CELL_BITS;
     let [columns, rows] = size.map(|size| size.div_ceil(cell));
@@ -109,7 +109,7 @@ fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Near {
     Near { columns, limb, outside }
 }
 
-/// Distances to the nearest cell that is at none, in two passes; each cell takes the limb of the one it is nearest to.
+/// Distances to the nearest cell with distance zero, in two passes; each cell takes over the limb of its nearest one.
 fn spread(distance: &mut [f32], mut limb: Option<&mut Vec<u16>>, columns: usize) {
     let rows = distance.len() / columns.max(1);
     let [side, corner] = CHAMFER;
@@ -128,7 +128,7 @@ fn spread(distance: &mut [f32], mut limb: Option<&mut Vec<u16>>, columns: usize)
             let (back, ahead) =
                 if pass == 0 { (column > 0, column + 1 < columns) } else { (column + 1 < columns, column > 0) };
             let before = if pass == 0 { row > 0 } else { row + 1 < rows };
-            // The same way back in the second pass.
+            // The second pass runs the same way backwards.
             let at = |offset: usize| if pass == 0 { to - offset } else { to + offset };
             if back {
                 take(to, at(1), side);

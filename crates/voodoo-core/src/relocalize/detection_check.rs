@@ -1,4 +1,4 @@
-//! When a detector looks at a tracked person, and whether it sees the person elsewhere or the other way round.
+//! Decides when the detector runs for a tracked person, and whether it finds the person elsewhere or facing the other way.
 
 use super::tentative_detection::ENOUGH_ODDS;
 use crate::body::Body;
@@ -6,31 +6,33 @@ use crate::detect::Detected;
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
-/// A track is looked after for so long from its start on, seconds. A body that has been lost for so long is gone, and who was hidden
-/// is waited for so long; a limb that is elsewhere is looked at as seldom.
+/// Time for which a track is new, seconds. It is also the time after which a lost body is gone and the time for which an
+/// occlusion is remembered, and the interval between detections for a suspect limb.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;
-/// Seconds from one look at a young, lost or unsure track to the next: a look costs as much as a frame or two.
+/// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two.
 const EVERY: f64 = 0.09;
-/// A detection is elsewhere when its trunk or legs are this far from the tracked ones in the mean, meters: other skeletons have hips
-/// and ankles 10 cm from where a detector tells them. Its ankles are as near to the floor on which somebody stands.
+/// A detection is elsewhere when its trunk or legs have at least this mean distance from the tracked ones, meters. Other
+/// skeletons have hips and ankles 10 cm from those that a detector reports. It is also the largest distance of detected ankles
+/// from the floor under a person.
 pub(super) const ELSEWHERE: f64 = 0.15;
-/// And by so many of its own standard deviations; those of people who hide each other are large although it is right.
+/// The mean distance must also exceed this multiple of the detection's mean standard deviation, which is large for persons who
+/// occlude each other even if the detection is right.
 pub(super) const SIGMAS: f64 = 3.5;
-/// From this sum of log odds on what is tracked is no person.
+/// Sum of log odds from which on a track is not a person.
 const FALSE_TRACK_ODDS: f64 = 12.0;
 
-/// What a detection says of where the body is tracked.
+/// Result of comparing a detection with the tracked pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DetectionVerdict {
-    /// It is there.
+    /// The detection agrees with the tracked pose.
     Consistent,
-    /// It is not, and it is too early to try the detection's place.
+    /// It disagrees, but the evidence is not yet enough to try the detected position.
     Inconsistent,
-    /// It is elsewhere: the detection's place is to be tried.
+    /// The body is elsewhere: the detected position is to be tried.
     Elsewhere,
 }
 
-/// Mean distance of detected joints from the tracked ones, and mean of their standard deviations, meters.
+/// Returns the mean distance of detected joints from the tracked ones, and the mean of their standard deviations, meters.
 fn joint_distance(detected: Detected, body: &Body, world_from_limb: &[Pose], joints: &[usize]) -> [f64; 2] {
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
     for joint in joints {
@@ -44,38 +46,39 @@ fn joint_distance(detected: Detected, body: &Body, world_from_limb: &[Pose], joi
     [apart, spread].map(|sum| sum / count.max(1.0))
 }
 
-/// What detections said of a track.
+/// Evidence of detections about a track, and when the detector is due.
 #[derive(Debug, Default)]
 pub(super) struct DetectionCheck {
-    /// The tracker found it by itself: nobody said where it is.
+    /// The track was auto-initialized by the detector.
     auto_initialized: bool,
-    /// When it was started, seconds.
+    /// Stamp of the start, seconds.
     since: Option<f64>,
-    /// When a detector looked last, and when it did for more than a limb in doubt, seconds; whether it does so in this frame.
+    /// Stamps of the last detection and of the last one that was compared with the pose, seconds; whether the detection of this
+    /// frame is compared.
     last_detection: Option<f64>,
     last_comparison: Option<f64>,
     compares: bool,
-    /// Whether the last look saw the person where somebody said it is.
+    /// Whether the last detection agreed with a start that was given by the user.
     agreed: bool,
-    /// Log odds that the person is elsewhere, and that what is tracked is none.
+    /// Log odds that the person is elsewhere, and that the tracked object is not a person.
     elsewhere: f64,
     false_track: f64,
-    /// Since when the body has been lost, seconds.
+    /// Stamp since which the body has been lost, seconds.
     lost_since: Option<f64>,
 }
 
 impl DetectionCheck {
-    /// A new track.
+    /// Resets the check for a new track.
     pub(super) fn restart(&mut self) {
         *self = Self::default();
     }
 
-    /// Whether nobody said where it is.
+    /// Whether the track was auto-initialized by the detector.
     pub(super) fn set_auto_initialized(&mut self, auto_initialized: bool) {
         self.auto_initialized = auto_initialized;
     }
 
-    /// Whether nobody said where it is.
+    /// Whether the track was auto-initialized by the detector.
     pub(super) fn is_auto_initialized(&self) -> bool {
         self.auto_initialized
     }
@@ -85,21 +88,21 @@ impl DetectionCheck {
         self.since.is_none_or(|since| stamp - since < NEW_TRACK_AGE)
     }
 
-    /// Whether what a detector sees in this frame is weighed against the pose. Of a young track only some looks are, since it may
-    /// start anew by them and forget how it moved; the others are for limbs in doubt.
+    /// Whether the detection of this frame is compared with the pose. For a new track only some detections are, because a
+    /// comparison may restart the track and discard its motion; the other detections are for suspect limbs.
     pub(super) fn compares(&self) -> bool {
         self.compares
     }
 
-    /// Counts a frame; whether a detector shall look at it. `limb_suspect`: a limb is not where it should be; `pose_uncertain`: it is in doubt if
-    /// one is; `lost`: the body is.
+    /// Counts a frame and returns whether the detector is due. `limb_suspect`: a limb is not supported in its pose;
+    /// `pose_uncertain`: it is uncertain whether one is; `lost`: the body is lost.
     pub(super) fn is_due(&mut self, stamp: f64, limb_suspect: bool, pose_uncertain: bool, lost: bool) -> bool {
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
         let waited = |last_detection: Option<f64>, every: f64| {
             last_detection.is_none_or(|last_detection| stamp - last_detection >= every)
         };
-        // A given start that was seen right is looked after half as often.
+        // A given start that a detection confirmed is checked half as often.
         let after = if self.agreed && !lost { 2.0 * EVERY } else { EVERY };
         let comparison_due = new_track && waited(self.last_comparison, after);
         let every = if pose_uncertain || lost { EVERY } else { NEW_TRACK_AGE };
@@ -114,8 +117,8 @@ impl DetectionCheck {
         due
     }
 
-    /// Weighs a detection against the pose, world frame: by the trunk, and by legs and arms of a `new_track` track or one
-    /// `among` several; what it says.
+    /// Compares a detection with the pose, world frame: by the trunk, and for a new track (`new_track`) or one `among` several
+    /// also by legs and arms.
     pub(super) fn compare(
         &mut self,
         detected: Detected,
@@ -146,8 +149,8 @@ impl DetectionCheck {
         DetectionVerdict::Consistent
     }
 
-    /// Notes what a frame said: whether the body was lost, and what a detector says of what stands where it is tracked. Whether
-    /// there is nobody any more.
+    /// Updates with a frame: whether the body was lost, and the log odds that the object at the tracked position is a person.
+    /// Returns whether the person is gone.
     pub(super) fn person_gone(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
         self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
         if let Some(person) = verdict {
@@ -157,7 +160,7 @@ impl DetectionCheck {
             || self.auto_initialized && self.lost_since.is_some_and(|since| stamp - since >= NEW_TRACK_AGE)
     }
 
-    /// What was seen elsewhere was tried.
+    /// Resets the evidence after the detected position was tried.
     pub(super) fn reset_elsewhere(&mut self) {
         self.elsewhere = 0.0;
     }

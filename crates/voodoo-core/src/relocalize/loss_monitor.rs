@@ -1,50 +1,51 @@
-//! How long a body has been lost, and for how long it is looked after once it is back.
+//! Counts for how long a body has been lost, and monitors it for a while after recovery.
 
 use super::detection_check::NEW_TRACK_AGE;
 use super::occlusion::Occlusion;
 use crate::hypotheses::PATIENCE;
 
-/// What a frame said of the body.
+/// Outcome of a frame for the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FrameOutcome {
     /// Time of the frame, seconds.
     pub stamp: f64,
     /// The body is lost.
     pub lost: bool,
-    /// It is tracked, neither lost nor degraded.
+    /// The body is tracked, neither lost nor degraded.
     pub tracked: bool,
-    /// Depth cameras that have been there gave no image: no sign that the body went.
+    /// Known depth cameras gave no image, so the frame is no evidence that the body left.
     pub silent: bool,
 }
 
-/// How long the body has been lost, and until when it is looked after.
+/// For how long the body has been lost, and until when it is monitored after recovery.
 #[derive(Debug, Default)]
 pub(super) struct LossMonitor {
-    /// Frames in a row in which it was lost.
+    /// Number of consecutive frames in which the body was lost.
     lost: usize,
-    /// Until when a body that is back is looked after, seconds.
+    /// Stamp until which a recovered body is monitored, seconds.
     until: Option<f64>,
-    /// What stands before it.
+    /// What occludes the body.
     pub(super) occlusion: Occlusion,
 }
 
 impl LossMonitor {
-    /// The body was set anew: nothing is lost.
+    /// Resets the monitor for a new track.
     pub(super) fn restart(&mut self) {
         *self = Self::default();
     }
 
-    /// In how many of the last frames the body was lost, from the one on in which that is no blur; `None` otherwise.
+    /// Returns for how many frames the lost body has been searched: the count starts at the frame from which on a loss is not
+    /// just a blurred image. `None` if the body is not searched for.
     pub(super) fn frames_searched(&self) -> Option<usize> {
         self.lost.checked_sub(PATIENCE)
     }
 
-    /// The body is back since a moment ago.
+    /// Whether the body recovered recently and is still monitored.
     pub(super) fn recently_recovered(&self) -> bool {
         self.until.is_some()
     }
 
-    /// Counts a frame.
+    /// Updates with the outcome of a frame.
     pub(super) fn observe(&mut self, outcome: FrameOutcome) {
         let FrameOutcome { stamp, lost, tracked, silent } = outcome;
         self.until = self.until.filter(|until| stamp < *until);

@@ -1,8 +1,7 @@
-//! Finding a body where a detector sees a person: one that nobody said where it is, a lost one, and one that is elsewhere than it
-//! is tracked.
+//! Finds a body at a detection: an auto-initialized body, a lost one, and one that is elsewhere than its track.
 //!
-//! The body is put there as the detector sees it and refined; it is taken where it explains the frame no worse by the score of all
-//! hypotheses and is not lost itself.
+//! The body is put at the detected pose and refined. The new pose is adopted if it explains the frame no worse, by the score of
+//! all hypotheses, and is not itself lost.
 
 mod detection_check;
 mod loss_monitor;
@@ -32,7 +31,7 @@ use tentative_detection::TentativeDetection;
 pub(crate) use tentative_detection::{DETECTION_COST, ENOUGH_ODDS, SAME_PERSON};
 use trials::Trials;
 
-/// Finds bodies. Remembers what a detector said, and how long the body has been lost.
+/// Finds bodies. Stores the evidence of past detections and for how long the body has been lost.
 #[derive(Debug, Default)]
 pub(crate) struct Relocalizer {
     loss: LossMonitor,
@@ -46,32 +45,32 @@ pub(crate) struct Relocalizer {
 }
 
 impl Relocalizer {
-    /// Takes the detector that finds this body.
+    /// Sets the detector that finds this body, or removes it.
     pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.people.set_detector(detector, body);
     }
 
-    /// The body's limbs or sites have changed.
+    /// Rebinds the detector after the body's limbs or sites have changed.
     pub(crate) fn bind(&mut self, body: &Body) {
         self.people.bind(body);
     }
 
-    /// What the detector's joints are on the body.
+    /// Returns the map from the detector's joints to the body.
     pub(crate) fn map(&self) -> &JointMap {
         self.people.map()
     }
 
-    /// Why the detector could not look, since [`Self::clear_error`].
+    /// The error of the detector, if it failed since [`Self::clear_error`].
     pub(crate) fn error(&self) -> Option<&DetectError> {
         self.people.error()
     }
 
-    /// Forgets the detector's last error.
+    /// Clears the detector's last error.
     pub(crate) fn clear_error(&mut self) {
         self.people.clear_error();
     }
 
-    /// Forgets everything that was remembered of an earlier track.
+    /// Clears everything that belongs to an earlier track.
     pub(crate) fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.loss.restart();
         self.check.restart();
@@ -86,12 +85,12 @@ impl Relocalizer {
         self.people.detects()
     }
 
-    /// A body of a detected person's sizes, or with `known` ones that the model has, and its poses, world frame.
+    /// Returns a body and its poses, world frame, for a detection: in the detected sizes, or with `known` in those of the model.
     pub(crate) fn place_body(&self, model: &Model, detected: Detected, known: bool) -> Option<(Body, Vec<Pose>)> {
         if known { Some((model.body.clone(), fit_pose(&model.body, detected)?)) } else { fit_body(model, detected) }
     }
 
-    /// Body and poses of the surest person in a frame.
+    /// Returns body and poses of the person with the highest log odds in a frame, once detections at one position confirm them.
     pub(crate) fn first_person(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
         self.people.detect(&model.body, frame, None, DetectionQuery::Any);
         let place = self.people.place()?;
@@ -102,18 +101,19 @@ impl Relocalizer {
         fit_body(model, self.people.detection()?)
     }
 
-    /// The track was started: `auto_initialized` where a detector saw somebody, and nobody had said where.
+    /// Records how the track was started: `auto_initialized` by the detector, or by the user.
     pub(crate) fn record_start(&mut self, auto_initialized: bool) {
         self.check.set_auto_initialized(auto_initialized);
         self.people.keep_floor(auto_initialized);
     }
 
-    /// The floor under a body that was found, where nobody tells it; world frame.
+    /// Returns the floor that the detector found under an auto-initialized body, world frame. It is used where the ground plane
+    /// is not given.
     pub(crate) fn floor(&self) -> Option<Ground> {
         self.people.floor
     }
 
-    /// Whether nobody had said where the track starts.
+    /// Whether the track was auto-initialized by the detector.
     pub(crate) fn is_auto_initialized(&self) -> bool {
         self.check.is_auto_initialized()
     }
@@ -123,8 +123,8 @@ impl Relocalizer {
         self.check.is_new(stamp)
     }
 
-    /// The pose of a body that fits best what a detector saw in this frame, world frame; the body is that of a start, or has the
-    /// sizes that the detector saw where they are surely others.
+    /// Returns the body and its poses, world frame, that fit best the detection of this frame. The body is `set`, the one of the
+    /// start, or has the detected sizes where these clearly differ.
     pub(crate) fn fit_detected(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {
         let detected = self.people.detection()?;
         if is_sized_like(set, detected, SIGMAS) {
@@ -133,13 +133,14 @@ impl Relocalizer {
         fit_body(model, detected)
     }
 
-    /// The pose in which a detector saw this body in this frame, world frame.
+    /// Returns the poses of this body that fit the detection of this frame, world frame.
     pub(crate) fn detected_pose(&self, body: &Body) -> Option<Vec<Pose>> {
         fit_pose(body, self.people.detection()?)
     }
 
-    /// Lets a detector look at a frame where that is due. `root` is where the body is expected, world frame; `limb_suspect`: a limb
-    /// was not where it should be in the frame before, or it is `pose_uncertain` whether one was, or the body `lost`.
+    /// Runs the detector on a frame where that is due. `root` is the expected position of the body, world frame. `limb_suspect`:
+    /// in the frame before, a limb was not supported in its pose; `pose_uncertain`: it was uncertain whether one was; `lost`: the
+    /// body was lost.
     pub(crate) fn detect(
         &mut self,
         body: &Body,
@@ -149,19 +150,20 @@ impl Relocalizer {
         pose_uncertain: bool,
         lost: bool,
     ) {
-        // A body that was found a moment ago may face the other way.
+        // A body that was just found may face the other way, so it is monitored closely.
         let often = lost || self.loss.recently_recovered();
         if self.check.is_due(frame.stamp, limb_suspect, pose_uncertain, often) && self.people.detects() {
             let query = if lost { DetectionQuery::Any } else { DetectionQuery::Near(root) };
             self.people.detect(body, frame, None, query);
-            // What stands before a hidden body is somebody else.
+            // A detection in front of a hidden body is another person.
             self.people.discard(|place| self.loss.occlusion.is_occluder(frame, place));
         } else {
             self.people.forget();
         }
     }
 
-    /// The same for one of several persons: good tracks are looked at, too, and who is lost is not looked for here.
+    /// Runs the detector for one of several persons where that is due. Good tracks are checked, too; lost persons are not
+    /// searched for here.
     pub(crate) fn detect_owned(
         &mut self,
         body: &Body,
@@ -178,22 +180,23 @@ impl Relocalizer {
         }
     }
 
-    /// What a detector saw in this frame counts for nothing.
+    /// Drops the detection of this frame.
     pub(crate) fn forget(&mut self) {
         self.people.forget();
     }
 
-    /// What a detector saw in this frame, if it looked.
+    /// Returns the detection of this frame, if there is one.
     pub(crate) fn detected(&self) -> Option<Detected<'_>> {
         self.people.detection()
     }
 
-    /// The pixels in which it saw it.
+    /// Returns the pixels of the detection.
     pub(crate) fn own_pixels(&self) -> Own<'_> {
         self.people.own_pixels()
     }
 
-    /// Notes what a frame shows where the body's joints are, the root's first, world frame: what hides the body is somebody else.
+    /// Updates the occlusion state with a frame and the positions of the body's joints, the root's first, world frame. What hides
+    /// the body is another person.
     pub(crate) fn observe_occlusion(
         &mut self,
         views: DepthViews,
@@ -204,8 +207,8 @@ impl Relocalizer {
         self.loss.occlusion.observe(views, joints, tracked, !lost);
     }
 
-    /// What a detector that looked at this frame says of a body at these poses, world frame; of a `new_track` track and of one `among`
-    /// several persons also of its arms and legs.
+    /// Compares the detection of this frame with a body at these poses, world frame. For a new track (`new_track`) and for one
+    /// `among` several persons, arms and legs are compared, too.
     pub(crate) fn compare(
         &mut self,
         body: &Body,
@@ -215,7 +218,7 @@ impl Relocalizer {
         among: bool,
     ) -> Option<DetectionVerdict> {
         let detected = self.people.detection().filter(|_| lost || self.check.compares())?;
-        // A lost body is where a person is seen for sure.
+        // A lost body is at a confirmed detection.
         Some(match lost {
             true if self.tentative.observe(self.people.place()) => DetectionVerdict::Elsewhere,
             true => DetectionVerdict::Inconsistent,
@@ -223,13 +226,13 @@ impl Relocalizer {
         })
     }
 
-    /// Whether nobody is there any more, as frames up to this one say: the body is `lost` for long, or no person.
+    /// Whether the person is gone, by the frames up to this one: the body has been `lost` for long, or the track is not a person.
     pub(crate) fn person_gone(&mut self, stamp: f64, lost: bool) -> bool {
         self.check.person_gone(stamp, lost, self.people.person_odds())
     }
 
-    /// The poses that a detector saw in this frame, refined, where they are no worse than the present ones; working frame. What
-    /// `fit` has matched is as before when it returns.
+    /// Returns the detected poses of this frame, refined, if they explain the frame no worse than the present ones; working
+    /// frame. The matches of `fit` are restored before it returns.
     pub(crate) fn try_detected(
         &mut self,
         context: Context,
@@ -244,10 +247,10 @@ impl Relocalizer {
         let (low, high) = (detected.detection.low - origin, detected.detection.high - origin);
         let margin = context.config.body_box_margin;
         let there = Aabb::new(low - Vec3::splat(margin), high + Vec3::splat(margin));
-        // What the present pose explains must not be left behind, unless it is `lost` there.
+        // Points that the present pose explains must not be left unexplained, unless the body is `lost` there.
         let here = if lost { there } else { body_box(&context.model.body, present, margin) };
         let bounds = Aabb::new(there.mins.min(here.mins), there.maxs.max(here.maxs));
-        // What was believed is tried now: the next time it has to be believed anew.
+        // The detection is tried now, so another trial needs new evidence.
         self.check.reset_elsewhere();
         self.tentative = TentativeDetection::default();
         fit.swap_matches(&mut self.matched);
@@ -265,12 +268,13 @@ impl Relocalizer {
         better.then(|| self.trials.poses())
     }
 
-    /// In how many of the last frames the body was lost, from the one on in which that is no blur; `None` otherwise.
+    /// Returns for how many frames the lost body has been searched: the count starts at the frame from which on a loss is not
+    /// just a blurred image. `None` if the body is not searched for.
     pub(crate) fn frames_searched(&self) -> Option<usize> {
         self.loss.frames_searched()
     }
 
-    /// Notes what a frame said of the body at these poses.
+    /// Updates with the outcome of a frame for the body at these poses.
     pub(crate) fn observe(&mut self, outcome: FrameOutcome, poses: &[Pose]) {
         self.loss.observe(outcome);
         if outcome.tracked {
@@ -278,8 +282,8 @@ impl Relocalizer {
         }
     }
 
-    /// Looks for a lost body that no detector sees; its poses where it explains the frame better than at `present`. What `fit` has
-    /// matched is as before when it returns.
+    /// Searches for a lost body that the detector cannot find. Returns its poses if it explains the frame better there than at
+    /// `present`. The matches of `fit` are restored before it returns.
     pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
         let (frame, origin) = (context.observation.frame(), context.observation.origin());
         if self.frames_searched().is_none() || self.people.detects() && !frame.images.is_empty() {
@@ -292,7 +296,7 @@ impl Relocalizer {
         let mut index = 0;
         while let Some(segment) = self.search.segment(index).filter(|_| !found) {
             index += 1;
-            // What stands before a hidden body is another one.
+            // A segment in front of a hidden body is another body.
             let other = self.loss.occlusion.is_occluder(frame, segment.center + origin);
             if other || !self.search.is_body_sized(&context.model.body, segment) {
                 continue;
@@ -315,8 +319,8 @@ mod tests {
     use super::*;
     use crate::testing::{depth, farthest, moved, put_board, standing, turned, with_context, without_background};
 
-    /// Where a lost body of another kind is in the frame after it was found, which was last tracked half a meter beside the
-    /// camera's axis.
+    /// Returns the poses of a lost body of another kind two frames after it was found. It was last tracked half a meter beside
+    /// the camera's axis.
     fn found(pixels: &[u16]) -> Option<Vec<Pose>> {
         let (model, poses) = standing();
         let present = moved(&poses, -0.5 * Vec3::X);
@@ -335,7 +339,7 @@ mod tests {
             relocalizer.observe(outcome(-0.2, true), &present);
             let mut found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
             assert_eq!(format!("{:?}", fit.correspondences()), before);
-            // The next two frames, which show the same.
+            // Two more frames with the same image.
             for _ in 0..2 {
                 found.iter_mut().for_each(|poses| {
                     let predicted = poses.clone();

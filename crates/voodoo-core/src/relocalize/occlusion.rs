@@ -1,4 +1,4 @@
-//! Whether something else stands before a tracked body: what hides it is somebody else, and not where it went.
+//! Detects occlusion of a tracked body: what hides the body is another person, not the body at a new position.
 
 use super::detection_check::NEW_TRACK_AGE;
 use crate::hypotheses::PATIENCE;
@@ -7,24 +7,25 @@ use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;
 use crate::visibility::LITTLE;
 
-/// What is so much nearer to a camera than a joint hides it, and than a body stands before it, meters: more than half of a body is
-/// thick.
+/// An object nearer to a camera than a joint by this occludes the joint, and one nearer than a body by this is in front of it,
+/// meters. The value exceeds half the thickness of a body.
 const IN_FRONT: f64 = 0.25;
 
-/// A body that is hidden, or was a moment ago.
+/// Occlusion state of a body that is hidden or was recently.
 #[derive(Debug, Default)]
 pub(super) struct Occlusion {
-    /// Frames in which it was seen where it was thought to be.
+    /// Number of frames in which the body was observed in its pose.
     visible_frames: usize,
-    /// When it was hidden the last time, seconds, and where it stood before or was tracked since, world frame.
+    /// Stamp of the last occlusion, seconds, and the position of the body before it, or tracked since then; world frame.
     last: Option<(f64, Vec3)>,
-    /// Where it is thought to be now: hidden, it may go on.
+    /// Current position of the track; a hidden body may keep moving.
     now: Vec3,
 }
 
 impl Occlusion {
-    /// Notes what a frame shows where a body's joints are, the root's first, world frame; whether it is `tracked`, or at least seen.
-    /// Furniture hides it, too, but nobody would take that for the body.
+    /// Updates with a frame and the positions of a body's joints, the root's first, world frame; `tracked` and `visible` say
+    /// whether the body is tracked, or at least not lost. Furniture in the background may also hide the body, but is ignored
+    /// because it is never taken for the body.
     pub(super) fn observe(
         &mut self,
         views: DepthViews,
@@ -44,10 +45,10 @@ impl Occlusion {
         let stamp = views.frame.stamp;
         let Some(root) = root else { return };
         self.now = root;
-        // Its own arms hide little of it.
+        // The body's own arms occlude only few of its joints.
         if f64::from(occluded) >= LITTLE * f64::from(all) {
             let place = self.last.map_or(root, |(_, place)| place);
-            // Only what was seen can be hidden: a start that was given wrongly may lie behind the body.
+            // Only a body that was observed can be occluded: a wrong start may lie behind the body.
             self.last = (self.visible_frames >= PATIENCE).then_some((stamp, place));
             return;
         }
@@ -56,7 +57,7 @@ impl Occlusion {
         self.last = last.map(|(last, place)| (last, if tracked { root } else { place }));
     }
 
-    /// Whether what is seen at a place of the world stands before the hidden body, or before where that went.
+    /// Whether an object at a world position is in front of the hidden body, at its last observed or its current position.
     pub(super) fn is_occluder(&self, frame: &Frame, place: Vec3) -> bool {
         let Some((_, own)) = self.last else { return false };
         frame.images.iter().any(|image| {
@@ -85,7 +86,7 @@ mod tests {
         put_board(&mut covered, root - 0.8 * Vec3::Z, [0.3, 0.9]);
         let mut occlusion = Occlusion::default();
         let (nothing, mut scene) = (Backgrounds::default(), Backgrounds::default());
-        // At which places somebody hides the body after a frame: beside it, behind it, before it.
+        // Which objects count as occluders after a frame: beside, behind and in front of the body.
         let mut after = |pixels: &[u16], stamp: f64, tracked: bool| {
             with_frame(pixels, stamp, |frame| {
                 occlusion.observe(views(frame, &nothing), poses.iter().map(|pose| pose.translation), tracked, tracked);
@@ -105,7 +106,7 @@ mod tests {
             );
         }
         assert_eq!(after(&open, 0.3 + NEW_TRACK_AGE, true), [false; 3], "long ago");
-        // Where it goes on to while it is hidden counts as well, and furniture does not.
+        // The position that the body moves to while it is hidden counts as well; furniture does not.
         let beyond = moved(&poses, 0.3 * Vec3::Z);
         with_frame(&covered, 2.6, |frame| {
             scene.start(frame, |_, _| {});
@@ -117,7 +118,7 @@ mod tests {
                 assert_eq!(occlusion.is_occluder(frame, root - 0.2 * Vec3::Z), by);
             }
         });
-        // Its own depth hides no body.
+        // A body does not occlude itself by its own thickness.
         let near = before_wall(&model.body, &moved(&poses, -0.15 * Vec3::Z));
         assert_eq!(after(&near, 3.0, true), [false; 3]);
     }

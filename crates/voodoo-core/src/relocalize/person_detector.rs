@@ -1,5 +1,5 @@
-//! What a detector reports of the person who is tracked, or of anybody where nobody is: where to start, where a lost body is, and
-//! whether a track is what it is taken for.
+//! Detections of the tracked person, or of any person while there is none: for the start of a track, for recovery of a lost body,
+//! and to verify a track.
 
 use super::detection_check::ELSEWHERE;
 use crate::body::Body;
@@ -11,26 +11,26 @@ use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 
-/// Asks the detector, and keeps what it last saw.
+/// Runs the detector and stores its last detection.
 #[derive(Debug, Default)]
 pub(super) struct PersonDetector {
     detector: BoundDetector,
     detection: Option<PlacedDetection>,
-    /// The image that shows it.
+    /// Number of the image with the detection.
     image: usize,
-    /// Log odds that what stands at the place that was looked at is a person; the surest of all images.
+    /// Log odds that the object at the queried position is a person; the largest over all images.
     person_odds: Option<f64>,
-    /// The floor on which it stood when it was found, world frame.
+    /// The floor on which the body stood when it was found, world frame.
     pub(super) floor: Option<Ground>,
 }
 
 impl PersonDetector {
-    /// Takes a detector for this body.
+    /// Sets the detector for this body, or removes it.
     pub(super) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>, body: &Body) {
         self.detector.set(detector, body);
     }
 
-    /// The body has changed.
+    /// Rebinds the detector after the body has changed.
     pub(super) fn bind(&mut self, body: &Body) {
         self.detector.bind(body);
     }
@@ -40,58 +40,59 @@ impl PersonDetector {
         self.detector.knows()
     }
 
-    /// What the detector's joints are on the body.
+    /// Returns the map from the detector's joints to the body.
     pub(super) fn map(&self) -> &JointMap {
         self.detector.map()
     }
 
-    /// Why the detector could not look, since [`Self::clear_error`].
+    /// The error of the detector, if it failed since [`Self::clear_error`].
     pub(super) fn error(&self) -> Option<&DetectError> {
         self.detector.error()
     }
 
-    /// Forgets the detector's last error.
+    /// Clears the detector's last error.
     pub(super) fn clear_error(&mut self) {
         self.detector.clear_error();
     }
 
-    /// What was seen in this frame.
+    /// Returns the detection of this frame, if there is one.
     pub(super) fn detection(&self) -> Option<Detected<'_>> {
         self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
     }
 
-    /// The root of the body and the log odds that it is a person, as seen in this frame.
+    /// Returns the root position of the detection of this frame, and the log odds that it is a person.
     pub(super) fn place(&self) -> Option<(Vec3, f64)> {
         self.detection.as_ref().map(|detection| (detection.root, detection.detection.person))
     }
 
-    /// Keeps the floor on which what was seen stands, if it was `found` there; else forgets it.
+    /// Stores the floor under the detection if the track was `found` by the detector; clears it otherwise.
     pub(super) fn keep_floor(&mut self, found: bool) {
         self.floor = self.detection().filter(|_| found).and_then(floor_under);
     }
 
-    /// The pixels that show it.
+    /// Returns the pixels of the detection.
     pub(super) fn own_pixels(&self) -> Own<'_> {
         let pixels = self.detection.as_ref().map_or(&[][..], |detection| &detection.detection.pixels);
         Own { image: self.image, pixels }
     }
 
-    /// Log odds that what stands where the person was expected is a person, if anything of that size does.
+    /// Returns the log odds that the object at the expected position is a person, if there is an object of that size.
     pub(super) fn person_odds(&self) -> Option<f64> {
         self.person_odds
     }
 
-    /// Forgets what was seen.
+    /// Clears the detection.
     pub(super) fn forget(&mut self) {
         (self.detection, self.person_odds) = (None, None);
     }
 
-    /// Forgets who was seen where it is not the person: the place of its root, world frame.
+    /// Drops the detection if `not_there` holds for its root position, world frame.
     pub(super) fn discard(&mut self, not_there: impl Fn(Vec3) -> bool) {
         self.detection = self.detection.take().filter(|detection| !not_there(detection.root));
     }
 
-    /// Looks for a body in all depth images of a frame, or in its share of them; keeps the surest person.
+    /// Runs the detector on all depth images of a frame, or on the owned pixels of each; keeps the detection with the highest log
+    /// odds.
     pub(super) fn detect(
         &mut self,
         body: &Body,
@@ -119,7 +120,8 @@ impl PersonDetector {
     }
 }
 
-/// The floor on which a detected person stands; a table below which their feet are is none.
+/// Returns the floor on which a detected person stands. A plane at another height than the ankles, such as a table, is not the
+/// floor.
 fn floor_under(detection: Detected) -> Option<Ground> {
     detection.detection.floor.filter(|floor| {
         let above = detection.ankles().map(|ankle| floor.normal.dot(ankle.position) - floor.offset);

@@ -1,5 +1,6 @@
-//! A lost body that no detector can see, since it is of another kind or there is no depth image: it is looked for at everything of
-//! its size that hangs together and is no background, as it was last tracked and turned about the vertical.
+//! Searches for a lost body without a detection, because the detector does not know its kind or there is no depth image. The body
+//! is tried at every connected foreground segment of its size, in its last tracked pose and in rotations of that about the
+//! vertical.
 
 use super::trials::Trials;
 use crate::body::Body;
@@ -9,37 +10,37 @@ use crate::math::{Pose, Quat, Vec3};
 use crate::observation::candidates::body_box;
 use crate::observation::segments::{Segment, Segments};
 
-/// What a search remembers, and its working memory.
+/// The state of the search, and its working memory.
 #[derive(Debug, Default)]
 pub(super) struct SegmentSearch {
     pub(super) segments: Segments,
-    /// Poses as last tracked, or as they were set.
+    /// The last tracked poses, or those that were set.
     tracked: Vec<Pose>,
     turned: Vec<Pose>,
     best: Vec<Pose>,
 }
 
 impl SegmentSearch {
-    /// Remembers a tracked body.
+    /// Stores the poses of a tracked body.
     pub(super) fn remember(&mut self, poses: &[Pose]) {
         self.tracked.clear();
         self.tracked.extend_from_slice(poses);
     }
 
-    /// One of the segments, the largest first.
+    /// Returns a segment by its index; the largest comes first.
     pub(super) fn segment(&self, index: usize) -> Option<Segment> {
         self.segments.found().get(index).copied()
     }
 
-    /// Whether a segment is as long as the body, or half or twice that.
+    /// Whether the longest side of a segment is between half and twice that of the body.
     pub(super) fn is_body_sized(&self, body: &Body, segment: Segment) -> bool {
         let length = body_box(body, &self.tracked, 0.0).extents().max_element();
         let extent = (segment.high - segment.low).max_element();
         extent > 0.5 * length && extent < 2.0 * length
     }
 
-    /// Whether the body is at a segment, whose points are the candidates of `context`, rather than at `present`; `trials` has its
-    /// poses then.
+    /// Tries the body at a segment, whose points are the candidates of `context`. Returns whether it is there rather than at
+    /// `present`; `trials` then has its poses.
     pub(super) fn try_segment(
         &mut self,
         segment: Segment,
@@ -61,7 +62,7 @@ impl SegmentSearch {
             turned.clear();
             turned.extend(tracked.iter().map(|pose| moved * *pose));
             let stray = trials.stray_fraction(context, turned);
-            // Of two that explain as much the one that turns less.
+            // Of two rotations that explain equally many points, the smaller one is kept.
             if stray < least {
                 least = stray;
                 std::mem::swap(best, turned);

@@ -1,15 +1,17 @@
-//! Whether what a detector sees is a person: looks at one place, one after the other, add up until they are enough.
+//! Confirms a detection as a person: the log odds of successive detections at one position add up until they suffice.
 
 use crate::math::Vec3;
 
-/// From this sum of log odds on it is a person, or one is elsewhere; no detection of a tracked one counts for more.
+/// Sum of log odds from which on a detection is confirmed as a person, or as being elsewhere than the track. No single detection
+/// of a tracked person contributes more.
 pub(crate) const ENOUGH_ODDS: f64 = 4.0;
-/// What a look counts less than its log odds: looks at a thing that stands still err alike.
+/// Amount subtracted from the log odds of every detection, because the errors of successive detections of a static object are
+/// correlated.
 pub(crate) const DETECTION_COST: f64 = 1.0;
-/// What is seen within this of the last place is the same, meters; what appears farther away is another one.
+/// Detections within this distance of the last position are of the same person, meters; farther ones are of another.
 pub(crate) const SAME_PERSON: f64 = 0.5;
 
-/// What past looks said.
+/// Log odds accumulated over detections at one position.
 #[derive(Debug, Default)]
 pub(super) struct TentativeDetection {
     place: Vec3,
@@ -17,10 +19,11 @@ pub(super) struct TentativeDetection {
 }
 
 impl TentativeDetection {
-    /// Takes a frame's look in: where a person's root is, and the log odds that it is one. Whether it is a person now.
+    /// Updates with a detection: the root position of a person, and the log odds that it is one. Returns whether the person is
+    /// confirmed.
     pub(super) fn observe(&mut self, detection: Option<(Vec3, f64)>) -> bool {
         let Some((place, person)) = detection else {
-            // What flickers is forgotten.
+            // Intermittent detections are gradually discarded.
             self.sum *= 0.5;
             return false;
         };
@@ -36,7 +39,7 @@ impl TentativeDetection {
 mod tests {
     use super::*;
 
-    /// At which of these looks, log odds and place, a person is believed.
+    /// Returns the index of the detection, given as log odds and position, at which the person is confirmed.
     fn confirmed(detections: &[Option<(f64, f64)>]) -> Option<usize> {
         let mut tentative = TentativeDetection::default();
         detections.iter().position(|given| tentative.observe(given.map(|(person, x)| (Vec3::new(x, 0.0, 1.0), person))))

@@ -1,4 +1,4 @@
-//! Whether a body stands where a detector sees it: refined there, it explains what is seen no worse.
+//! Tries a body at a detection: after refinement there it must explain the points no worse than the present pose.
 
 use crate::body::Model;
 use crate::fit::{Context, Fit};
@@ -8,33 +8,33 @@ use crate::hypotheses::{
 use crate::math::{Pose, Vec3, WeightedPoints};
 use crate::visibility::evidence::EXPLAINED;
 
-/// Working memory.
+/// Working memory of a trial.
 #[derive(Debug, Default)]
 pub(super) struct Trials {
-    /// Some of the points there, and their distances to the body.
+    /// A sample of the candidates, and their distances to the body.
     sample: WeightedPoints,
     nearest: Vec<f32>,
     distances: Vec<f32>,
-    /// The poses that are tried, and where they started.
+    /// The poses under trial, and their start.
     poses: Vec<Pose>,
     predicted: Vec<Pose>,
 }
 
 impl Trials {
-    /// The poses that were tried last.
+    /// Returns the poses of the last trial.
     pub(super) fn poses(&self) -> &[Pose] {
         &self.poses
     }
 
-    /// Tries the body where a detector saw it, with the points there as the candidates of `context`; whether it explains them no
-    /// worse than the present pose does.
+    /// Tries the body at a detected pose, with the points there as the candidates of `context`. Returns whether it explains them
+    /// no worse than the present pose does.
     pub(super) fn try_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
-        // Depth hardly tells a person's front from the back; the detector does.
+        // Depth is nearly symmetric front to back, so a detection may override a slightly better score.
         self.try_at(context, fit, present, place, SURE_GAIN)
     }
 
-    /// Tries the body at a place; whether it explains the points there no worse than the present pose does, or by less than
-    /// `turning` worse where it faces the other way.
+    /// Tries the body at the poses `place`. Returns whether it explains the points there no worse than the present pose does, or
+    /// by less than `turning` worse where it faces the other way.
     pub(super) fn try_at(
         &mut self,
         context: Context,
@@ -56,7 +56,7 @@ impl Trials {
         pose_score(context, fit, &self.poses) < allowed && stray < CLUTTER
     }
 
-    /// Share of some of the points there that lie far from a body.
+    /// Returns the fraction of a sample of the candidates that lies far from the body.
     pub(super) fn stray_fraction(&mut self, context: Context, poses: &[Pose]) -> f64 {
         let Self { sample, nearest, distances, .. } = self;
         let candidates = context.observation.candidates;
@@ -71,7 +71,7 @@ impl Trials {
         stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
     }
 
-    /// Refines `poses` in some ICP steps; `fit` then holds their matches.
+    /// Refines `poses` by a few ICP steps; `fit` then holds their matches.
     fn refine(&mut self, context: Context, fit: &mut Fit) {
         let Self { poses, predicted, .. } = self;
         predicted.clone_from(poses);
@@ -82,13 +82,13 @@ impl Trials {
     }
 }
 
-/// The score of all hypotheses, and what named sites and the other joints say.
+/// Returns the score of all hypotheses plus the costs of named sites and of the other joints.
 fn pose_score(context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
     let matched = fit.matched(poses);
     overall_cost(context, matched).total + body_landmark_cost(matched) + other_joints_strain(context.model, poses)
 }
 
-/// Cost of the broken limits of joints that belong to no arm or leg, or end one: a foot that points backwards.
+/// Returns the cost of violated limits at joints that are not inside an arm or leg, for example of a foot that points backwards.
 fn other_joints_strain(model: &Model, poses: &[Pose]) -> f64 {
     let inner = |limb: usize| model.extremities.iter().any(|chain| limb == chain.upper || limb == chain.lower);
     let others = (1..poses.len()).filter(|limb| !inner(*limb));

@@ -1,4 +1,4 @@
-//! A cheap distance, for choosing the limb of a point.
+//! A fast approximate distance, used to choose the limb of a point.
 
 use super::TaperedEllipticCylinder;
 use crate::math::{Mat3, Points, Pose, Vec3, widest};
@@ -6,9 +6,9 @@ use crate::math::{Mat3, Points, Pose, Vec3, widest};
 impl TaperedEllipticCylinder {
     /// An approximate signed distance from `q` to the closed surface, limb frame, meters, negative inside.
     ///
-    /// To the side it is the first-order distance `(ρ - 1) / |∇ρ|` of the level function `ρ = sqrt((x/a(z))² + (y/b(z))²)`,
-    /// exact to about 1 mm (95 % of points within 5 cm of limb-like shapes); beyond a cap it is joined with the height above
-    /// the cap. No iteration; only the order of limbs should depend on it.
+    /// To the side it is the first-order distance `(ρ - 1) / |∇ρ|` of the level function `ρ = sqrt((x/a(z))² + (y/b(z))²)`, with
+    /// an error of approximately 1 mm (95 % of points within 5 cm of limb-like shapes). Beyond a cap it is combined with the
+    /// height above the cap. It needs no iteration. Use it only to rank limbs.
     pub fn approximate_distance(&self, q: Vec3) -> f64 {
         let (a, b) = self.semi_axes(q.z);
         let tiny = 1e-9;
@@ -24,7 +24,7 @@ impl TaperedEllipticCylinder {
             -(u * u * (self.a1 - self.a0) * inv_a + v * v * (self.b1 - self.b0) * inv_b) * rate
         };
         let gradient = Vec3::new(u * inv_a, v * inv_b, climb).length();
-        // The level function has a cusp on the axis, where the distance is the lesser semi-axis.
+        // The level function has a cusp on the axis, where the distance is the smaller semi-axis.
         let side = if gradient > 0.0 { ((rho - 1.0) * rho / gradient).max(-a.min(b)) } else { -a.min(b) };
         if above <= 0.0 {
             side.max(above)
@@ -34,7 +34,7 @@ impl TaperedEllipticCylinder {
         }
     }
 
-    /// [`Self::approximate_distance`] of every query in the frame `world`, in single precision, into `out`.
+    /// [`Self::approximate_distance`] for every query in the frame `world`, in single precision, into `out`.
     pub(crate) fn approximate_distances(&self, world_from_limb: &Pose, queries: &Points, out: &mut Vec<f32>) {
         out.resize(queries.len(), 0.0);
         let rough = Rough::new(self, world_from_limb);
@@ -50,12 +50,12 @@ impl TaperedEllipticCylinder {
     }
 }
 
-/// What the single-precision distance needs of shape and pose.
+/// Shape and pose as needed by the single-precision distance.
 struct Rough {
-    /// Rows of the rotation, and the shift, from the world to the limb.
+    /// Rows of the rotation and the translation from the world to the limb frame.
     rows: [[f32; 4]; 3],
     length: f32,
-    /// Semi-axes at the proximal end, and their growth by the meter.
+    /// Semi-axes at the proximal end, and their change per meter.
     start: [f32; 2],
     growth: [f32; 2],
 }

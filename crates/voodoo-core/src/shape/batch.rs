@@ -1,4 +1,4 @@
-//! Closest points of many queries at once.
+//! Closest points of batches of queries.
 
 use super::closest::ONE_BASIN;
 use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
@@ -8,7 +8,8 @@ use crate::math::has_avx512;
 use crate::math::{LANES, Points, Pose, Vec3};
 use std::ops::Range;
 
-/// Largest [`TaperedEllipticCylinder::aspect_change`] at which the f32 kernel is trusted in what it settles: no error beyond a micrometer in a million queries at 0.4.
+/// Largest [`TaperedEllipticCylinder::aspect_change`] at which results that the f32 kernel marks as settled are accepted: at 0.4
+/// no error was above a micrometer in a million queries.
 const SETTLED: f64 = 0.2;
 
 /// Closest points of a batch of queries, in the frame of the queries; index i belongs to query i.
@@ -20,7 +21,7 @@ pub struct SurfaceBatch {
     pub normals: Points,
     /// Distances, meters, negative inside.
     pub signed_distance: Vec<f32>,
-    /// Faces, [`Region`](super::Region) as a number; read them with [`Region::from_u8`](super::Region::from_u8).
+    /// Faces: [`Region`](super::Region) as a number, decoded by [`Region::from_u8`](super::Region::from_u8).
     pub region: Vec<u8>,
 }
 
@@ -35,7 +36,7 @@ impl SurfaceBatch {
         self.region.is_empty()
     }
 
-    /// Makes room for `len` results in all.
+    /// Reserves memory for `len` results in total.
     pub fn reserve(&mut self, len: usize) {
         self.points.reserve(len);
         self.normals.reserve(len);
@@ -61,12 +62,13 @@ impl SurfaceBatch {
 }
 
 impl TaperedEllipticCylinder {
-    /// [`Self::closest_point`] of every query, queries and results in the frame `world`.
+    /// [`Self::closest_point`] for every query; queries and results in the frame `world`.
     ///
-    /// Single precision on SIMD lanes, within 1 µm of the exact answer for queries within 1.5 m of the limb in a frame a few
-    /// meters wide. What the fixed number of Newton steps does not settle (queries near the medial axis, on a rim, not
-    /// finite; shapes whose end ellipses differ in aspect, or one of which is nearly a tip) is redone in double precision. A result depends on its query, shape
-    /// and pose only, not on its place in the batch. `out` is resized; nothing is allocated once it is large enough.
+    /// Computed in single precision on SIMD lanes, within 1 µm of the exact answer for queries within 1.5 m of the limb in a
+    /// frame a few meters wide. Some queries are not settled by the fixed number of Newton steps: those near the medial axis, on
+    /// a rim or not finite, and those to shapes whose end ellipses differ in aspect or one of which is nearly a tip. They are
+    /// computed again in double precision. A result depends on its query, shape and pose only, not on its position in the batch.
+    /// `out` is resized; nothing is allocated once it is large enough.
     pub fn closest_points(&self, world_from_limb: &Pose, queries: &Points, out: &mut SurfaceBatch) {
         self.closest_points_range(world_from_limb, queries, 0..queries.len(), out);
     }
@@ -74,7 +76,7 @@ impl TaperedEllipticCylinder {
     /// [`Self::closest_points`] of the queries in `range` only; result 0 belongs to query `range.start`.
     ///
     /// # Panics
-    /// When the range does not lie within the queries.
+    /// If the range does not lie within the queries.
     pub fn closest_points_range(
         &self,
         world_from_limb: &Pose,
@@ -94,7 +96,7 @@ impl TaperedEllipticCylinder {
             return;
         }
         let constants = Constants::new(self, world_from_limb);
-        // More than half a block takes less time as a whole one than as short ones.
+        // More than half a block takes less time as a whole block than as short ones.
         let rest = xs.len() % BLOCK;
         let whole = if 2 * rest > BLOCK { xs.len() } else { xs.len() - rest };
         let queries = [xs, ys, zs];
@@ -106,10 +108,10 @@ impl TaperedEllipticCylinder {
     }
 }
 
-// So many are decided side by side in double precision.
+// This many queries are processed side by side in double precision.
 const _: () = assert!(SHORT <= LANES);
 
-/// Queries that wait until there are as many as are worked on side by side, and which they are.
+/// Queries, with their indices, that wait until there are enough to be processed side by side.
 struct Few {
     queries: Block<SHORT>,
     indices: [usize; SHORT],
@@ -121,7 +123,7 @@ impl Few {
         Self { queries: Block::ZERO, indices: [0; SHORT], count: 0 }
     }
 
-    /// Adds one; whether that makes them enough.
+    /// Adds a query; returns whether there are now enough.
     fn push(&mut self, index: usize, [x, y, z]: [f32; 3]) -> bool {
         let at = self.count;
         (self.queries.x[at], self.queries.y[at], self.queries.z[at], self.indices[at]) = (x, y, z, index);
@@ -130,26 +132,27 @@ impl Few {
     }
 }
 
-/// Queries to one shape in its pose, and where the results go.
+/// Queries to one shape in its pose, and the output of the results.
 struct Batch<'a> {
     shape: &'a TaperedEllipticCylinder,
     world_from_limb: &'a Pose,
     constants: Constants,
     out: &'a mut SurfaceBatch,
-    /// Left by few steps of single precision; left by more of them.
+    /// Queries not settled by few single-precision steps; those not settled by more steps.
     unsettled: Few,
     open: Few,
 }
 
 impl Batch<'_> {
-    /// Closest points of the queries in `range`, block by block; those in doubt go on in between, the last ones wait.
+    /// Closest points of the queries in `range`, block by block. Unsettled queries are processed whenever there are enough of
+    /// them; the last ones wait.
     fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: [&[f32]; 3], range: Range<usize>) {
         let mut block = Block::ZERO;
         let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
             let count = N.min(range.end - start);
             let span = start..start + count;
-            // The tail is padded with what the block held before, so every point meets the same instructions.
+            // The tail is padded with the block's previous contents, so that every point goes through the same instructions.
             load(&mut block.x, &queries[0][span.clone()]);
             load(&mut block.y, &queries[1][span.clone()]);
             load(&mut block.z, &queries[2][span.clone()]);
@@ -174,7 +177,7 @@ impl Batch<'_> {
         }
     }
 
-    /// Takes more steps in single precision with those that few did not settle.
+    /// Takes more single-precision steps for the queries that few steps did not settle.
     fn refine_unsettled(&mut self) {
         let mut found = BlockResult::ZERO;
         if self.unsettled.count > 0 {
@@ -193,7 +196,7 @@ impl Batch<'_> {
         self.unsettled.count = 0;
     }
 
-    /// Decides what is still open in double precision.
+    /// Computes the remaining queries in double precision.
     fn finish_exactly(&mut self) {
         let Self { shape, world_from_limb, out, open, .. } = self;
         let mut queries = [Vec3::ZERO; SHORT];
@@ -202,7 +205,7 @@ impl Batch<'_> {
         }
         let queries = &queries[..open.count];
         let mut decide = |at: usize, found: SurfacePoint| out.set(open.indices[at], &found, world_from_limb);
-        // All lanes take as long for one as for all of them: a few take less one by one.
+        // One query takes as long on the lanes as a full set; so a few queries are faster one by one.
         if 2 * open.count <= SHORT || shape.aspect_change() > ONE_BASIN {
             queries.iter().enumerate().for_each(|(at, query)| decide(at, shape.closest_point(*query)));
         } else {
@@ -216,7 +219,7 @@ fn in_limb(world_from_limb: &Pose, query: [f32; 3]) -> Vec3 {
     world_from_limb.inverse_transform_point(Vec3::from_array(query.map(f64::from)))
 }
 
-/// Copies a block, mostly a whole one: its size is then known to the compiler.
+/// Copies a block. Mostly it is a full one, whose size is then known to the compiler.
 #[inline(always)]
 fn load<const N: usize>(to: &mut [f32; N], from: &[f32]) {
     match from.first_chunk() {
@@ -266,7 +269,7 @@ fn kernel<const N: usize, const STEPS: usize>() -> Kernel<N> {
     closest_baseline::<N, STEPS>
 }
 
-/// The kernel for whatever the crate is compiled for; every aarch64 processor has fused multiply-add.
+/// The kernel for the target that the crate is compiled for; every aarch64 processor has fused multiply-add.
 fn closest_baseline<const N: usize, const STEPS: usize>(
     constants: &Constants,
     queries: &Block<N>,

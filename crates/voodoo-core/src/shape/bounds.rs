@@ -1,4 +1,4 @@
-//! Axis-aligned boxes, and spheres.
+//! Axis-aligned bounding boxes, and bounding spheres.
 
 use super::TaperedEllipticCylinder;
 use crate::math::{Aabb, Pose, Vec3};
@@ -27,7 +27,7 @@ impl TaperedEllipticCylinder {
         Aabb::new((start - first).min(end - last), (start + first).max(end + last))
     }
 
-    /// Middle and radius, meters, of a sphere around the solid in the frame `world`.
+    /// Center and radius, meters, of a sphere around the solid in the frame `world`.
     pub(crate) fn sphere(&self, world_from_limb: &Pose) -> (Vec3, f64) {
         let half = 0.5 * self.length;
         let radius = self.a0.max(self.a1).max(self.b0).max(self.b1);

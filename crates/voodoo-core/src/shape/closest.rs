@@ -26,10 +26,10 @@ const COSINES: [f64; SCAN + 1] = [
     0.09801714032956063,
     0.0,
 ];
-/// Least ratio of the semi-axes for which the scan is stretched towards the sharp tips of an ellipse.
+/// Minimum ratio of the semi-axes for which the scan is stretched towards the sharp tips of an ellipse.
 const SHARPEST: f64 = 1e-3;
 
-/// Least ratio of `g''/2` to `|P_θ|²` of a minimum that is taken for the only one; it falls to 0 at the medial axis.
+/// Minimum ratio of `g''/2` to `|P_θ|²` at which a minimum counts as distinct; the ratio falls to 0 at the medial axis.
 pub(super) const DISTINCT: f64 = 0.3;
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which a distinct minimum is the only one.
 pub(super) const ONE_BASIN: f64 = 0.05;
@@ -41,13 +41,13 @@ pub(super) fn folded(q: Vec3) -> Vec3 {
 impl TaperedEllipticCylinder {
     /// The closest point of the closed surface to `q`, limb frame, meters.
     ///
-    /// For a query folded to `x, y >= 0` the side asks for the least of `g(θ) = min_t |P(θ, t) - q|²` on a quadrant, where
-    /// `g'(0) <= 0 <= g'(π/2)`: Newton's iteration, kept in a bracket by bisection, always ends in a minimum. `g` has only
-    /// one when `a0 b1 = a1 b0` and no end is nearly a tip, and where these differ little and it is a distinct one; otherwise a scan
-    /// finds the basins first. The caps compete where the query projects into
-    /// them. Where several points are equally near (on the medial axis) one of them is returned.
+    /// For a query folded to `x, y >= 0`, the closest point of the side minimizes `g(θ) = min_t |P(θ, t) - q|²` on a quadrant,
+    /// where `g'(0) <= 0 <= g'(π/2)`. Newton's iteration, kept in a bracket by bisection, always ends in a minimum. `g` has only
+    /// one minimum when `a0 b1 = a1 b0` and no end is nearly a tip, and also when these products differ little and the minimum is
+    /// distinct. Otherwise a scan finds the basins first. The caps are compared where the query projects into them. Where several
+    /// points are equally near (on the medial axis), one of them is returned.
     ///
-    /// A query that is not finite gives a point and a distance that are not a number.
+    /// A query that is not finite gives a point and a distance that are NaN.
     pub fn closest_point(&self, q: Vec3) -> SurfacePoint {
         if !q.is_finite() {
             return SurfacePoint { point: Vec3::NAN, normal: Vec3::Z, signed_distance: f64::NAN, region: Region::Side };
@@ -56,8 +56,8 @@ impl TaperedEllipticCylinder {
         self.nearest_face(q, self.closest_on_side(folded, self.guessed(folded)))
     }
 
-    /// [`Self::closest_point`] when a first minimum is known, for shapes whose end ellipses differ little: where it is a
-    /// distinct one, the side has no other basin, and none is looked for.
+    /// [`Self::closest_point`] with a known first minimum, for shapes whose end ellipses differ little: if that minimum is
+    /// distinct, the side has no other basin, and no scan is done.
     pub(super) fn settled(&self, q: Vec3, guessed: Foot) -> SurfacePoint {
         if !q.is_finite() {
             return self.closest_point(q);
@@ -71,7 +71,7 @@ impl TaperedEllipticCylinder {
         minimum.bend >= DISTINCT * ((a * minimum.angle.s).powi(2) + (b * minimum.angle.c).powi(2))
     }
 
-    /// The closest point when that of the side is known: a cap may be nearer.
+    /// The closest point, given the closest point of the side: a cap may be nearer.
     fn nearest_face(&self, q: Vec3, side: Foot) -> SurfacePoint {
         let mut squared = side.squared;
         let mut cap = None;
@@ -112,7 +112,7 @@ impl TaperedEllipticCylinder {
         SurfacePoint { point, normal, signed_distance, region }
     }
 
-    /// Distance from `q` to the closed surface, limb frame, meters, negative inside. Exact.
+    /// Exact distance from `q` to the closed surface, limb frame, meters, negative inside.
     pub fn signed_distance(&self, q: Vec3) -> f64 {
         self.closest_point(q).signed_distance
     }
@@ -123,7 +123,7 @@ impl TaperedEllipticCylinder {
         if first == second { 0.0 } else { (first - second).abs() / (first + second) }
     }
 
-    /// True when neither end is nearly a tip. All θ meet in a tip, so `g` has a plateau where it is nearest.
+    /// Whether neither end is nearly a tip. All θ meet in a tip, so `g` has a plateau where the tip is nearest.
     pub(super) fn is_blunt(&self) -> bool {
         let (first, last) = (self.a0.max(self.b0), self.a1.max(self.b1));
         first.min(last) > 0.2 * first.max(last)
@@ -134,7 +134,7 @@ impl TaperedEllipticCylinder {
         self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q)
     }
 
-    /// The closest point of the side with its rims, for a query with `x, y >= 0` and what was guessed for it.
+    /// The closest point of the side with its rims, for a query with `x, y >= 0` and the minimum from its first guess.
     fn closest_on_side(&self, q: Vec3, guessed: Foot) -> Foot {
         let one_basin = self.aspect_change() <= ONE_BASIN && self.is_blunt();
         if one_basin && (self.aspect_change() < 1e-12 || self.is_distinct(&guessed)) {
@@ -147,7 +147,7 @@ impl TaperedEllipticCylinder {
         for (a, b) in [(self.a0, self.b0), (self.a1, self.b1)] {
             let ratio = a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
             if ratio < 0.5 {
-                // Equal steps of the normal's direction instead of θ: dense at the tips of a flat ellipse.
+                // Equal steps in the normal's direction instead of θ: dense at the tips of a flat ellipse.
                 let floor = SHARPEST * a.max(b);
                 let foot = self.scan(Some(Angle { c: a.max(floor), s: b.max(floor) }), q);
                 if foot.squared < best.squared {
@@ -188,7 +188,7 @@ impl TaperedEllipticCylinder {
     /// A starting angle: the direction `(x/a, y/b)` of the slice, then one step over the evolute of its ellipse.
     #[inline(always)]
     pub(super) fn guess(&self, q: Vec3) -> Angle {
-        // Not the very ends: a tip has no ellipse.
+        // Excludes the ends, because a tip has no ellipse.
         let (a, b) = self.semi_axes(q.z.clamp(0.1 * self.length, 0.9 * self.length));
         let near = Angle::from_vector(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });
         let focus = a * a - b * b;
@@ -199,7 +199,7 @@ impl TaperedEllipticCylinder {
         Angle::from_vector(start.c.max(1e-9), start.s.max(1e-9)).unwrap_or(near)
     }
 
-    /// The minimum of `g` between two angles by Newton's iteration with bisection, the best foot seen.
+    /// The minimum of `g` between two angles by Newton's iteration with bisection; returns the best foot found.
     fn refine(&self, mut low: Angle, start: Angle, mut high: Angle, q: Vec3) -> Foot {
         let scale = self.a0.max(self.a1).max(self.b0).max(self.b1);
         let mut foot = self.foot(start, q);

@@ -1,17 +1,17 @@
-//! The contour of the side as a camera sees it, in closed form.
+//! The contour of the side as observed by a camera, in closed form.
 //!
 //! With `a' = a1 - a0`, `b' = b1 - b0` and the camera's center `C` in the limb frame, the point `P(θ, t)` lies on the contour where
 //! the ray touches the surface, `(P - C) · (P_θ × P_t) = 0`:
 //! `L a b - L (b C_x cos θ + a C_y sin θ) + (C_z - L t) (a b' sin² θ + b a' cos² θ) = 0`.
-//! Where both axes taper alike (`m = a'/a = b'/b`), `cos(θ - θ0) = (1 + m (C_z - L t) / L) / hypot(C_x / a, C_y / b)` with
-//! `θ0 = atan2(C_y / b, C_x / a)`: two straight lines. Elsewhere that is where one Newton step starts.
+//! Where both axes taper equally (`m = a'/a = b'/b`), `cos(θ - θ0) = (1 + m (C_z - L t) / L) / hypot(C_x / a, C_y / b)` with
+//! `θ0 = atan2(C_y / b, C_x / a)`, which gives two straight lines. Otherwise this solution is the start of one Newton step.
 
 use super::TaperedEllipticCylinder;
 use crate::math::Vec3;
 
-/// Looking along the limb the two lines meet: beyond this cosine of their half angle, the contour is uncertain.
+/// When the camera looks along the limb, the two lines meet. Above this cosine of their half angle, the contour is uncertain.
 const ALONG: f64 = 0.98;
-/// Tapers that differ by less than this are alike.
+/// Tapers that differ by less than this count as equal.
 const ALIKE: f64 = 1e-9;
 
 /// A point of the contour, limb frame.
@@ -19,13 +19,13 @@ const ALIKE: f64 = 1e-9;
 pub(crate) struct ContourPoint {
     /// The point, meters.
     pub point: Vec3,
-    /// Outward normal of the surface there, any length above zero: the ray from the camera lies in the tangent plane.
+    /// Outward normal of the surface there, of any length above zero: the ray from the camera lies in the tangent plane.
     pub normal: Vec3,
 }
 
 impl TaperedEllipticCylinder {
-    /// The two points of the contour at the share `t` of the length, seen from `camera` (limb frame, meters); `None` where one
-    /// looks along the limb, or from within it. The first lies to the side of smaller angles about the axis.
+    /// The two points of the contour at the fraction `t` of the length, observed from `camera` (limb frame, meters). `None` if
+    /// the camera looks along the limb or is inside it. The first point is on the side of smaller angles about the axis.
     pub(crate) fn contour(&self, t: f64, camera: Vec3) -> Option<[ContourPoint; 2]> {
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
         let (a, b) = (self.a0 + t * da, self.b0 + t * db);
@@ -57,8 +57,9 @@ impl TaperedEllipticCylinder {
         }))
     }
 
-    /// The point of an end's rim at an angle given by its cosine and sine, and the direction of the rim there, where it is on
-    /// the contour seen from `camera` (limb frame, meters): one of the two faces that meet there is seen, the other is not.
+    /// The point of an end's rim at an angle given by its cosine and sine, and the direction of the rim there. `None` unless the
+    /// point is on the contour observed from `camera` (limb frame, meters): one of the two adjacent faces is visible, the other
+    /// is not.
     pub(crate) fn rim_contour(&self, distal: bool, [c, s]: [f64; 2], camera: Vec3) -> Option<[Vec3; 2]> {
         let (a, b, z) = if distal { (self.a1, self.b1, self.length) } else { (self.a0, self.b0, 0.0) };
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);
@@ -76,7 +77,7 @@ mod tests {
     use proptest::prelude::*;
 
     prop_compose! {
-        /// A limb whose aspect changes by up to 15 % and whose side is no steeper than 45 degrees, and a camera beside it.
+        /// A limb whose aspect changes by up to 15 % and whose side is at most 45 degrees steep, and a camera beside it.
         fn limb_and_camera()(length in 0.1..0.6, a0 in 0.03..0.2, aspect in 0.6..1.6, taper in 0.6..1.5, change in 0.85..1.15, away in 1.5..6.0, round in 0.0..std::f64::consts::TAU, rise in -0.6..0.6)
             -> (TaperedEllipticCylinder, Vec3) {
             let (b0, a1, b1) = (a0 * aspect, a0 * taper, a0 * aspect * taper * change);
@@ -87,11 +88,13 @@ mod tests {
         }
     }
 
-    /// How far a ray through a point of the contour may be from the tangent plane there, as a sine: what one Newton step leaves.
+    /// Bound of the angle between a ray through a point of the contour and the tangent plane there, as a sine: the error after
+    /// one Newton step.
     ///
-    /// With `f(θ)` the equation of the contour over `a b`, `u = |a'/a - b'/b| |C_z - L t| / L` how unlike the tapers are, and the
-    /// start as where they were alike, `f <= u / 2` there and `|f'| >= across sine - u`, so that the step is no longer than `h` and
-    /// leaves `max|f''| h² / 2`; the step is the tangent of an angle, which is shorter than it by `h³ / 3`. None: no step is told.
+    /// With `f(θ)` the equation of the contour divided by `a b`, `u = |a'/a - b'/b| |C_z - L t| / L` the difference of the
+    /// tapers, and the start at the solution for equal tapers: `f <= u / 2` there and `|f'| >= across sine - u`, so that the step
+    /// is at most `h` long and leaves `max|f''| h² / 2`. The step is the tangent of an angle, which is shorter than it by
+    /// `h³ / 3`. `None`: no bound for the step.
     fn newton_leaves(shape: &TaperedEllipticCylinder, t: f64, camera: Vec3, away: f64) -> Option<f64> {
         let (da, db) = (shape.a1 - shape.a0, shape.b1 - shape.b0);
         let (a, b) = (shape.a0 + t * da, shape.b0 + t * db);
@@ -101,14 +104,14 @@ mod tests {
         let slope = across * (1.0 - cosine * cosine).sqrt() - unlike;
         let h = 0.5 * unlike / slope;
         let bent = across * (cosine + h) + 2.0 * unlike;
-        // Where tapers are alike there is no step.
+        // With equal tapers there is no step.
         let exact = (da * b - db * a).abs() < ALIKE;
         let left = if exact { 0.5 * unlike } else { 0.5 * bent * h * h + (across + unlike) * h * h * h / 3.0 };
         (slope > 0.0).then(|| left * a.max(b) / away + 1e-12)
     }
 
-    /// An oracle that knows nothing of the formula: a ray that passes the contour's point a little outside misses the limb, one a
-    /// little inside hits it. The end caps are out of its way at mid-height.
+    /// A test oracle independent of the formula: a ray slightly outside the contour's point misses the limb, and one slightly
+    /// inside hits it. At mid-height the end caps do not interfere.
     fn check(shape: &TaperedEllipticCylinder, t: f64, camera: Vec3) -> Result<(), TestCaseError> {
         let Some(points) = shape.contour(t, camera) else { return Ok(()) };
         for found in points {
@@ -121,7 +124,7 @@ mod tests {
                 let towards = (found.point + off * normal - camera).normalize();
                 shape.cast_ray(camera, towards, f64::INFINITY).is_none()
             };
-            // On a cone seen aslant the ray may still touch nearer the thick end: a saddle is no wider than this.
+            // On a cone observed obliquely the ray may still touch nearer the thick end: a saddle is no wider than this.
             prop_assert!(!passes(-5e-4), "inside");
             prop_assert!(passes(5e-4), "outside");
         }
@@ -163,7 +166,8 @@ mod tests {
             };
             (0..8).filter(|k| limb_and_camera(*k)).count()
         };
-        // From the side, half of either rim bounds the picture; from ahead all of the nearer one does, as the sides are hidden.
+        // From the side, half of each rim bounds the image; from the axis direction all of the nearer rim does, because the sides
+        // are hidden.
         assert_eq!((rim(Vec3::new(3.0, 0.1, 0.2), true), rim(Vec3::new(3.0, 0.1, 0.2), false)), (4, 4));
         assert_eq!(rim(Vec3::new(0.0, 0.0, 0.41), true), 8);
     }

@@ -4,16 +4,17 @@ use super::closest::DISTINCT;
 use super::{RIM_NORMAL_DISTANCE, Region, TaperedEllipticCylinder};
 use crate::math::{Mat3, Pose, Vec3};
 
-/// Points of a whole block, and of the short ones at the end. The loop over a block has no branch and no bounds check, so it
-/// becomes SIMD of the target's width.
+/// Number of points in a full block; the blocks at the end are shorter. The loop over a block has no branch and no bounds check,
+/// so the compiler vectorizes it at the target's SIMD width.
 pub(super) const BLOCK: usize = 32;
 pub(super) const SHORT: usize = 8;
-/// Steps of Newton's iteration before the last one: of all points, and of the hundredth of them for which that is too few.
+/// Newton steps before the last one: for all points, and for the approximately one percent of them for which that is too few.
 pub(super) const FEW: usize = 1;
 pub(super) const MORE: usize = 3;
-/// Largest estimate of the foot's error, the square of the last Newton step times the size of the shape, meters, that passes.
+/// Largest accepted estimate of the foot's error, meters: the square of the last Newton step times the size of the shape.
 const FOOT_ERROR: f32 = 3e-8;
-/// Least ratio of `g''/2` to `|P_θ|²` that passes as well-conditioned: the error of the foot is that of the query divided by it.
+/// Minimum ratio of `g''/2` to `|P_θ|²` that counts as well-conditioned. The foot's error is the query's error divided by this
+/// ratio.
 const CONDITIONED: f32 = DISTINCT as f32;
 
 /// One block of points, structure of arrays.
@@ -38,7 +39,7 @@ pub(super) struct BlockResult<const N: usize> {
     pub normals: Block<N>,
     pub signed_distance: [f32; N],
     pub region: [u8; N],
-    /// Not zero where the exact path must decide.
+    /// Not zero where the exact path must compute the result.
     pub unsettled: [u8; N],
 }
 
@@ -52,16 +53,16 @@ impl<const N: usize> BlockResult<N> {
     };
 }
 
-/// What the kernel needs of shape and pose, in single precision.
+/// Shape and pose in single precision, as needed by the kernel.
 ///
-/// The limb's origin is split into `origin`, exact in f32, and `rest`, the remainder turned into the limb frame: the
-/// difference of query and origin is then rounded relative to the size of the limb, not to its place in the world.
+/// The limb's origin is split into `origin`, exact in f32, and `rest`, the remainder rotated into the limb frame. The difference
+/// of query and origin is then rounded relative to the size of the limb, not to its position in the world.
 pub(super) struct Constants {
     /// Columns of `world_from_limb`'s rotation.
     columns: [[f32; 3]; 3],
     origin: [f32; 3],
     rest: [f32; 3],
-    /// What the square of the last Newton step is multiplied with to bound the error it leaves, meters.
+    /// Factor of the square of the last Newton step that bounds the remaining error, meters.
     second_order: f32,
     length: f32,
     inverse_length: f32,
@@ -101,7 +102,7 @@ impl Constants {
         }
     }
 
-    /// A query in the limb frame.
+    /// Transforms a query into the limb frame.
     #[inline(always)]
     fn in_limb<const FMA: bool>(&self, x: f32, y: f32, z: f32) -> (f32, f32, f32) {
         let (wx, wy, wz) = (x - self.origin[0], y - self.origin[1], z - self.origin[2]);
@@ -112,7 +113,7 @@ impl Constants {
         (turn(0), turn(1), turn(2))
     }
 
-    /// One coordinate of a vector of the limb frame in the frame of the queries, added to `base`.
+    /// One coordinate of a limb-frame vector in the frame of the queries, added to `base`.
     #[inline(always)]
     fn in_world<const FMA: bool>(&self, axis: usize, x: f32, y: f32, z: f32, base: f32) -> f32 {
         fma::<FMA>(
@@ -135,7 +136,7 @@ fn fma<const FMA: bool>(a: f32, b: f32, c: f32) -> f32 {
     if FMA { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// `max` and `min` as one instruction: the standard ones treat NaN, which is caught at the end here.
+/// `max` and `min` as one instruction: the standard functions handle NaN, which is detected at the end here.
 #[inline(always)]
 fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -153,7 +154,7 @@ fn select(condition: bool, yes: f32, no: f32) -> f32 {
 
 /// The foot on one ruling and the derivatives of `g`, as in `ruling`.
 struct LaneFoot {
-    /// The parameter along the ruling before it is clamped to 0..1, and its derivative by θ.
+    /// The parameter along the ruling before it is clamped to 0..1, and its derivative with respect to θ.
     free: f32,
     drift: f32,
     slope: f32,
@@ -190,7 +191,7 @@ fn unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
     (x * inverse, y * inverse)
 }
 
-/// The unit vector along a vector whose length is 1 but for a small step: `1/sqrt(1 + u) = 1 - u/2 + 3u²/8 - ...`.
+/// The unit vector along a vector whose length is 1 up to a small step: `1/sqrt(1 + u) = 1 - u/2 + 3u²/8 - ...`.
 #[inline(always)]
 fn nearly_unit<const FMA: bool>(x: f32, y: f32) -> (f32, f32) {
     let u = fma::<FMA>(x, x, fma::<FMA>(y, y, -1.0));
@@ -211,7 +212,7 @@ fn turned<const FMA: bool>(c: f32, s: f32, step: f32) -> (f32, f32) {
     nearly_unit::<FMA>(max(fma::<FMA>(-step, s, c), 0.0), max(fma::<FMA>(step, c, s), 0.0))
 }
 
-/// The angle to start from: the direction `(x/a, y/b)` in the slice, then one step over the evolute of the slice.
+/// The start angle: the direction `(x/a, y/b)` in the slice, then one step over the evolute of the slice.
 #[inline(always)]
 fn first_angle<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32) -> (f32, f32) {
     let (a, b) = k.slice::<FMA>(z);
@@ -240,7 +241,7 @@ struct SideFoot {
 #[inline(always)]
 fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: f32) -> SideFoot {
     let f = foot::<FMA>(k, c, s, x, y, z);
-    // The last step moves t along with the angle to first order; what it leaves is of second order in the step.
+    // The last step moves t along with the angle to first order; the remaining error is of second order in the step.
     let step = newton(&f);
     let (c, s) = turned::<FMA>(c, s, step);
     let free = fma::<FMA>(f.drift, step, f.free);
@@ -249,7 +250,7 @@ fn side_foot<const FMA: bool>(k: &Constants, c: f32, s: f32, x: f32, y: f32, z: 
     let (ex, ey) = (fma::<FMA>(a, c, -x), fma::<FMA>(b, s, -y));
     let ez = fma::<FMA>(k.length, t, -z);
     let squared = fma::<FMA>(ex, ex, fma::<FMA>(ey, ey, ez * ez));
-    // A step across a rim meets another g'' there, so its error is of first order.
+    // A step across a rim changes g'' discontinuously, so its error is of first order.
     let crossed = ((free < 0.0) != (f.free < 0.0)) | ((free > 1.0) != (f.free > 1.0));
     let error = k.second_order * select(crossed, step.abs(), step * step);
     let trusted = (error < FOOT_ERROR) & (f.bend >= CONDITIONED * f.tangent);
@@ -263,12 +264,13 @@ struct Face {
     /// The nearest face is this cap; at most one of the two.
     proximal: bool,
     distal: bool,
-    /// The query lies straight beyond a cap: it is the nearest face, whatever the rounding of the side's distance.
+    /// The query lies beyond a cap and projects into it: the cap is the nearest face regardless of the rounding of the side's
+    /// distance.
     decided: bool,
     squared: f32,
 }
 
-/// The nearest face, when the side is the square root of `side` away.
+/// The nearest face, given the squared distance `side` to the side.
 #[inline(always)]
 fn nearest_face<const FMA: bool>(k: &Constants, x: f32, y: f32, z: f32, side: f32) -> Face {
     // Inside: between the caps and inside the slice.
@@ -312,10 +314,10 @@ fn angles<const FMA: bool, const N: usize, const STEPS: usize>(
     (limb, cosine, sine)
 }
 
-/// The kernel over one block. `FMA` says whether fused multiply-add is an instruction of the target.
+/// The kernel over one block. `FMA` states whether fused multiply-add is an instruction of the target.
 ///
-/// Three loops, not one: each is short enough for the processor to overlap its iterations, whose chains are long.
-/// Newton's iteration takes `STEPS` steps before the last one.
+/// It uses three loops instead of one: each is short enough for the processor to overlap its iterations, whose dependency chains
+/// are long. Newton's iteration takes `STEPS` steps before the last one.
 #[inline(always)]
 pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
     k: &Constants,
@@ -362,7 +364,7 @@ pub(super) fn closest<const FMA: bool, const N: usize, const STEPS: usize>(
         let lateral = if rim { edge } else { Region::Side as u8 };
         let flat = if face.distal { Region::DistalCap as u8 } else { Region::ProximalCap as u8 };
         out.region[i] = if cap { flat } else { lateral };
-        // Written so that a NaN anywhere is doubtful.
+        // Written so that a NaN anywhere counts as unsettled.
         let clear = (side.trusted | face.decided)
             & (cap | (norm > 1e-12))
             & (cap | !rim | (distance > RIM_NORMAL_DISTANCE as f32));

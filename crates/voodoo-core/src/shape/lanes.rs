@@ -1,6 +1,6 @@
-//! The iteration of `closest` for several queries side by side: the few of a batch that single precision does not settle.
+//! The iteration of `closest` for several queries side by side: the queries of a batch that single precision does not settle.
 //!
-//! Every lane does what [`TaperedEllipticCylinder::refine`] does, operation by operation, so the result is the same, bit by bit.
+//! Every lane does the same operations as [`TaperedEllipticCylinder::refine`], so the result is bit-identical.
 
 use super::ruling::{Angle, Foot};
 use super::{SurfacePoint, TaperedEllipticCylinder};
@@ -8,7 +8,7 @@ use crate::math::{LANES, Vec3, widest};
 
 type Lanes = [f64; LANES];
 
-/// One [`Foot`] a lane.
+/// One [`Foot`] per lane.
 #[derive(Clone, Copy)]
 struct Feet {
     angle: [Lanes; 2],
@@ -58,9 +58,9 @@ impl Feet {
 }
 
 impl TaperedEllipticCylinder {
-    /// [`Self::closest_point`] of all queries, of a shape whose end ellipses differ little, at most [`LANES`], limb frame.
+    /// [`Self::closest_point`] for all queries (at most [`LANES`]), for a shape whose end ellipses differ little, limb frame.
     pub(super) fn closest_points_in_one_basin(&self, queries: &[Vec3], mut found: impl FnMut(usize, SurfacePoint)) {
-        // Lanes that are not wanted repeat the first: none takes longer than those that are.
+        // Unused lanes repeat the first query, so they never take longer than the used ones.
         let Some(first) = queries.first() else { return };
         let mut folded = [super::closest::folded(*first); LANES];
         for (folded, query) in folded.iter_mut().zip(queries) {
@@ -75,7 +75,7 @@ impl TaperedEllipticCylinder {
         }
     }
 
-    /// The minimum of `g` in the quadrant, of every lane.
+    /// The minimum of `g` in the quadrant, for every lane.
     #[inline(always)]
     fn refine_lanes(&self, start: &[Angle; LANES], queries: &[Vec3; LANES]) -> Feet {
         let scale = self.a0.max(self.a1).max(self.b0).max(self.b1);

@@ -33,19 +33,19 @@ use thiserror::Error;
 pub use batch::SurfaceBatch;
 pub(crate) use section::FacingSection;
 
-/// A length below this, meters, is taken for a mistake: it is the accuracy of the queries.
+/// Minimum length, meters: the accuracy of the queries. A smaller value is an input error.
 pub(crate) const MIN_SIZE: f64 = 1e-6;
-/// A length above this, meters, is taken for a mistake (of units, most likely).
+/// Maximum length, meters. A larger value is an input error, most likely of units.
 pub(crate) const MAX_SIZE: f64 = 1e3;
-/// On a rim the normal is the direction to the query when it is farther than this, meters, and the mean of the two adjacent
-/// faces' normals when it is nearer.
+/// On a rim, the normal is the direction to the query when the query is farther away than this, meters, and the mean of the two
+/// adjacent faces' normals when it is nearer.
 pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
 
-/// Why a shape was refused.
+/// Why a shape was rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// A length or semi-axis is not a number, infinite, negative or absurdly large.
+    /// A length or semi-axis is not a number, infinite, negative or too large.
     #[error("{name} must be between {min} and {MAX_SIZE} m, found {value}")]
     OutOfRange {
         /// The parameter.
@@ -55,7 +55,7 @@ pub enum ShapeError {
         /// The value found.
         value: f64,
     },
-    /// Both ends have (nearly) no extent along one axis, so the body would have no inside.
+    /// Both ends have (nearly) no extent along one axis, so the solid would have no interior.
     #[error(
         "one of {first} and {second} must be at least {MIN_SIZE} m, found {first_value} and {second_value}: the limb would be flat"
     )]
@@ -121,13 +121,13 @@ pub struct SurfacePoint {
 ///
 /// ```
 /// use voodoo_core::math::Vec3;
-/// use voodoo_core::shape::{Region, TaperedEllipticCylinder};
+/// use voodoo_core::{Region, TaperedEllipticCylinder};
 ///
 /// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.045, 0.03, 0.025)?;
 /// let near = forearm.closest_point(Vec3::new(0.2, 0.0, 0.1));
 /// assert_eq!(near.region, Region::Side);
 /// assert!((near.signed_distance - 0.1575).abs() < 1e-3);
-/// # Ok::<(), voodoo_core::shape::ShapeError>(())
+/// # Ok::<(), voodoo_core::ShapeError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaperedEllipticCylinder {
@@ -185,7 +185,7 @@ impl TaperedEllipticCylinder {
         self.b1
     }
 
-    /// The same shape, all five sizes multiplied by `factor`.
+    /// The shape with all five sizes multiplied by `factor`.
     ///
     /// # Errors
     /// [`ShapeError::Scale`] when the factor is not positive and finite; the errors of [`Self::new`] for the result.
@@ -202,13 +202,13 @@ impl TaperedEllipticCylinder {
         (self.a0 + (self.a1 - self.a0) * t, self.b0 + (self.b1 - self.b0) * t)
     }
 
-    /// `(x b)² + (y a)² - (a b)²` at the slice of `q`: negative inside the ellipse, positive outside, no division.
+    /// `(x b)² + (y a)² - (a b)²` at the slice of `q`: negative inside the ellipse, positive outside; needs no division.
     fn ellipse_sign(&self, q: Vec3) -> f64 {
         let (a, b) = self.semi_axes(q.z);
         (q.x * b).powi(2) + (q.y * a).powi(2) - (a * b).powi(2)
     }
 
-    /// True when `q` is strictly inside the solid.
+    /// Whether `q` is strictly inside the solid.
     pub(crate) fn contains(&self, q: Vec3) -> bool {
         q.z > 0.0 && q.z < self.length && self.ellipse_sign(q) < 0.0
     }

@@ -4,7 +4,7 @@ use super::ruling::Angle;
 use super::{Region, TaperedEllipticCylinder};
 use crate::math::Vec3;
 
-/// Where a ray enters the solid, limb frame.
+/// The point at which a ray enters the solid, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Distance from the origin of the ray, meters.
@@ -23,12 +23,13 @@ type Quartic = [f64; 5];
 impl TaperedEllipticCylinder {
     /// The first point at which a ray passes from outside to inside, limb frame, at most `max_distance` meters away.
     ///
-    /// `direction` need not be a unit vector. `None` when the ray misses, only touches the surface, or is not finite; a ray
-    /// that starts inside is followed out of the solid, which, not being convex, it may enter again.
+    /// `direction` need not be a unit vector. Returns `None` when the ray misses, only touches the surface, or is not finite. A
+    /// ray that starts inside is followed out of the solid and may enter it again, because the solid is not convex.
     ///
-    /// Between the cap planes the solid is `F = (x b)² + (y a)² - (a b)² < 0`; x, y, a and b are linear along the ray, so F is
-    /// a quartic. The roots of its derivatives, each isolated by those of the next, cut the ray into stretches on which F is
-    /// monotone: the first that goes from `F >= 0` to `F < 0` holds the hit, found by bisection. No root can be missed.
+    /// Between the cap planes the solid is `F = (x b)² + (y a)² - (a b)² < 0`; x, y, a and b are linear along the ray, so F is a
+    /// quartic. The roots of each derivative are isolated by the roots of the next derivative. They divide the ray into intervals
+    /// on which F is monotone. The first interval with a change from `F >= 0` to `F < 0` contains the hit, which is found by
+    /// bisection. No root can be missed.
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<RayHit> {
         let direction = direction.try_normalize()?;
         if !origin.is_finite() || max_distance.is_nan() {
@@ -73,12 +74,12 @@ impl TaperedEllipticCylinder {
         None
     }
 
-    /// Where a ray of unit direction enters and leaves the box around the shape, meters from its origin, and whether it enters
-    /// through the plane of a cap: of the proximal one when true. `None` when it misses.
+    /// Distances at which a ray of unit direction enters and leaves the box around the shape, meters from its origin; and whether
+    /// it enters through a cap plane: `Some(true)` for the proximal one, `Some(false)` for the distal one. `None` when it misses.
     fn cross_box(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<(f64, f64, Option<bool>)> {
         let (mut near, mut far) = (0.0, max_distance);
         let mut through_cap = None;
-        // The box is widened sideways, so that F > 0 where the ray enters it through a side.
+        // The box is enlarged laterally, so that F > 0 where the ray enters it through a side.
         let size = self.local_aabb().maxs * 1.001;
         for (axis, min, max) in [(0, -size.x, size.x), (1, -size.y, size.y), (2, 0.0, self.length)] {
             let (start, rate) = (origin[axis], direction[axis]);
@@ -142,12 +143,13 @@ fn derivative(polynomial: &Quartic) -> Quartic {
     [c1, 2.0 * c2, 3.0 * c3, 4.0 * c4, 0.0]
 }
 
-/// The points of (0, 1), ascending, between which the polynomial is monotone.
+/// The points in (0, 1), ascending, between which the polynomial is monotone.
 fn turning_points(polynomial: &Quartic) -> ([f64; 3], usize) {
     let first = derivative(polynomial);
     let second = derivative(&first);
     let third = derivative(&second);
-    // The third derivative is linear, so it changes sign at most once; each level splits the intervals of the one below.
+    // The third derivative is linear, so it changes sign at most once. Each derivative's roots split the intervals for the one
+    // below.
     let mut roots = [0.0; 3];
     let mut count = 0;
     for function in [&third, &second, &first] {
@@ -167,7 +169,7 @@ fn turning_points(polynomial: &Quartic) -> ([f64; 3], usize) {
     (roots, count)
 }
 
-/// The end of the stretch from `start` to `end` on which `after` is false; it must be true at `end`.
+/// The end of the interval from `start` to `end` on which `after` is false; it must be true at `end`.
 fn bisect(mut start: f64, mut end: f64, after: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = 0.5 * (start + end);

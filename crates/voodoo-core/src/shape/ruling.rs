@@ -1,9 +1,9 @@
-//! The straight lines of the side: for one angle θ the distance from a point is a point-to-segment distance.
+//! The straight lines (rulings) of the side: for one angle θ the distance from a point is a point-to-segment distance.
 
 use super::TaperedEllipticCylinder;
 use crate::math::Vec3;
 
-/// An angle in the first quadrant as its cosine and sine; no query needs trigonometric functions.
+/// An angle in the first quadrant, stored as cosine and sine, so that queries need no trigonometric functions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angle {
     pub c: f64,
@@ -17,7 +17,7 @@ impl Angle {
     /// The angle of the vector `(x, y)`, `None` for the zero vector.
     #[inline(always)]
     pub(super) fn from_vector(x: f64, y: f64) -> Option<Self> {
-        // Lengths and their products: far from where the squares overflow or vanish, so no need for the slower `hypot`.
+        // Lengths and their products are far from overflow and underflow of the squares, so the slower `hypot` is not needed.
         let norm = (x * x + y * y).sqrt();
         (norm > 0.0 && norm.is_finite()).then(|| Self { c: x / norm, s: y / norm })
     }
@@ -78,8 +78,8 @@ impl TaperedEllipticCylinder {
 
     /// Outward unit normal of the side, `P_θ × P_t = (b L c, a L s, -(a b' s² + b a' c²))` with `a' = a1 - a0`.
     ///
-    /// On a tip (`a = b = 0`) the product vanishes; all points of the ruling have its limit as their normal there.
-    /// On an edge (`a = 0` or `b = 0`) it can vanish at the edge's ends; the horizontal direction stands in.
+    /// On a tip (`a = b = 0`) the product vanishes; its limit is used, which is the same for all points of the ruling. On an edge
+    /// (`a = 0` or `b = 0`) it can vanish at the edge's ends; there the horizontal direction is used.
     pub(super) fn side_normal(&self, angle: Angle, t: f64) -> Vec3 {
         let Angle { c, s } = angle;
         let (da, db) = (self.a1 - self.a0, self.b1 - self.b0);

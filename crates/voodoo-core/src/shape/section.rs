@@ -1,9 +1,9 @@
-//! Sections of a limb across its axis: the ellipse at a height, and what of it faces a camera.
+//! Cross sections of a limb: the ellipse at a height, and the part of it that faces a camera.
 
 use super::TaperedEllipticCylinder;
 use crate::math::{Pose, Vec3};
 
-/// The ellipse in which a plane across the axis cuts the side, limb frame, meters.
+/// The ellipse in which a plane perpendicular to the axis cuts the side, limb frame, meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
     /// Semi-axis along x.
@@ -14,23 +14,24 @@ pub(crate) struct Section {
     pub z: f64,
 }
 
-/// A section and the directions in which a camera sees it, limb frame.
+/// A section and the directions of its visible part for a camera, limb frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FacingSection {
     /// The section.
     pub section: Section,
-    /// From its center to the camera, meters.
+    /// Vector from its center to the camera, meters.
     pub to_camera: Vec3,
-    /// The part of that across the axis, meters.
+    /// The component of `to_camera` perpendicular to the axis, meters.
     pub across: Vec3,
-    /// The unit vector along that part: the middle of what the camera sees lies there.
+    /// The unit vector along `across`: the middle of the visible part lies in this direction.
     pub ahead: Vec3,
-    /// The unit vector at right angles to it and to the axis: the section's borders in the image lie about there.
+    /// The unit vector perpendicular to `ahead` and to the axis: the section's borders in the image lie approximately in this
+    /// direction.
     pub side: Vec3,
 }
 
 impl TaperedEllipticCylinder {
-    /// The section at the share `t` of the length, 0 at the proximal end and 1 at the distal one.
+    /// The section at the fraction `t` of the length, 0 at the proximal end and 1 at the distal one.
     #[inline]
     pub(crate) fn section(&self, t: f64) -> Section {
         Section { a: self.a0 + t * (self.a1 - self.a0), b: self.b0 + t * (self.b1 - self.b0), z: t * self.length }
@@ -44,7 +45,7 @@ impl Section {
         Vec3::new(0.0, 0.0, self.z)
     }
 
-    /// What of it faces a camera; `None` when the camera looks along the axis.
+    /// The part of it that faces a camera; `None` when the camera looks along the axis.
     #[inline]
     pub(crate) fn facing(self, camera_from_limb: &Pose) -> Option<FacingSection> {
         let to_camera = camera_from_limb.inverse_transform_vector(-(*camera_from_limb * self.center()));
@@ -54,14 +55,14 @@ impl Section {
         Some(FacingSection { section: self, to_camera, across, ahead, side })
     }
 
-    /// How far the ellipse reaches along a unit vector across the axis, meters: the distance of its tangent from the center.
+    /// Extent of the ellipse along a unit vector perpendicular to the axis, meters: the distance of its tangent from the center.
     #[inline]
     pub(crate) fn extent(&self, direction: Vec3) -> f64 {
         let (x, y) = (self.a * direction.x, self.b * direction.y);
         (x * x + y * y).sqrt()
     }
 
-    /// The point of the ellipse that reaches farthest along a unit vector across the axis, meters.
+    /// The point of the ellipse with the largest extent along a unit vector perpendicular to the axis, meters.
     #[inline]
     pub(crate) fn farthest_point(&self, direction: Vec3) -> Vec3 {
         let extent = self.extent(direction);
@@ -70,8 +71,8 @@ impl Section {
 }
 
 impl FacingSection {
-    /// The point on the rim that lies the share `s`, from -1 to 1, across as the camera sees it: 0 is the middle, in units of
-    /// the semi-axes.
+    /// The point on the rim at the lateral position `s`, from -1 to 1, as the camera sees it: 0 is the middle, in units of the
+    /// semi-axes.
     #[inline]
     pub(crate) fn point(&self, s: f64) -> Vec3 {
         let place = self.ahead * (1.0 - s * s).sqrt() + self.side * s;
@@ -104,7 +105,7 @@ mod tests {
             prop_assume!(facing.across.length() > 0.5);
             let point = facing.point(s);
             prop_assert!(shape.closest_point(point).signed_distance.abs() < 1e-9);
-            // The camera stands where the pose says: the origin of its frame, seen from the limb.
+            // The camera is at the origin of its frame, here in the limb frame.
             let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
             prop_assert!((section.center() + facing.to_camera - camera).length() < 1e-9);
             prop_assert!((facing.point(0.0) - section.center()).dot(facing.ahead) > 0.0, "the middle faces the camera");
@@ -115,7 +116,7 @@ mod tests {
         fn no_point_of_the_ellipse_reaches_farther(shape in shapes(), angle in 0.0..std::f64::consts::TAU, t in 0.0..1.0) {
             let section = shape.section(t);
             let direction = Vec3::new(angle.cos(), angle.sin(), 0.0);
-            // A dense search, which knows nothing of tangents.
+            // A dense search that does not use tangents.
             let rim = (0..20_000).map(|k| f64::from(k) * std::f64::consts::TAU / 20_000.0);
             let points = rim.map(|at| Vec3::new(section.a * at.cos(), section.b * at.sin(), section.z));
             let best = points.max_by(|p, q| p.dot(direction).total_cmp(&q.dot(direction))).unwrap();

@@ -20,7 +20,7 @@ pub(crate) struct ChainSolver {
 }
 
 impl ChainSolver {
-    /// One damped step from the normal equations at `poses`, `stride` times as far; the joints come out exactly closed.
+    /// One damped step from the normal equations at `poses`, scaled by `stride`; afterwards the joints are exactly closed.
     pub(crate) fn step(
         &mut self,
         body: &Body,
@@ -40,7 +40,7 @@ impl ChainSolver {
         let Self { chain, screws, composite, h, step } = self;
         let n = chain.freedoms;
         list_screws(body, poses, screws);
-        // Blocks of a limb and all that hangs on it, leaf to root.
+        // Blocks of a limb and all its descendants, leaf to root.
         composite.clear();
         composite.extend(normal.limbs.iter().map(|block| (block.h, block.g)));
         for limb in (1..composite.len()).rev() {
@@ -58,7 +58,7 @@ impl ChainSolver {
             for row in chain.start[limb]..chain.start[limb] + chain.count[limb] {
                 let force = block * screws[row];
                 step[row] = -screws[row].dot(gradient);
-                // Every ancestor's freedoms move this limb too.
+                // The degrees of freedom of every ancestor move this limb too.
                 let mut ancestor = limb;
                 loop {
                     for column in chain.start[ancestor]..chain.start[ancestor] + chain.count[ancestor] {
@@ -104,7 +104,8 @@ impl ChainSolver {
             Vec3::new(part(start), part(start + 1), part(start + 2))
         };
         let twist = Vector6::from_fn(|i, _| part(i));
-        // Turns are read from the old poses before their parents move: children stand behind parents, so walk backwards.
+        // Joint rotations are computed from the old poses before their parents move. Children come after parents, so iterate
+        // backwards.
         let limbs = body.limbs();
         for index in (1..limbs.len()).rev() {
             if let Some((parent, joint)) = &limbs[index].parent {
@@ -113,7 +114,7 @@ impl ChainSolver {
                     1 => crate::body::kinematics::hinge_axis(joint) * part(chain.start[index]),
                     _ => turns(index),
                 };
-                // The slot keeps the joint's new turn until the forward pass places the limb.
+                // The slot stores the joint's new rotation until the forward pass sets the limb pose.
                 poses[index] = Pose::from_rotation((Quat::from_scaled_axis(more) * turn).normalize());
             }
         }

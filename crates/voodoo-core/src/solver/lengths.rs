@@ -1,4 +1,4 @@
-//! How much longer the limbs should be: the chain's normal equations with one more unknown for every pair of limbs.
+//! Estimates changes of limb lengths: extends the chain's normal equations by one unknown for every pair of limbs.
 
 use nalgebra::Vector6;
 
@@ -11,15 +11,15 @@ use crate::terms::normal_equations::NormalEquations;
 /// Working memory.
 #[derive(Debug, Default)]
 pub(crate) struct Lengths {
-    /// Mixed second derivatives, one row of all pose unknowns a pair.
+    /// Mixed second derivatives: per pair, one row over all pose unknowns.
     mixed: Vec<f64>,
     reduced: Vec<f64>,
     gradient: Vec<f64>,
 }
 
 impl ChainSolver {
-    /// Relative changes of length, one a pair, into `change`: the Gauss-Newton step of the lengths after the pose's unknowns
-    /// have been eliminated (Schur complement), held back by `inertia` and drawn to `change`'s value at entry by `pull`.
+    /// Writes the relative change of length of each pair to `change`: the Gauss-Newton step of the lengths after elimination of
+    /// the pose unknowns (Schur complement), damped by `inertia` and pulled towards the initial value of `change` by `pull`.
     pub(crate) fn lengths(
         &mut self,
         body: &Body,
@@ -45,7 +45,7 @@ impl ChainSolver {
     }
 }
 
-/// Lengthening its parent carries a limb along the parent's axis: the twist of a sliding joint below the turning one.
+/// Twist of a limb when its parent lengthens: a translation along the parent's axis, as of a sliding joint.
 fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
     let Some((parent, joint)) = &body.limbs()[limb].parent else { return Vector6::zeros() };
     let own = body.limbs()[*parent].parent.as_ref().map_or(0.0, |(_, joint)| joint.limb_from_joint.translation.z);
@@ -54,8 +54,8 @@ fn slide(body: &Body, poses: &[Pose], limb: usize) -> Vector6<f64> {
 }
 
 impl Lengths {
-    /// Information of the relative length of each of `pairs` by itself, pose's unknowns eliminated, from what
-    /// [`ChainSolver::factor_information`] left; one a pair, into `information`.
+    /// Writes the information of the relative length of each of `pairs` on its own to `information`, with the pose unknowns
+    /// eliminated. Uses the factorization of [`ChainSolver::factor_information`].
     pub(crate) fn information(
         &mut self,
         solver: &ChainSolver,
@@ -71,12 +71,12 @@ impl Lengths {
         for row in 0..count {
             let own = &mut mixed[row * n..(row + 1) * n];
             half_substitute(&solver.h, own, n);
-            // A number that is none leaves no information.
+            // A NaN leaves no information.
             information.push((reduced[row * count + row] - dot(own, own)).max(0.0));
         }
     }
 
-    /// Second derivatives and gradient of the lengths, and the mixed ones with the pose's unknowns.
+    /// Computes second derivatives and gradient of the lengths, and the mixed derivatives with the pose unknowns.
     fn couple(&mut self, solver: &ChainSolver, body: &Body, poses: &[Pose], pairs: &[Pair]) {
         let ChainSolver { chain, screws, composite, .. } = solver;
         let (n, count) = (chain.freedoms, pairs.len());
@@ -121,15 +121,15 @@ impl Lengths {
         }
     }
 
-    /// Eliminates the pose's unknowns; false when their matrix is not positive definite.
+    /// Eliminates the pose unknowns; returns false when their matrix is not positive definite.
     fn eliminate(&mut self, solver: &mut ChainSolver, count: usize) -> bool {
-        // `step` holds the negative gradient of the pose's unknowns.
+        // `step` holds the negative gradient of the pose unknowns.
         let ChainSolver { chain: Chain { freedoms: n, .. }, h, step, .. } = solver;
         let (n, Self { mixed, reduced, gradient }) = (*n, self);
         if !factor(h, n) {
             return false;
         }
-        // With `H = L^T L`, `b^T H^-1 c` is the product of what half of the substitution leaves of both.
+        // With `H = L^T L`, `b^T H^-1 c` is the dot product of the two vectors after half of the substitution.
         half_substitute(h, step, n);
         for row in 0..count {
             half_substitute(h, &mut mixed[row * n..(row + 1) * n], n);
@@ -144,7 +144,7 @@ impl Lengths {
     }
 }
 
-/// Whether a limb hangs on another, directly or not; parents come first.
+/// Whether a limb is a descendant of another; parents come first.
 fn hangs_on(parent: &[usize], below: usize, limb: usize) -> bool {
     let mut ancestor = below;
     while ancestor > limb {

@@ -1,20 +1,20 @@
-//! The published solver: weighted absolute orientation, each limb alone (K06 IV-B.7, K07 3.2).
+//! The published solver: weighted absolute orientation of each limb separately (K06 IV-B.7, K07 3.2).
 
 use super::{Gate, Problem, Reassociation, Schedule, Solver, WarmStart, WarmStartInput};
 use crate::association::correspondence::LimbMatches;
 use crate::config::Config;
 use crate::math::{Mat3, Moments, Pose, Vec3};
 
-/// Lever of the wish not to turn where the pairs fix no rotation, meters: the girth of a limb.
+/// Lever of the damping against rotation where the pairs do not determine it, meters: the girth of a limb.
 const STAY: f64 = 0.05;
 
-/// Each limb moves to the optimum of its own pairs; information crosses one joint a step through the bands.
+/// Moves each limb to the optimum of its own pairs; information crosses one joint per step through the bands.
 #[derive(Debug, Default)]
 pub(crate) struct Limbwise {
     warm_start: WarmStart,
 }
 
-/// Rounds in which the chain follows the sites: each of them assigns the points anew.
+/// Warm-start rounds in which the chain follows the sites; each of them reassigns the points.
 const LIMBWISE_ROUNDS: usize = 3;
 
 impl Solver for Limbwise {
@@ -28,7 +28,7 @@ impl Solver for Limbwise {
                 moments.add(pair.weight, pair.x - center, pair.p - center);
             }
             for band in &correspondences.bands {
-                // The same band twice, once for each limb it joins: the partner's end is the datum (K07 4.3).
+                // Each band appears twice, once for each limb that it joins: the end on the other limb is the target (K07 4.3).
                 if band.child == limb {
                     moments.add(band.child_weight, band.on_child - center, band.on_parent - center);
                 }
@@ -38,7 +38,7 @@ impl Solver for Limbwise {
             }
             if let Some(motion) = moments.absolute_orientation(STAY) {
                 let rotation = (motion.rotation * pose.rotation).normalize();
-                // x - center = 0 at the limb's own position, so its image is the motion's translation.
+                // x - center = 0 at the limb's own position, so its image is the translation of the motion.
                 *pose = Pose::from_parts(center + motion.translation, rotation);
             }
         }

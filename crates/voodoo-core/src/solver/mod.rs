@@ -1,4 +1,4 @@
-//! Step 7: the pose that fits the correspondences. The solver is the one replaceable part of the step.
+//! Step 7: fits the pose to the correspondences. The solver is the one replaceable part of the step.
 
 mod chain;
 mod lengths;
@@ -24,27 +24,27 @@ use crate::config::{Config, SolverKind};
 use crate::math::Pose;
 use crate::observation::frame::Ground;
 
-/// Largest turn of a joint or limb in one step, radians: linearized rows hold no farther.
+/// Largest rotation of a joint or limb in one step, radians: the linearization is not valid beyond.
 const LARGEST_TURN: f64 = 0.5;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
 const LIMIT_SIGMA: f64 = 0.05;
-/// Relative damping of the normal matrix: what hardly anything measures stays where it is.
+/// Relative damping of the normal matrix: unknowns with almost no measurements stay where they are.
 const DAMPING: f64 = 1e-3;
 
-/// What a solver works on: one ICP step of one frame.
+/// Input of a solver: one ICP step of one frame.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
     /// The body.
     pub body: &'a Body,
-    /// What was matched at the current poses.
+    /// Correspondences at the current poses.
     pub correspondences: &'a Correspondences,
-    /// The poses expected before the frame was seen.
+    /// The predicted poses, from before this frame's measurements.
     pub predicted: &'a [Pose],
-    /// The floor, working frame, where it is known.
+    /// The ground plane in the working frame, if it is known.
     pub floor: Option<Ground>,
     /// Index of the step in its frame.
     pub step: usize,
-    /// Seconds since the last frame, as multiples of 1/30 s; the standard deviations of motion grow with it.
+    /// Time since the last frame, in units of 1/30 s; the standard deviations of motion grow with it.
     pub time_scale: f64,
     /// Parameters.
     pub config: &'a Config,
@@ -52,11 +52,11 @@ pub(crate) struct Problem<'a> {
 
 /// Moves the limbs towards their correspondences: prepares a frame, then solves every step of it.
 pub(crate) trait Solver: std::fmt::Debug + Send + Sync {
-    /// What it wants of the loop.
+    /// The schedule that the solver needs.
     fn schedule(&self, config: &Config) -> Schedule;
 
-    /// Follows the named sites before the first step of a frame (warm start); true asks for another round. `problem.predicted`
-    /// are the poses before the frame.
+    /// Warm start: follows the named sites before the first step of a frame. Returns true to request another round.
+    /// `problem.predicted` are the poses before the frame.
     fn prepare(&mut self, _problem: &Problem, _poses: &mut [Pose]) -> bool {
         false
     }
@@ -64,8 +64,9 @@ pub(crate) trait Solver: std::fmt::Debug + Send + Sync {
     /// One update of all poses (working frame).
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]);
 
-    /// Relative changes of the lengths of `pairs` that the correspondences ask for at `poses`, into `change`, which holds how
-    /// far the lengths are below those to which they are drawn by the information `pull`. False when the solver knows none.
+    /// Writes the relative changes of the lengths of `pairs` that fit the correspondences at `poses` to `change`. On input,
+    /// `change` holds the change from each length to the one it is regularized to, with information `pull`. Returns false when
+    /// the solver cannot estimate lengths.
     fn lengths(
         &mut self,
         _problem: &Problem,
@@ -78,7 +79,7 @@ pub(crate) trait Solver: std::fmt::Debug + Send + Sync {
     }
 }
 
-/// The solver of a configuration.
+/// Creates the solver of a configuration.
 pub(crate) fn solver(kind: SolverKind) -> Box<dyn Solver> {
     match kind {
         SolverKind::Limbwise => Box::new(Limbwise::default()),

@@ -1,8 +1,8 @@
-//! What a solver wants of the loop around it.
+//! What a solver requires of the loop around it.
 
-/// Factor by which gates and kernels narrow from step to step: far points pull while the pose is rough.
+/// Factor by which gates and kernels narrow from step to step: far points may pull only while the pose is inaccurate.
 const NARROWING: f64 = 0.7;
-/// From this step on, only every second one assigns points and looks for edges: once the gate has narrowed, few change.
+/// From this step on, only every second step assigns points and searches for edges: once the gate has narrowed, few change.
 const EVERY_SECOND_FROM: usize = 2;
 
 /// A length that narrows from `start` to `end`, in the given step of a frame.
@@ -19,12 +19,12 @@ pub(crate) struct Gate {
     pub distance: f64,
 }
 
-/// In which steps points get new limbs and contours new edges; in the others they keep those of the step before.
+/// In which steps points are reassigned to limbs and contours get new edges; other steps keep those of the step before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reassociation {
     /// In every step, as published (K06 IV-B).
     EveryStep,
-    /// In the first steps, then in every second one.
+    /// In the first steps, and then in every second one.
     EverySecondStep,
 }
 
@@ -33,24 +33,25 @@ pub(crate) enum Reassociation {
 pub(crate) enum WarmStartInput {
     /// Named sites with positions and rays.
     Sites,
-    /// Those, and where there are any, the points as well.
+    /// Sites, and in frames with sites also the points.
     SitesAndPoints,
 }
 
-/// What a solver wants of the loop: constant for one configuration.
+/// What a solver requires of the loop: constant for one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Schedule {
     /// Gate of the first step, and the one it narrows to.
     pub gates: [Gate; 2],
-    /// When points are assigned anew.
+    /// When points are reassigned.
     pub reassociation: Reassociation,
-    /// What the warm start reads.
+    /// Measurements that the warm start uses.
     pub warm_start: WarmStartInput,
-    /// It reads the elastic bands (K07 4.3).
+    /// Whether the solver uses the elastic bands (K07 4.3).
     pub bands: bool,
-    /// Depth pixels match only what faces their camera; the published method takes the closest point wherever it is.
+    /// Whether depth pixels match only surfaces that face their camera; the published method takes the closest point anywhere.
     pub visible_side: bool,
-    /// Steps start from the predicted pose, and what judges whole bodies (hypotheses, girths, relocalization) runs after them.
+    /// Whether steps start from the predicted pose, and the stages that evaluate whole bodies (hypotheses, girths,
+    /// relocalization) run after them.
     pub whole_body: bool,
 }
 
@@ -64,7 +65,7 @@ impl Schedule {
         }
     }
 
-    /// Whether points are assigned anew in a step of a frame.
+    /// Whether points are reassigned in a step of a frame.
     pub(crate) fn reassociates(&self, step: usize) -> bool {
         match self.reassociation {
             Reassociation::EveryStep => true,

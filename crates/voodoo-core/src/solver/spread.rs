@@ -1,4 +1,4 @@
-//! How far the chain's unknowns may be off: what the inverse of their information says of limbs and joints.
+//! Covariances of limbs and joints, from the inverse of the information of the chain's unknowns.
 
 use nalgebra::Matrix6;
 
@@ -7,17 +7,17 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3, factor};
 use crate::terms::normal_equations::{NormalEquations, line};
 
-/// Columns of the half-solved system, one row an unknown.
+/// Columns of the half-solved system, one row per unknown.
 #[derive(Debug, Default)]
 pub(crate) struct Spread {
     rows: Vec<[f64; 6]>,
-    /// Unknowns that move the limb that is asked for, the last one first.
+    /// Unknowns that move the queried limb, last one first.
     moving: Vec<usize>,
 }
 
 impl ChainSolver {
-    /// The limbs' information at `poses` with `own` added to that of every unknown, factored: what [`Spread`] reads. False when
-    /// it is not positive definite.
+    /// Assembles the limbs' information at `poses`, adds `own` to the diagonal, and factors the result for [`Spread`]. Returns
+    /// false when it is not positive definite.
     pub(crate) fn factor_information(
         &mut self,
         body: &Body,
@@ -34,7 +34,7 @@ impl ChainSolver {
         factor(&mut self.h, n)
     }
 
-    /// The same with what is `known` of all unknowns, a lower triangle, to which the limbs' information is added.
+    /// Adds the limbs' information to `known`, a lower triangle over all unknowns, and factors the sum for [`Spread`].
     pub(crate) fn factor_added(
         &mut self,
         body: &Body,
@@ -51,7 +51,7 @@ impl ChainSolver {
 }
 
 impl Spread {
-    /// Covariance of the pose of a limb about the `origin` of its frame: a turn in world axes (radians), then a shift (meters).
+    /// Covariance of a limb's pose about the `origin` of its frame: rotation in world axes (radians), then translation (meters).
     pub(crate) fn of_limb(&mut self, solver: &ChainSolver, limb: usize, origin: Vec3) -> Matrix6<f64> {
         self.list(solver, limb);
         for unknown in &self.moving {
@@ -66,7 +66,7 @@ impl Spread {
         self.gram()
     }
 
-    /// Covariance of the unknowns of a limb's own joint (of the root: of its turn, then of its shift), in their order.
+    /// Covariance of the unknowns of a limb's own joint, in their order; for the root: of its rotation, then of its translation.
     pub(crate) fn of_joint(&mut self, solver: &ChainSolver, limb: usize) -> Matrix6<f64> {
         self.list(solver, limb);
         let start = solver.chain.start[limb];
@@ -80,7 +80,7 @@ impl Spread {
         self.gram()
     }
 
-    /// `Y^T Y` of what was solved.
+    /// `Y^T Y` of the solved columns.
     fn gram(&self) -> Matrix6<f64> {
         let mut gram = Matrix6::zeros();
         for unknown in &self.moving {
@@ -110,7 +110,7 @@ impl Spread {
         }
     }
 
-    /// Solves `L^T y = b` for six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`. Nothing but what moves the limb takes part.
+    /// Solves `L^T y = b` for six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`. Only unknowns that move the limb take part.
     fn solve_half(&mut self, solver: &ChainSolver) {
         let n = solver.chain.freedoms;
         for (place, unknown) in self.moving.iter().enumerate() {
@@ -156,7 +156,7 @@ mod tests {
         let n = system.chain.freedoms;
         let own: Vec<f64> = (0..n).map(|index| 1.0 + (index % 5) as f64).collect();
         assert!(system.factor_information(body, &normal, &poses, &own));
-        // The dense way: every limb's twist as a matrix of all unknowns.
+        // The dense reference: every limb's twist as a matrix over all unknowns.
         let moves = |limb: usize, unknown: usize| {
             let mut ancestor = limb;
             loop {
@@ -180,7 +180,7 @@ mod tests {
         let inverse = h.try_inverse().unwrap();
         let mut spread = Spread::default();
         for limb in 0..poses.len() {
-            // Moved to the limb's frame: its origin moves by `v + omega x origin`.
+            // Moved to the limb frame: its origin moves by `v + omega x origin`.
             let x = poses[limb].translation;
             let at = DMatrix::from_fn(6, 6, |row, column| match row {
                 0..3 => f64::from(u8::from(row == column)),

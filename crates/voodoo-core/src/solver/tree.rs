@@ -1,5 +1,5 @@
-//! All limbs at once with the elastic bands kept (K07 section 4): every limb has a twist of its own, and the normal matrix
-//! has the shape of the body's tree, so that elimination from the leaves to the root solves it in time linear in the limbs.
+//! Solves for all limbs at once with elastic bands (K07 section 4). Every limb has a twist of its own. The normal matrix has the
+//! structure of the body's tree, so elimination from the leaves to the root takes time linear in the number of limbs.
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
@@ -9,15 +9,15 @@ use crate::body::{Body, Joint, JointKind};
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
 
-/// Information every unknown has from the start, so that nothing is singular.
+/// Initial information of every unknown, so that nothing is singular.
 const FLOOR: f64 = 1e-6;
 
 /// The system of one step, and its solution.
 #[derive(Debug, Default)]
 pub(crate) struct TreeSolver {
-    /// Parent of each limb, always before it; the root is its own.
+    /// Parent of each limb, which always precedes it; the root is its own parent.
     pub parent: Vec<usize>,
-    /// A limb's own block of the matrix and half the gradient of its twist.
+    /// A limb's own block of the matrix, and half the gradient of its twist.
     pub own: Vec<LimbBlock>,
     /// The block of the matrix between a limb (rows) and its parent (columns); unused for the root.
     pub mixed: Vec<Matrix6<f64>>,
@@ -26,8 +26,8 @@ pub(crate) struct TreeSolver {
 }
 
 impl TreeSolver {
-    /// One damped step from the normal equations at `poses`, `stride` times as far; `band_sigma` is a band's standard deviation,
-    /// meters.
+    /// One damped step from the normal equations at `poses`, scaled by `stride`; `band_sigma` is the standard deviation of a
+    /// band, meters.
     pub(crate) fn step(
         &mut self,
         body: &Body,
@@ -83,7 +83,7 @@ impl TreeSolver {
         }
     }
 
-    /// What the terms say about the joint's relative turn `omega_child - omega_parent`.
+    /// Adds the normal equations of the joint's relative rotation `omega_child - omega_parent`.
     fn add_turn(&mut self, [child, parent]: [usize; 2], normal: &NormalEquations) {
         let joint = &normal.joints[child];
         for i in 0..3 {
@@ -97,8 +97,8 @@ impl TreeSolver {
         }
     }
 
-    /// Eliminates every limb into its parent, leaves first, then finds the twists from the root on. False, and no twist to
-    /// be used, when the matrix is not positive definite. `own` and `mixed` are used up.
+    /// Eliminates every limb into its parent, leaves first, then computes the twists from the root on. Returns false, with
+    /// unusable twists, when the matrix is not positive definite. Overwrites `own` and `mixed`.
     pub(crate) fn solve(&mut self) -> bool {
         let Self { parent, own, mixed, twist } = self;
         twist.clear();
@@ -109,7 +109,7 @@ impl TreeSolver {
             if limb == 0 {
                 break;
             }
-            // x = -H^-1 g - H^-1 M x_parent; what remains for the parent is the Schur complement.
+            // x = -H^-1 g - H^-1 M x_parent; the parent gets the Schur complement.
             let carried = factor.solve(&mixed[limb]);
             let above = &mut own[parent[limb]];
             above.h -= mixed[limb].tr_mul(&carried);
@@ -124,8 +124,9 @@ impl TreeSolver {
     }
 }
 
-/// Ends of the bands that hold a joint together, joint frame: a hinge's two, so that it turns about its axis only, else one
-/// at the center. Strong bands at the four ends of an ellipse would let it turn no more; how far it may is the limits' say.
+/// Ends of the bands that hold a joint together, joint frame. A hinge has two, so that it only rotates about its axis; other
+/// joints have one at the center. Strong bands at the four ends of an ellipse would block rotation; joint limits restrict it
+/// instead.
 fn bands(joint: &Joint) -> impl Iterator<Item = Vec3> + use<> {
     let count = if joint.kind() == JointKind::Hinge { 2 } else { 1 };
     let center = joint.kind() == JointKind::Elliptic;

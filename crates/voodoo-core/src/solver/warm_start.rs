@@ -1,10 +1,12 @@
-//! Warm start: named sites drive the body. Before a solver that moves each limb alone sees a frame, the joint chain follows the sites.
+//! Warm start: moves the body towards the named sites as a joint chain, before the solver's first step.
 //!
-//! A position of a hand says something about the whole arm, but a limb alone hears of it one joint a step (K06 IV-B.7). Here
-//! the sites with positions and rays move the chain as one, each joint by no more than its motion allows (R07, J10).
+//! The position of a hand constrains the whole arm, but in a solver that moves each limb separately it propagates by one joint
+//! per step (K06 IV-B.7). Here the sites with positions and rays move the whole chain, each joint within its expected motion
+//! (R07, J10).
 //!
-//! With points the limbs on the way to a site follow their own along with it, and every other limb is held where it is by as
-//! many points as it has: an arm that can reach its hand leaves the trunk alone, and a leg that nothing measures is carried.
+//! Where points are matched too, the limbs that lead to a site also follow their own points. Every other limb is held in place
+//! by the information of its points: an arm that can reach its hand position does not move the trunk, and a leg without
+//! measurements moves with its parent.
 
 use super::{ChainSolver, DAMPING, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
@@ -14,32 +16,32 @@ use crate::math::Pose;
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
 
-/// Information of the heaviest site in surface points of weight one. Only the proportions of weights matter in this solver,
-/// and the limbs' own points have their say afterwards.
+/// Information of the heaviest site, in surface points of weight one. Only the proportions of weights matter in this solver, and
+/// the limbs' own points correct the result in later steps.
 const DRIVING_INFORMATION: f64 = 2.0;
-/// Scale of the kernel, meters: sites that drive come from far.
+/// Scale of the kernel, meters: large, because the sites may be far from the limbs.
 const SCALE: f64 = 0.5;
 
-/// Damped Gauss-Newton steps on the sites, and the points where they are matched before.
+/// Damped Gauss-Newton steps on the sites, and on the points where they are matched before the warm start.
 #[derive(Debug, Default)]
 pub(crate) struct WarmStart {
     normal: NormalEquations,
     chain: ChainSolver,
     joint_sigmas: Vec<f64>,
-    /// The poses with their joints closed: before the frame, now, and before the last step.
+    /// The poses with closed joints: before the frame, now, and before the last step.
     start: Vec<Pose>,
     closed: Vec<Pose>,
     before: Vec<Pose>,
     moved: Vec<Pose>,
-    /// The limbs that are driven.
+    /// The limbs that the sites move.
     driven: Vec<bool>,
-    /// With points: the limbs that follow theirs, and what holds the others.
+    /// With points: the limbs that follow their points, and the information that holds the others.
     following: Vec<bool>,
     held: NormalEquations,
 }
 
 impl WarmStart {
-    /// Lets all limbs move, against their points; false without sites.
+    /// Lets all limbs move, with points matched; returns false without sites.
     pub(crate) fn drives_all(&mut self, problem: &Problem) -> bool {
         let count = problem.body.limbs().len();
         self.driven.clear();
@@ -53,7 +55,7 @@ impl WarmStart {
         self.following.contains(&true)
     }
 
-    /// Whether sites farther than `from` meters from where they were seen lead their limbs alone in this frame.
+    /// Whether sites farther than `from` meters from their measured positions move their limbs in this frame, without points.
     pub(crate) fn drives_far(&mut self, problem: &Problem, from: f64) -> bool {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
@@ -67,7 +69,7 @@ impl WarmStart {
         self.driven.contains(&true)
     }
 
-    /// One step: the limbs move as those of a body with closed joints would; gaps that the bands left stay as they are.
+    /// One step: each limb moves as it would with closed joints; gaps that the bands left are kept.
     pub(crate) fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, config, .. } = problem;
         if problem.step == 0 {
@@ -83,7 +85,8 @@ impl WarmStart {
         );
         let root = [config.root_turn_sigma, config.root_shift_sigma].map(|sigma| sigma * time_scale);
         self.normal.clear(poses.len());
-        // Beside points a site within its bias must not count as much as any other.
+        // Where points are used, the weights are those before the reduction for bias: otherwise a site within its bias would
+        // count fully.
         let with_points = !self.following.is_empty();
         let weights = correspondences.sites.iter().map(|pair| if with_points { pair.base_weight } else { pair.weight });
         let heaviest = weights.fold(f64::MIN_POSITIVE, f64::max);
@@ -101,7 +104,7 @@ impl WarmStart {
         }
         self.before.clone_from(&self.closed);
         self.chain.step(body, &self.normal, DAMPING, 1.0, &mut self.closed);
-        // The others stay where they were.
+        // Limbs that are not driven keep their poses.
         self.moved.clone_from(&self.closed);
         for (limb, part) in body.limbs().iter().enumerate() {
             self.closed[limb] = match &part.parent {
@@ -119,12 +122,12 @@ impl WarmStart {
         }
     }
 
-    /// Points of the limbs that follow draw them, those of the others hold them where they are.
+    /// Points of the following limbs pull them; points of the other limbs hold those in place.
     fn add_points(&mut self, problem: &Problem, information: f64) {
         let Problem { body, correspondences, config, .. } = problem;
         let surface =
             |slide| Surface { correspondences, information, tangential_weight: slide, scale: config.kernel_start };
-        // Limbs that follow may slide along themselves.
+        // Following limbs may slide along their own axis.
         surface(config.tangential_weight).add(body, &self.closed, &mut self.normal);
         self.held.clear(self.closed.len());
         surface(1.0).add(body, &self.closed, &mut self.held);
@@ -135,7 +138,7 @@ impl WarmStart {
     }
 }
 
-/// Closes the joints from the root outwards, orientations kept.
+/// Closes the joints from the root outwards, keeping orientations.
 fn close(body: &Body, poses: &mut [Pose]) {
     for (index, limb) in body.limbs().iter().enumerate() {
         if let Some((parent, joint)) = &limb.parent {
@@ -145,7 +148,7 @@ fn close(body: &Body, poses: &mut [Pose]) {
     }
 }
 
-/// Marks the limbs from `limb` to the first whose parent carries several.
+/// Marks `limb` and its ancestors, up to the first limb whose parent has several children.
 fn drive_from(body: &Body, limb: usize, driven: &mut [bool]) {
     let mut next = Some(limb);
     while let Some(limb) = next {

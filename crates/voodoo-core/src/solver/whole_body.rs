@@ -1,4 +1,4 @@
-//! All limbs at once: the terms are summed into one system, which the chain or the tree solves.
+//! Solves for all limbs at once: sums the terms into one system, which the chain or the tree solves.
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
@@ -12,32 +12,36 @@ use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term};
 
-/// Standard deviation of an axis that lies in another limb or below the floor, meters.
+/// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
 const OVERLAP_SIGMA: f64 = 0.03;
-/// Scatter of the points about the body from which deviations count as noise in full, in units of `point_sigma`.
+/// Scatter of the points about the body at which the still prior has its full gain, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
-/// From this step on, what is left of a deviation from the prediction may be noise: before, the body has to find its points.
+/// From this step on, a remaining deviation from the prediction may be noise; in earlier steps the points are still being
+/// matched.
 const STILL_FROM: usize = 3;
-/// Where points are measured, all steps of a frame but the last go so many times as far as the linear system says: closest points
-/// follow the body, so what they ask for is only a part of the way (P. Besl and N. McKay, "A Method for Registration of 3-D
-/// Shapes", IEEE PAMI 1992, whose accelerated steps go on along a line as well).
+/// Over-relaxation: where points are measured, every step of a frame but the last is scaled by this factor. Closest points move
+/// with the body, so the linear system yields only a part of the way (P. Besl and N. McKay, "A Method for Registration of 3-D
+/// Shapes", IEEE PAMI 1992, whose accelerated steps also extrapolate along a line).
 const OVER_RELAXATION: f64 = 1.4;
-/// A limb with this many matched patches moves freely; one with fewer in proportion less, down to the second share.
+/// Weight of matched patches from which a limb moves freely. With less, its expected motion is reduced in proportion, down to
+/// the fraction below.
 const FREE_WEIGHT: f64 = 20.0;
 const HIDDEN_MOTION: f64 = 0.1;
-/// Share by which a hand, foot or head that does not show at all is drawn to its posture at rest in 1/30 s: else it would keep for
-/// ever how it was seen last. In a quarter of a second it comes half of the way.
+/// Fraction by which a fully occluded hand, foot or head is pulled towards its rest posture per 1/30 s; otherwise it would keep
+/// its last observed posture forever. It covers half of the way in a quarter of a second.
 const TO_REST: f64 = 0.1;
-/// By contours alone every joint moves by so much at least, radians: no points hold a shoulder where it is not.
+/// Minimum expected motion of a joint when only contours are measured, radians: no points hold a wrong shoulder there.
 const LEAST_MOTION: f64 = 0.1;
-/// By contours alone a joint that turns little is held to where it is at rest by a standard deviation of this share of half of its
-/// range, times `motion_scale`.
+/// When only contours are measured, joints with a small range are pulled to their rest position, with a standard deviation of
+/// this fraction of half of the range, times `motion_scale`.
 const POSTURE: f64 = 1.0;
-/// Information that holds a length's relative change back in one frame, and that draws it to the length set.
+/// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
+/// length.
 pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
-/// Least scale of the kernel of sites, meters: they were gated before, and a limb that is lost comes from far.
+/// Minimum scale of the kernel of sites, meters: sites were gated before, and a lost limb has a large residual.
 pub(crate) const SITE_SCALE: f64 = 0.15;
-/// Sites farther than this from their measurement drive the chain before the points are assigned, meters; rounds of it.
+/// Sites farther than this from their measurement move the chain before points are assigned, meters; and the number of such
+/// rounds.
 const DRIVEN_FROM: f64 = 0.25;
 const WARM_START_ROUNDS: usize = 4;
 
@@ -46,23 +50,23 @@ const WARM_START_ROUNDS: usize = 4;
 pub(crate) struct WholeBody {
     normal: NormalEquations,
     chain: ChainSolver,
-    /// Moves the limbs instead of the chain, if there.
+    /// Solves for the limbs instead of the chain, if present.
     tree: Option<TreeSolver>,
     lengths: Lengths,
     warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
-    /// Shares by which joints are drawn to their turns at rest.
+    /// Fractions by which joints are pulled towards their rest rotations.
     rests: Vec<f64>,
-    /// Weight of the sites on each limb and beyond it.
+    /// Weight of the sites on each limb and its descendants.
     sites: Vec<f64>,
-    /// Weight of the edges of colors on each limb.
+    /// Weight of the color edges on each limb.
     edges: Vec<f64>,
-    /// A sphere around each limb.
+    /// Bounding sphere of each limb.
     spheres: Vec<(Vec3, f64)>,
     stillness: Stillness,
 }
 
-/// How calm the root and the joints are, as the step has said in which a frame began to hold them, and the last step.
+/// Stillness of the root and the joints, computed in the step in which the still prior begins; and the last step.
 #[derive(Debug, Default)]
 struct Stillness {
     joints: Vec<f64>,
@@ -88,7 +92,7 @@ impl Solver for WholeBody {
     }
 
     fn prepare(&mut self, problem: &Problem, poses: &mut [Pose]) -> bool {
-        // From so far, points that are thought to lie on the limb where it was would hold it there.
+        // At such a distance, points assigned to the limb at its old pose would hold it there.
         if self.tree.is_some() || !self.warm_start.drives_far(problem, DRIVEN_FROM) {
             return false;
         }
@@ -110,12 +114,12 @@ impl Solver for WholeBody {
 }
 
 impl WholeBody {
-    /// The same terms, solved with elastic bands.
+    /// A solver with the same terms, and elastic bands at the joints.
     pub(crate) fn tree() -> Self {
         Self { tree: Some(TreeSolver::default()), ..Self::default() }
     }
 
-    /// The normal equations at `poses`, with or without the sites that may always be off.
+    /// Sums the normal equations at `poses`, with or without the sites that have a bias.
     fn sum_terms(&mut self, problem: &Problem, poses: &[Pose], biased: bool) {
         self.weigh_sites(problem, poses.len(), biased);
         self.expect_motion(problem);
@@ -139,7 +143,7 @@ impl WholeBody {
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
         let posture = Posture { fraction: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
-        // The objective: one more term is a file and a line here.
+        // The cost function: a new term is a new file and a line here.
         let terms: [Option<&dyn Term>; 9] = [
             Some(&surface),
             Some(&sites),
@@ -157,7 +161,7 @@ impl WholeBody {
         }
     }
 
-    /// A site speaks for every joint between it and the root: what a hand is seen to do, its arm does.
+    /// A site gives information on every joint between it and the root: the position of a hand constrains the arm.
     fn weigh_sites(&mut self, problem: &Problem, limbs: usize, biased: bool) {
         self.sites.clear();
         self.sites.resize(limbs, 0.0);
@@ -171,7 +175,7 @@ impl WholeBody {
         }
     }
 
-    /// Standard deviation of every joint's motion.
+    /// Computes the standard deviation of every joint's motion.
     fn expect_motion(&mut self, problem: &Problem) {
         let information = 1.0 / (problem.config.point_sigma * problem.config.point_sigma);
         self.edges.clear();
@@ -185,7 +189,7 @@ impl WholeBody {
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
             let motion = if contours_alone { motion.max(LEAST_MOTION) } else { motion };
-            // A limb that hardly shows keeps to what is expected: a few stray points must not swing it.
+            // A limb that is hardly visible stays near its prediction: a few stray points must not move it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let measured_fraction = (measured / FREE_WEIGHT).min(1.0);
             let end = part.match_caps[1] && !contours_alone;
@@ -202,10 +206,10 @@ impl WholeBody {
 }
 
 impl Stillness {
-    /// How much tighter the root and each joint are held in this step, at most by `gain`.
+    /// Additional information of the root and of each joint in this step, at most `gain`.
     fn prior_gains(&mut self, problem: &Problem, prior: &Prior, poses: &[Pose], gain: f64) -> &[f64] {
         let Self { joints, step, holds } = self;
-        // A frame, and every hypothesis in it, begins with an earlier step than the last one before.
+        // Each frame, and each hypothesis in it, starts at a step that is not after the last one of its predecessor.
         let anew = problem.step <= *step || joints.len() != poses.len();
         *step = problem.step;
         if anew || problem.step == STILL_FROM {
@@ -217,18 +221,18 @@ impl Stillness {
     }
 }
 
-/// Whether edges of colors are matched and no points.
+/// Whether color edges are matched and no points.
 fn contours_alone(problem: &Problem) -> bool {
     let Problem { correspondences, .. } = problem;
     !correspondences.regions.is_empty() && correspondences.limbs.iter().all(|matches| matches.candidate.is_empty())
 }
 
-/// How much tighter small deviations from the prediction are held, in this step.
+/// Gain of the prior for small deviations from the prediction, in this step.
 fn still_prior_gain(problem: &Problem, information: f64) -> f64 {
     let Problem { correspondences, config, step, .. } = problem;
-    // After the last step only lengths are asked for: a pose held tightly would let them bear every deviation.
+    // After the last step only lengths are estimated: with a tight prior of the pose, they would absorb every deviation.
     let holds = (STILL_FROM..config.max_steps).contains(step);
-    // Points that lie closer to the body than they are trusted to are not at rest by chance: what they show is motion.
+    // When points lie closer to the body than `point_sigma` suggests, a small deviation is motion and not noise.
     let scatter = if holds { correspondences.scatter(config.kernel_end).unwrap_or(0.0) } else { 0.0 };
     config.still_prior_gain * (scatter * information / (ROUGH * ROUGH)).min(1.0)
 }

@@ -1,4 +1,4 @@
-//! The body's contour in depth images: no limb stands out of it, and none keeps from an edge that is its own.
+//! The depth contour of the body: pulls a limb's rim towards the edges observed in depth images, outward or inward.
 
 use super::{Term, surface::geman_mcclure};
 use crate::association::correspondence::ContourPair;
@@ -6,7 +6,7 @@ use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
-/// Edges along their direction across the limb, under the Geman-McClure kernel.
+/// Distances of edges along their direction, under the Geman-McClure kernel.
 #[derive(Debug)]
 pub(crate) struct Contour<'a> {
     /// The pairs.

@@ -1,5 +1,5 @@
-//! Nobody stands in the floor: the ends of limbs stay above it. Soft, as limbs are among each other: the floor may be told or seen a
-//! little wrong.
+//! Keeps the ends of limbs above the ground plane. The constraint is soft, as between limbs: the given or estimated plane may
+//! have a small error.
 
 use super::Term;
 use crate::body::Body;
@@ -10,7 +10,7 @@ use crate::terms::normal_equations::{NormalEquations, line};
 /// One-sided: `r = max(0, -height)` for the distal end of every limb's axis.
 #[derive(Debug)]
 pub(crate) struct Floor {
-    /// The floor, in the frame of the poses.
+    /// The ground plane, in the frame of the poses.
     pub plane: Ground,
     /// Standard deviation of the depth below it, meters.
     pub sigma: f64,

@@ -27,7 +27,7 @@ impl Term for Limits {
                 } else {
                     continue;
                 };
-                // d v = J^-1 (relative turn in the joint frame); one row of the inverse left Jacobian.
+                // d v = J^-1 (relative rotation in the joint frame); one row of the inverse left Jacobian.
                 let row = inverse_left_jacobian_row(v, axis);
                 normal.joints[index].add_row(weight, world_from_joint * row, excess);
                 normal.cost += weight * excess * excess;
@@ -36,7 +36,7 @@ impl Term for Limits {
     }
 }
 
-/// The joint's axes in the world, and the rotation vector of its turn, joint frame, radians.
+/// The joint's axes in the world frame, and the rotation vector of its rotation in the joint frame, radians.
 pub(super) fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat, Vec3) {
     let world_from_joint = parent.rotation * joint.parent_from_joint.rotation;
     let turned = world_from_joint.inverse() * limb.rotation * joint.limb_from_joint.rotation;

@@ -1,4 +1,4 @@
-//! The energy: each term adds to the same normal equations. The list of files is the objective.
+//! The cost function: each term adds to the same normal equations. The list of files is the list of terms.
 
 mod contour;
 mod floor;
@@ -25,7 +25,7 @@ use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
-/// One influence on the pose.
+/// One term of the cost function.
 pub(crate) trait Term {
     /// Adds cost, gradient and information at `poses` (working frame).
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);

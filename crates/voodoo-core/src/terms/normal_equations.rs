@@ -1,8 +1,8 @@
-//! Normal equations of the whole body: what terms add to and whole-body solvers read.
+//! Normal equations of the whole body: terms add to them, and whole-body solvers solve them.
 //!
-//! A limb moves by a spatial twist `(omega, v)` about the working frame's origin: a point `x` fixed to it moves by
-//! `omega x x + v`. A joint turns by the relative angular motion `omega_child - omega_parent`, world axes.
-//! The cost is `sum w r^2`; `h = sum w J^T J`, `g = sum w J^T r`, the step `-h^-1 g`.
+//! A limb moves by a spatial twist `(omega, v)` about the working frame's origin: a point `x` fixed to it moves by `omega x x +
+//! v`. A joint rotates by the relative angular motion `omega_child - omega_parent`, in world axes. The cost is `sum w r^2`; `h =
+//! sum w J^T J`, `g = sum w J^T r`, and the step is `-h^-1 g`.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -17,10 +17,10 @@ pub(crate) struct LimbBlock {
     pub g: Vector6<f64>,
 }
 
-/// Normal equations of one joint's relative turn (the joint of a limb to its parent).
+/// Normal equations of the relative rotation of one joint (the joint of a limb to its parent).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct JointBlock {
-    /// Information of the turn.
+    /// Information of the rotation.
     pub h: Matrix3<f64>,
     /// Half the gradient.
     pub g: Vector3<f64>,
@@ -29,16 +29,16 @@ pub(crate) struct JointBlock {
 /// The whole system and its cost.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NormalEquations {
-    /// One block a limb.
+    /// One block per limb.
     pub limbs: Vec<LimbBlock>,
-    /// One block a limb, for its joint; unused for the root.
+    /// One block per limb, for its joint; unused for the root.
     pub joints: Vec<JointBlock>,
     /// Value of the cost.
     pub cost: f64,
 }
 
 impl NormalEquations {
-    /// Empties the system for `limbs` limbs.
+    /// Clears the system for `limbs` limbs.
     pub(crate) fn clear(&mut self, limbs: usize) {
         self.limbs.clear();
         self.limbs.resize(limbs, LimbBlock::default());
@@ -64,7 +64,7 @@ impl LimbBlock {
 
     /// Adds a vector residual `r` of a point at `x` with information `w`.
     pub(crate) fn add_point(&mut self, information: &Mat3, x: Vec3, r: Vec3) {
-        // Rows of J = [-[x]x, I], one a world axis.
+        // Rows of J = [-[x]x, I], one per world axis.
         let rows = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| line(x, axis));
         let force = *information * r;
         for i in 0..3 {
@@ -77,7 +77,7 @@ impl LimbBlock {
 }
 
 impl JointBlock {
-    /// Adds a vector residual `r` of the relative turn with information `weight` and unit derivative.
+    /// Adds a vector residual `r` of the relative rotation with information `weight` and unit derivative.
     pub(crate) fn add_turn(&mut self, weight: f64, r: Vec3) {
         self.h += Matrix3::identity() * weight;
         self.g += Vector3::new(r.x, r.y, r.z) * weight;

@@ -1,5 +1,5 @@
-//! Limbs do not pass through each other: a limb's axis stays out of other limbs. Limbs are soft, and fatter here than they are, so
-//! that their surfaces may overlap.
+//! Limbs do not pass through each other: keeps each limb's axis outside of other limbs. Surfaces may overlap, because limbs are
+//! soft, and the models are thicker than real limbs.
 
 use super::Term;
 use crate::body::Body;
@@ -7,18 +7,18 @@ use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 use crate::terms::normal_equations::NormalEquations;
 
-/// Where on a limb's axis overlap is felt, as shares of the length: both ends, and two places between.
+/// Positions on a limb's axis that are tested for overlap, as fractions of the length: both ends, and two positions between.
 const FELT: [f64; 4] = [0.0, 0.35, 0.7, 1.0];
-/// Error of `approximate_distance` that is allowed for before the exact distance is asked, meters.
+/// Assumed error of `approximate_distance`; the exact distance is only computed within this margin, meters.
 const APPROXIMATE: f64 = 0.01;
 
-/// One-sided: `r = max(0, -distance)` for every felt point against every limb that is neither joined to its
-/// own nor hangs on the same parent. Those overlap at their joints in any pose.
+/// One-sided: `r = max(0, -distance)` for every tested point against every limb that is neither joined to the point's limb nor
+/// has the same parent. Such limbs overlap at their joints in any pose.
 #[derive(Debug)]
 pub(crate) struct Penetration<'a> {
     /// Standard deviation of the overlap, meters.
     pub sigma: f64,
-    /// [`TaperedEllipticCylinder::sphere`] of every limb: most are far from each other.
+    /// [`TaperedEllipticCylinder::sphere`] of every limb: excludes most pairs, which are far apart.
     pub spheres: &'a [(Vec3, f64)],
 }
 
@@ -54,17 +54,17 @@ impl Penetration<'_> {
             if overlap <= 0.0 {
                 continue;
             }
-            // The distance grows as the point moves along the normal, and as the surface moves against it.
+            // The distance grows when the point moves along the normal, and when the surface moves against it.
             let row = crate::terms::normal_equations::line(poses[other] * local, poses[other].rotation * found.normal);
             normal.cost += weight * overlap * overlap;
-            // The mixed block of the two twists is left out: the system is one of single limbs and joints.
+            // The mixed block of the two twists is left out: the system only has blocks of single limbs and joints.
             normal.limbs[limb].add_row(weight, &-row, overlap);
             normal.limbs[other].add_row(weight, &row, overlap);
         }
     }
 }
 
-/// Whether a point, limb frame, lies outside the box around the shape.
+/// Whether a point in the limb frame lies outside the box around the shape.
 fn is_outside_box(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
     q.x.abs() > shape.a0().max(shape.a1())
         || q.y.abs() > shape.b0().max(shape.b1())
@@ -72,7 +72,7 @@ fn is_outside_box(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
         || q.z > shape.length()
 }
 
-/// Whether two spheres meet.
+/// Whether two spheres intersect.
 fn overlap((from, reach): (Vec3, f64), (to, other_reach): (Vec3, f64)) -> bool {
     (to - from).length_squared() < (reach + other_reach).powi(2)
 }

@@ -1,7 +1,8 @@
-//! A usual posture: joints that turn little are drawn to where they are at rest.
+//! Rest posture: pulls joints with a small range of motion towards their rest position.
 //!
-//! Edges of colors err alike, and what two cameras see from opposite sides says hardly anything of a turn along their line of
-//! sight: a pelvis turns, a spine twists a little farther with every frame, and nothing turns it back.
+//! The errors of color edges are correlated, and two cameras on opposite sides give almost no evidence for a rotation about
+//! their line of sight. Without this term, the pelvis rotates and the spine twists a little farther with every frame, and
+//! nothing pulls them back.
 
 use super::Term;
 use super::limits::{inverse_left_jacobian_row, turn_in_joint};
@@ -9,14 +10,14 @@ use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
-/// A component that may turn farther than this in all, radians, swings where it likes: those of shoulders, elbows and knees, and
-/// the bends of hips and back.
+/// A component with a range larger than this, radians, is left free: those of shoulders, elbows and knees, and the bending of
+/// hips and back.
 const SWINGS: f64 = 1.7;
 
 /// All joints that have limits.
 #[derive(Debug)]
 pub(crate) struct Posture {
-    /// Standard deviation of each component of a joint's turn, as a share of half of what it may turn in all.
+    /// Standard deviation of each component of a joint's rotation, as a fraction of half of its range.
     pub fraction: f64,
 }
 
@@ -33,7 +34,7 @@ impl Term for Posture {
                 }
                 let sigma = 0.5 * range * self.fraction;
                 let weight = 1.0 / (sigma * sigma);
-                // At rest the turn is none, or as little as the limits let it be.
+                // At rest the rotation is zero, or the nearest value within the limits.
                 let off = v[axis] - 0.0_f64.clamp(*low, *high);
                 normal.joints[index].add_row(weight, world_from_joint * inverse_left_jacobian_row(v, axis), off);
                 normal.cost += weight * off * off;
@@ -62,7 +63,7 @@ mod tests {
         assert!(cost(body, &poses) < 1e-12 && cost(body, &arm_up) < 1e-12);
         let mut twisted = poses.clone();
         twisted[0] = turned(&poses[..1], poses[0].translation, poses[0].rotation * crate::math::Vec3::Z, 0.3)[0];
-        // A waist and two hips, each a bit more than a standard deviation off.
+        // A waist and two hips, each slightly more than one standard deviation from rest.
         assert!((2.0..12.0).contains(&cost(body, &twisted)), "{}", cost(body, &twisted));
     }
 }

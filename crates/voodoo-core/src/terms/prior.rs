@@ -1,9 +1,11 @@
-//! Prediction and smoothness (R07 eq. 16-18, 26): the root's twist and every joint's turn are drawn to the predicted ones.
+//! Prediction and smoothness (R07 eq. 16-18, 26): pulls the twist of the root and the rotation of every joint towards the
+//! predicted ones.
 //!
-//! R07's penalty is quadratic: what is strong enough for a body at rest makes a fast one late. Here every joint is held tighter the
-//! less it wants to deviate from what is expected ([`Prior::stillness`]): a small deviation is taken for noise. That is decided once
-//! a frame, by where the measurements alone have moved the joint; judged anew in every step, what is held deviates less and is
-//! held tighter still, until it sticks where it happened to be in the frame before.
+//! R07's penalty is quadratic: if it is strong enough for a body at rest, it makes a fast body lag. Here the information of a
+//! joint grows the less the measurements move it from the prediction ([`Prior::stillness`]), because a small deviation is
+//! probably noise. The stillness is computed once per frame, from the deviation that the measurements alone cause. Computed
+//! again in every step, it would feed back: a tighter prior makes the deviation smaller, which tightens the prior further, until
+//! the joint sticks at its previous position.
 
 use super::Term;
 use super::surface::geman_mcclure;
@@ -11,9 +13,9 @@ use crate::body::{Body, Joint};
 use crate::math::{Pose, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
-/// Deviation, in standard deviations of expected motion, at which a joint is held by a quarter: what is smaller counts as noise.
+/// Deviation, in standard deviations of the expected motion, at which the stillness is a quarter: smaller ones count as noise.
 const WELL: f64 = 0.6;
-/// Share of it that holds the root: what all limbs agree on is less likely noise.
+/// Factor of the additional information for the root: a deviation that all limbs share is less likely to be noise.
 const ROOT_FRACTION: f64 = 0.2;
 
 /// Deviation from a predicted pose.
@@ -23,16 +25,16 @@ pub(crate) struct Prior<'a> {
     pub predicted: &'a [Pose],
     /// Standard deviations of the root: radians, meters.
     pub root: [f64; 2],
-    /// Standard deviation of each joint's turn, radians.
+    /// Standard deviation of each joint's rotation, radians.
     pub joints: &'a [f64],
-    /// How much tighter the root (first) and each joint are held, as multiples of their information; empty: not at all.
+    /// Additional information of the root (first) and of each joint, as multiples of their information; empty for none.
     pub holds: &'a [f64],
-    /// The share by which the turn expected of each joint is drawn to that at rest; empty: not at all.
+    /// Fraction by which the expected rotation of each joint is moved towards its rest rotation; empty for none.
     pub rests: &'a [f64],
 }
 
 impl Prior<'_> {
-    /// How calm the root (first) and each joint are, into `stillness`: 1 where they are as expected, 0 where they move.
+    /// Writes the stillness of the root (first) and of each joint: 1 where they are as predicted, towards 0 where they move.
     pub(crate) fn stillness(&self, body: &Body, poses: &[Pose], stillness: &mut Vec<f64>) {
         let fraction = |deviation: f64| geman_mcclure(deviation, WELL).1;
         stillness.clear();
@@ -45,13 +47,13 @@ impl Prior<'_> {
         }));
     }
 
-    /// Turn and shift of the root, apart, so that the lever to the working origin does not matter.
+    /// Rotation and translation of the root as separate terms, so that the lever to the working origin does not matter.
     fn root_deviation(&self, poses: &[Pose]) -> (Vec3, Vec3) {
         let turn = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
         (turn, poses[0].translation - self.predicted[0].translation)
     }
 
-    /// Turn of a limb against its parent from the one that is expected, in the parent's frame.
+    /// Rotation from the expected to the current orientation of a limb relative to its parent, in the parent frame.
     fn turn(&self, poses: &[Pose], parent: usize, limb: usize, joint: &Joint) -> Vec3 {
         let relative = |poses: &[Pose]| poses[parent].rotation.inverse() * poses[limb].rotation;
         let expected = match self.rests.get(limb) {
@@ -80,7 +82,7 @@ impl Term for Prior<'_> {
         }
         for (index, limb) in body.limbs().iter().enumerate() {
             let Some((parent, joint)) = &limb.parent else { continue };
-            // In world axes its derivative by the relative turn is one.
+            // In world axes its derivative with respect to the relative rotation is one.
             let r = poses[*parent].rotation * self.turn(poses, *parent, index, joint);
             let weight = information(self.joints[index], hold(index));
             normal.joints[index].add_turn(weight, r);

@@ -1,4 +1,4 @@
-//! Edges of color regions (R07 section 3): each a distance along one direction, as certain as its colors are.
+//! Edges of color regions (R07 section 3): each is a distance along one direction, with the information of its colors.
 
 use super::Term;
 use crate::association::correspondence::RegionPair;

@@ -15,7 +15,7 @@ pub(crate) struct Sites<'a> {
     pub information: f64,
     /// Scale of the kernel, meters.
     pub scale: f64,
-    /// Whether sites with a bias count: one that may always be off can move a limb, but not tell how long it is.
+    /// Whether to include sites with a bias: a site with a constant error can move a limb, but cannot measure its length.
     pub biased: bool,
 }
 

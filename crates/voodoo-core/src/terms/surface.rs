@@ -1,4 +1,4 @@
-//! Measured surface points: robust point-to-plane with a little point-to-point (method section 1).
+//! Measured surface points: robust point-to-plane distance with a small point-to-point part (method section 1).
 
 use super::Term;
 use crate::association::correspondence::{Correspondences, LimbMatches};
@@ -13,7 +13,7 @@ pub(crate) struct Surface<'a> {
     pub correspondences: &'a Correspondences,
     /// Information of a point of weight one, 1/m^2.
     pub information: f64,
-    /// Share of the information across the normal: it stops sliding.
+    /// Tangential information as a fraction of the normal information: it prevents sliding.
     pub tangential_weight: f64,
     /// Scale of the kernel, meters.
     pub scale: f64,
@@ -40,8 +40,8 @@ impl Term for Surface<'_> {
 
 type SurfaceLanes = [f32; LANES];
 
-/// Sums over the points of a limb, each split into lanes. Points lie near the working frame's origin and are single
-/// precision themselves: so are their sums.
+/// Sums over the points of a limb, each split into lanes. The sums are in single precision, as are the points, which lie near
+/// the working frame's origin.
 struct Sums {
     cost: SurfaceLanes,
     /// Lower triangle of the point-to-plane information, row by row.
@@ -73,12 +73,12 @@ impl Surface<'_> {
         ];
         let count = matches.weight.len() / LANES;
         let [x, y, z, nx, ny, nz, distance, weight] = columns.map(|column| &column.as_chunks::<LANES>().0[..count]);
-        // Spelled out: an array's `map` within the loop is not inlined.
+        // Written out, because an array's `map` within the loop is not inlined.
         for i in 0..count {
             self.sum_block([x[i], y[i], z[i], nx[i], ny[i], nz[i], distance[i], weight[i]], &mut sums);
         }
         if count * LANES < matches.weight.len() {
-            // Nothing is what the empty lanes weigh.
+            // Empty lanes have weight zero.
             let last = columns.map(|column| {
                 let rest = &column[count * LANES..];
                 let mut lanes = [0.0; LANES];
@@ -110,7 +110,7 @@ impl Surface<'_> {
             row[1][l] = z[l] * nx[l] - x[l] * nz[l];
             row[2][l] = x[l] * ny[l] - y[l] * nx[l];
         }
-        // A row at a time: loops of one length each are unrolled as a whole.
+        // One row at a time: loops of one length each are fully unrolled.
         sums.add_row::<0>(&row, &plane, &pull);
         sums.add_row::<1>(&row, &plane, &pull);
         sums.add_row::<2>(&row, &plane, &pull);
@@ -147,7 +147,7 @@ fn add_product(sum: &mut SurfaceLanes, left: &SurfaceLanes, right: &SurfaceLanes
 }
 
 impl Sums {
-    /// Adds what row `I` of the information and of the gradient gets of a block of points.
+    /// Adds the contribution of a block of points to row `I` of the information and of the gradient.
     #[inline(always)]
     fn add_row<const I: usize>(&mut self, row: &[SurfaceLanes; 6], plane: &SurfaceLanes, pull: &SurfaceLanes) {
         add_product(&mut self.gradient[I], pull, &row[I]);

@@ -22,7 +22,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// Adds a limb (a held box); it starts with its joint closed and at rest.
+    /// Adds a limb, for example a held box. It starts with its joint closed and in the rest pose.
     pub fn add_limb(
         &mut self,
         name: &str,
@@ -41,7 +41,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// Removes a limb with all that hangs on it.
+    /// Removes a limb with all its descendants.
     pub fn remove_limb(&mut self, name: &str) -> Result<(), BodyError> {
         let kept = self.model.remove_limb(name)?;
         if self.is_started() {
@@ -51,15 +51,15 @@ impl Tracker {
         Ok(())
     }
 
-    /// Keeps what a color camera sees of the scene without anybody: pictures with their heights and widths; none: forgets it.
+    /// Stores color pictures of the empty scene for a color camera, each with its height and width. An empty slice removes them.
     pub fn set_background(&mut self, camera: u16, pictures: &[(ColorPixels, [usize; 2])]) -> Result<(), TrackError> {
         self.fit.regions_mut().set_background(camera, pictures)
     }
 
-    /// Takes note of a changed body and closes its joints from the root outwards, orientations kept.
+    /// Updates the tracker after a change of the body, and closes the joints from the root outwards; orientations are kept.
     fn edited(&mut self) {
         let Self { model, motion, fit, hypotheses, relocalizer, sizes, assessor, estimate, .. } = self;
-        // The motion starts anew: the poses before belong to another body.
+        // The motion restarts because the previous poses belong to another body.
         motion.forget();
         hypotheses.restart(model);
         relocalizer.bind(&model.body);

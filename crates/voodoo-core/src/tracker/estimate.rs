@@ -1,4 +1,4 @@
-//! What a step found.
+//! Results of a step.
 
 use crate::math::{Pose, Vec3};
 use crate::uncertainty::Covariances;
@@ -11,18 +11,18 @@ pub enum Status {
     Tracking,
     /// More than a quarter of the limbs are not measured.
     Degraded,
-    /// Hardly anything measured supports the pose, or what is seen there is flat.
+    /// Few measurements support the pose, or the observed surface is flat.
     Lost,
-    /// There is no pose: it is looked for.
+    /// There is no pose; the tracker searches for the body.
     #[default]
     Searching,
 }
 
 impl Status {
-    /// All there are.
+    /// All values.
     pub const ALL: &[Self] = &[Self::Tracking, Self::Degraded, Self::Lost, Self::Searching];
 
-    /// Its name in results and messages.
+    /// Returns the name used in results and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tracking => "tracking",
@@ -39,19 +39,19 @@ impl Status {
 pub enum LimbStatus {
     /// Measurements support it.
     Measured,
-    /// Hidden, out of view, or nothing seen that another limb would not explain as well: carried by its joints and the
+    /// Occluded, out of view, or without evidence that another limb would not explain as well: given by its joints and the
     /// prediction.
     Inferred,
-    /// It should show where it is, and does not.
+    /// It should be visible in its pose, but is not.
     #[default]
     Lost,
 }
 
 impl LimbStatus {
-    /// All there are.
+    /// All values.
     pub const ALL: &[Self] = &[Self::Measured, Self::Inferred, Self::Lost];
 
-    /// Its name in results and messages.
+    /// Returns the name used in results and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -61,17 +61,17 @@ impl LimbStatus {
     }
 }
 
-/// What one source gave to a step.
+/// Contribution of one source to a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct SourceReport {
-    /// Measurements of the source that were candidates.
+    /// Number of measurements of the source that were candidates.
     pub count: usize,
-    /// Those that matched the body.
+    /// Number of those that matched the body.
     pub inliers: usize,
-    /// Sum of the weights of the matched ones.
+    /// Sum of the weights of the matched measurements.
     pub weight: f64,
-    /// Root of the weighted mean of their squared distances, meters; NaN without any.
+    /// Root of the weighted mean of the squared distances of the matched measurements, meters; NaN without any.
     pub residual: f64,
 }
 
@@ -81,9 +81,9 @@ pub struct SourceReport {
 pub struct Estimate {
     /// Time of the frame; NaN after a reset and before the first one.
     pub stamp: f64,
-    /// How much it can be relied on.
+    /// Reliability of the pose.
     pub status: Status,
-    /// How much every limb can be relied on.
+    /// Reliability of every limb's pose.
     pub limb_status: Vec<LimbStatus>,
     /// Pose of every limb.
     pub world_from_limb: Vec<Pose>,
@@ -93,20 +93,20 @@ pub struct Estimate {
     pub mean_squared_distance: f64,
     /// ICP steps used.
     pub steps: usize,
-    /// Matched points of every limb.
+    /// Number of matched points of every limb.
     pub limb_points: Vec<usize>,
-    /// Root of the mean squared distance of every limb; NaN without points.
+    /// Root of the mean squared distance of every limb's points, meters; NaN without points.
     pub limb_residual: Vec<f64>,
     /// Distance between the two centers of the joint of every limb to its parent; 0 for the root.
     pub joint_gaps: Vec<f64>,
-    /// What each source gave.
+    /// Contribution of each source.
     pub sources: Vec<SourceReport>,
-    /// How far the pose may be off.
+    /// Covariances of limb poses, joint angles and site positions.
     pub covariances: Covariances,
 }
 
 impl Default for Estimate {
-    /// Of a tracker without a pose: nothing measured.
+    /// Returns the estimate of a tracker without a pose: nothing measured.
     fn default() -> Self {
         Self {
             stamp: f64::NAN,

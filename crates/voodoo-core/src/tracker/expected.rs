@@ -1,14 +1,14 @@
-//! Where the body is at other times than the last frame's, by the last two estimates.
+//! Extrapolation of the body from the last two estimates to other times.
 
 use super::Tracker;
 use super::estimate::Estimate;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 
-/// A site that is faster, meters a second, has jumped: it is expected to rest.
+/// Largest plausible speed of a site, meters per second. A faster site has jumped and is expected to stay where it is.
 const FASTEST_SITE: f64 = 8.0;
 
-/// What is kept of the estimate before the last one.
+/// The parts of the estimate before the last one that extrapolation needs.
 #[derive(Debug, Default)]
 pub(super) struct Before {
     stamp: f64,
@@ -17,7 +17,7 @@ pub(super) struct Before {
 }
 
 impl Before {
-    /// Keeps an estimate; another one follows.
+    /// Stores an estimate before it is replaced.
     pub(super) fn keep(&mut self, estimate: &Estimate) {
         self.stamp = estimate.stamp;
         self.world_from_limb.clone_from(&estimate.world_from_limb);
@@ -25,19 +25,19 @@ impl Before {
     }
 }
 
-/// Poses of all limbs in the last two estimates, world.
+/// Poses of all limbs in the last two estimates, world frame.
 #[derive(Clone, Copy, Debug)]
 pub struct LimbMotion<'a> {
-    /// In the last one.
+    /// Poses in the last estimate.
     pub now: &'a [Pose],
-    /// In the one before.
+    /// Poses in the estimate before.
     pub before: &'a [Pose],
-    /// Time between the two, seconds.
+    /// Time between the two estimates, seconds.
     pub interval: f64,
 }
 
 impl Tracker {
-    /// How limbs moved between the last two estimates; none where they do not belong together, as after a reset.
+    /// Returns the motion of the limbs between the last two estimates; `None` where these are unrelated, as after a reset.
     pub fn limb_motion(&self) -> Option<LimbMotion<'_>> {
         let (before, now) = (&self.before, &self.estimate);
         let interval = now.stamp - before.stamp;
@@ -49,8 +49,8 @@ impl Tracker {
         })
     }
 
-    /// Where every site is expected at a time, world, meters: the last estimate moved on by the share of its motion that is expected to
-    /// go on ([`crate::Config::prediction`]).
+    /// Returns the expected position of every site at a time, world frame, meters: the last estimate, extrapolated by the
+    /// fraction of its motion that is expected to continue ([`crate::Config::prediction`]).
     ///
     /// # Errors
     /// [`TrackError::NotInitialized`] without a pose.
@@ -75,7 +75,7 @@ mod tests {
     use crate::body::HumanModel;
     use crate::{Body, Config};
 
-    /// A tracker whose body went from one place to another in a tenth of a second.
+    /// Returns a tracker whose body moved by `shift` within a tenth of a second.
     fn moved(shift: Vec3) -> Tracker {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let mut tracker = Tracker::new(body.clone(), Config { prediction: 0.5, ..Config::default() }).unwrap();

@@ -1,4 +1,4 @@
-//! The tracker: `step` names the method.
+//! The tracker of one body. [`Tracker::step`] documents the method.
 
 mod assess;
 mod edits;
@@ -25,7 +25,7 @@ use assess::Assessor;
 use estimate::{Estimate, Status};
 use expected::Before;
 
-/// Follows one body through frames.
+/// Tracks one body through a sequence of frames.
 #[derive(Debug)]
 pub struct Tracker {
     config: Config,
@@ -42,7 +42,7 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// A tracker of `body`. It has no pose until [`Tracker::reset`].
+    /// Returns a tracker of `body`. It has no pose until [`Tracker::reset`].
     pub fn new(body: Body, config: Config) -> Result<Self, TrackError> {
         Ok(Self {
             model: Model::new(body),
@@ -59,31 +59,32 @@ impl Tracker {
         })
     }
 
-    /// The same tracker with a detector: it finds the body without a pose, finds it again when it is lost, and notices when it is
-    /// elsewhere than it is tracked. Without one, a lost body is looked for in everything of its size that is no background.
+    /// Returns the tracker with a detector. The detector initializes the body without a pose, finds it again when it is lost, and
+    /// detects when the body is elsewhere than its track. Without a detector, a lost body is searched for in every foreground
+    /// segment of its size.
     pub fn with_detector(mut self, detector: Box<dyn Detect>) -> Self {
         self.set_detector(Some(detector));
         self
     }
 
-    /// Takes another detector, or none.
+    /// Replaces the detector, or removes it.
     pub(crate) fn set_detector(&mut self, detector: Option<Box<dyn Detect>>) {
         self.relocalizer.set_detector(detector, &self.model.body);
     }
 
-    /// Whether it looks for the body while it has no pose: it has a detector that knows the body.
+    /// Whether the tracker searches for the body while it has no pose: it has a detector that supports this body.
     pub fn can_search(&self) -> bool {
         self.relocalizer.can_detect()
     }
 
-    /// Why the detector could not look in the last step, if it could not. The step went on without detections.
+    /// The error of the detector in the last step, if it failed. The step then ran without detections.
     pub fn detector_error(&self) -> Option<&DetectError> {
         self.relocalizer.error()
     }
 
-    /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position);
-    /// sizes are fitted from those the body was given in, not from those of an earlier reset. Time may start anew afterwards.
-    /// The tracker is unchanged on error.
+    /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
+    /// are fitted starting from those of the body that was given to the tracker, not from those of an earlier reset. Stamps after
+    /// a reset may start again from any time. On error the tracker is unchanged.
     pub fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
         let (body, poses) = self.model.fit(positions, fit_sizes)?;
         self.restart(body, poses, fit_sizes);
@@ -117,12 +118,12 @@ impl Tracker {
         self.report(f64::NAN, 0, None);
     }
 
-    /// The pose at the next instant (K06 IV-B). On error the tracker is as before.
+    /// Updates the pose with the next frame (K06 IV-B). On error the tracker is unchanged.
     pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
         self.check(frame)?;
         self.before.keep(&self.estimate);
         self.relocalizer.clear_error();
-        // Where nobody tells the floor, it is where a detector saw it when it found the body.
+        // Where the ground plane is not given, the one that the detector found under the body is used.
         let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
         if self.is_started() {
             self.verify_start(frame);
@@ -133,8 +134,8 @@ impl Tracker {
         Ok(&self.estimate)
     }
 
-    /// In the first frame after a reset: where a detector sees the person elsewhere or the other way round, and the frame agrees,
-    /// the start was given wrongly.
+    /// Verifies a given start in the first frame after a reset. If the detector reports the person elsewhere or facing the other
+    /// way, and the frame confirms it, the start was wrong and the track restarts at the detection.
     fn verify_start(&mut self, frame: &Frame) {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
@@ -151,11 +152,12 @@ impl Tracker {
                 return;
             }
         }
-        // The start was right: what it says of body and scene counts.
+        // The start was right, so its sizes and scene are kept and the detection is dropped.
         relocalizer.forget();
     }
 
-    /// Starts anew where a detector sees the body, in the sizes it was set in or clearly has; whether it could.
+    /// Restarts the track at the current detection, in the sizes that were set or, where they clearly differ, in the detected
+    /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
         let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
@@ -169,14 +171,14 @@ impl Tracker {
         true
     }
 
-    /// Takes in what the detector that looked at this frame reports of the sizes.
+    /// Updates the sizes with the detection of this frame, if there is one.
     fn update_sizes(&mut self) {
         if let Some(detected) = self.relocalizer.detected() {
             self.sizes.update(detected);
         }
     }
 
-    /// Looks for a person, and follows the one that is found.
+    /// Searches for a person and tracks the one that is found.
     fn search(&mut self, frame: &Frame) {
         if let Some((body, poses)) = self.relocalizer.first_person(frame, &self.model) {
             self.restart(body, poses, true);
@@ -192,7 +194,8 @@ impl Tracker {
         self.stop(frame.stamp);
     }
 
-    /// Starts where a detector saw somebody, in their sizes or with `known` in those that the body has. Whether they are there.
+    /// Starts the track at a detection, in the detected sizes or, with `known`, in the sizes that the body has. Returns whether
+    /// the person is there.
     pub(crate) fn start_at_detection(
         &mut self,
         frame: &Frame,
@@ -200,7 +203,7 @@ impl Tracker {
         detected: Detected,
         known: bool,
     ) -> bool {
-        // Colors tell persons apart; they are none's alone.
+        // With several persons, color pictures only serve to identify them. No tracker is fitted to colors.
         let frame = &Frame { colors: &[], ..*frame };
         let Some((body, poses)) = self.relocalizer.place_body(&self.model, detected, known) else { return false };
         self.restart(body, poses, !known);
@@ -213,19 +216,19 @@ impl Tracker {
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
-    /// There is nobody: from the next frame on somebody is looked for.
+    /// Removes the pose: no person is there. From the next frame on the tracker searches for one.
     fn stop(&mut self, stamp: f64) {
         self.motion.poses.clear();
         self.motion.stamp = Some(stamp);
         self.estimate = Estimate { stamp, ..Estimate::default() };
     }
 
-    /// The pose at the next instant (K06 IV-B), by all of a frame or by its `ownership` of it.
+    /// Updates the pose with the next frame (K06 IV-B): with the whole frame, or with the part given by `ownership`.
     fn follow(&mut self, frame: &Frame, ownership: Option<OwnershipMask>) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
-        // Where the body is expected, and what the frame shows there (1).
+        // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
         let searched = relocalizer.frames_searched().filter(|_| config.relocalization);
         let Motion { poses, previous, predicted, origin, .. } = motion;
@@ -236,7 +239,7 @@ impl Tracker {
             Some(ownership) => observer.observe_owned(frame, expected, ownership, config),
         }
         let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale };
-        // Sizes from the first frame, then warm start and the ICP steps (2 to 7).
+        // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.with_model(model), poses);
         if config.hypotheses && schedule.whole_body && known {
@@ -247,7 +250,7 @@ impl Tracker {
         }
         sizes.initialize(setting, model, poses, fit);
         steps += fit.run(setting.with_model(model), predicted, poses);
-        // Other configurations of arms and legs.
+        // Alternative hypotheses for arms and legs.
         if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
             let (root, limb_suspect) =
@@ -262,11 +265,11 @@ impl Tracker {
             steps +=
                 hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected(), &detected);
         }
-        // Sizes that follow what this frame shows.
+        // Refinement of the sizes with this frame.
         let lost = assessor.status() == Status::Lost;
         let reliance = Reliance { lost, girths: schedule.whole_body, limb: |limb| assessor.is_reliable(limb) };
         sizes.refine(setting, model, poses, predicted, fit, reliance);
-        // What all that is worth.
+        // Assessment: status of the body and its limbs.
         assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
         fit.learn_regions(setting.with_model(model));
         motion.commit(frame.stamp);
@@ -282,7 +285,7 @@ impl Tracker {
         }
     }
 
-    /// The pose at the next instant by its share of a frame, which was checked.
+    /// Updates the pose with the owned part of a frame, which the caller has checked.
     pub(crate) fn step_owned(&mut self, frame: &Frame, ownership: OwnershipMask) -> &Estimate {
         self.relocalizer.clear_error();
         if self.is_started() {
@@ -292,7 +295,7 @@ impl Tracker {
         &self.estimate
     }
 
-    /// Refuses what cannot be used, before anything changes.
+    /// Checks the frame and the state of the tracker before anything changes.
     fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         if !self.is_started() && !self.can_search() {
             return Err(TrackError::NotInitialized);
@@ -301,8 +304,8 @@ impl Tracker {
         self.fit.regions().check(frame)
     }
 
-    /// Takes a body that a detector has seen elsewhere for long enough there. A young track starts anew instead, in this frame:
-    /// whether it does.
+    /// Moves the body to where a detector has reported it often enough. A new track restarts there instead, in this frame: the
+    /// result says whether it does.
     fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
         let lost = self.assessor.status() == Status::Lost;
         if !among {
@@ -315,7 +318,7 @@ impl Tracker {
             let new_track = self.relocalizer.is_new(frame.stamp);
             match self.relocalizer.compare(&self.model.body, &world_from_limb, lost, new_track, among) {
                 Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame) => {
-                    // What was learned of sizes and scene was learned in the wrong place.
+                    // Sizes and scene were learned at the wrong position, so a new track restarts.
                     return !among && new_track && self.restart_at_detection();
                 }
                 Some(DetectionVerdict::Consistent) if !among => self.update_sizes(),
@@ -329,7 +332,7 @@ impl Tracker {
         false
     }
 
-    /// Moves a lost body that no detector can see to where it is found.
+    /// Searches for a lost body without a detector, and moves it to where it is found.
     fn search_everywhere(&mut self, frame: &Frame) {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         let observation = observer.observation(frame, motion.origin);
@@ -340,7 +343,7 @@ impl Tracker {
         }
     }
 
-    /// Moves the body to where a detector sees it; whether it is there now.
+    /// Moves the body to the current detection if that explains the frame no worse. Returns whether it moved.
     fn move_to_detection(&mut self, frame: &Frame) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         let learned = observer.release(frame, relocalizer.own_pixels());
@@ -356,13 +359,13 @@ impl Tracker {
         moved
     }
 
-    /// Moves the body to another place, the predicted one, if it is not lost there; whether it is there now.
+    /// Swaps the pose with the predicted one, and keeps it if the body is not lost there. Returns whether it was kept.
     fn move_to_predicted(&mut self, frame: &Frame) -> bool {
         let Motion { poses, predicted, .. } = &mut self.motion;
         std::mem::swap(poses, predicted);
         self.reassess(frame);
         if self.assessor.status() != Status::Lost {
-            // Nothing is known of how it moves.
+            // The motion of the body at its new position is unknown.
             self.motion.forget();
             return true;
         }
@@ -372,7 +375,7 @@ impl Tracker {
         false
     }
 
-    /// Matches and assesses this frame for other poses.
+    /// Matches and assesses this frame again, for changed poses.
     fn reassess(&mut self, frame: &Frame) {
         let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
         observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), config);
@@ -382,7 +385,7 @@ impl Tracker {
         assessor.assess(setting.with_model(model), fit.matched(poses), None);
     }
 
-    /// What this frame said of the body.
+    /// Summarizes the frame's assessment for the relocalizer.
     fn frame_outcome(&self, frame: &Frame) -> FrameOutcome {
         let status = self.assessor.status();
         FrameOutcome {
@@ -393,13 +396,13 @@ impl Tracker {
         }
     }
 
-    /// Remembers where arms and legs end.
+    /// Stores the end positions of arms and legs for the hypotheses of later frames.
     fn remember(&mut self) {
         let Self { model, motion, hypotheses, assessor, .. } = self;
         hypotheses.remember(model, motion, assessor.status() == Status::Lost, |limb| assessor.is_reliable(limb));
     }
 
-    /// Fills the estimate in: of a frame `time_scale` after the last one, or of a pose that was set.
+    /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
     fn report(&mut self, stamp: f64, steps: usize, time_scale: Option<f64>) {
         let Self { config, model, motion, observer, fit, hypotheses, sizes, assessor, estimate, .. } = self;
         estimate.fill(&model.body, motion, fit.correspondences(), observer.candidates());

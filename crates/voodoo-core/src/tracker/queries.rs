@@ -1,4 +1,4 @@
-//! What can be asked of a tracker between frames: body, configuration, last estimate, distances of places from the posed body.
+//! Queries of a tracker between frames: body, configuration, last estimate, distances of points from the posed body.
 
 use super::Tracker;
 use super::estimate::Estimate;
@@ -10,34 +10,37 @@ use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{ColorRegions, Posed, RegionLine};
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
 
-/// So much of a line of sight is looked at, meters: more than a trunk's width, and half a forearm's.
+/// Length of the line of sight that is evaluated, meters: more than a trunk's width, and half a forearm's.
 const SEARCHED_DEPTH: f64 = 0.75;
-/// At so many places.
+/// Number of samples along it.
 const PLACES: usize = 30;
-/// Distances in single precision are off by less: meters, and share of a distance.
+/// Bound on the error of distances in single precision: meters, and fraction of the distance.
 const ROUNDING: f64 = 1e-3;
 
-/// Whether all between two places in a limb's frame is surely outside of it, for all of it lies to one side.
+/// Whether the segment between two points in the limb frame is certainly outside of the limb, because the segment lies on one
+/// side of its bounding box.
 fn passes_by(shape: &TaperedEllipticCylinder, [from, to]: [Vec3; 2]) -> bool {
     let (low, high) = (from.min(to), from.max(to));
-    // Rounding is far below this.
+    // The factor covers rounding with a wide margin.
     let [wide, deep] = [shape.a0().max(shape.a1()), shape.b0().max(shape.b1())].map(|most| 1.000_001 * most);
     high.z <= 0.0 || low.z >= shape.length() || low.x >= wide || high.x <= -wide || low.y >= deep || high.y <= -deep
 }
 
 impl Tracker {
-    /// The lines along which the last step looked for edges of colors in a camera's picture.
+    /// Returns the lines along which the last step searched for color edges in a camera's picture.
     pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         self.fit.regions().lines(camera)
     }
 
-    /// How likely each pixel of a frame's pictures shows the body at some poses (world; none: those of now), picture after picture,
-    /// row by row, 0 to 1, by the colors that were learned. Cameras that are new learn them there.
+    /// Returns the probability, 0 to 1, that each pixel of a frame's pictures shows the body, by the learned colors: picture
+    /// after picture, row by row. The body is at `poses` (world frame), or at its current poses with `None`. Cameras without
+    /// learned colors learn them at these poses.
     pub fn segment(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<Vec<Vec<f32>>, TrackError> {
         self.at_poses(frame, poses, |regions, posed| regions.segment(frame, posed))
     }
 
-    /// Learns the body's colors in a frame's pictures at some poses (world; none: those of now).
+    /// Learns the body's colors in a frame's pictures, with the body at `poses` (world frame), or at its current poses with
+    /// `None`.
     pub fn learn_colors(&mut self, frame: &Frame, poses: Option<&[Pose]>) -> Result<(), TrackError> {
         self.at_poses(frame, poses, |regions, posed| regions.learn_at(frame, posed))
     }
@@ -58,22 +61,22 @@ impl Tracker {
         Ok(work(self.fit.regions_mut(), Posed { body, poses: poses.unwrap_or(&current), previous, origin }))
     }
 
-    /// The body in its current sizes.
+    /// Returns the body in its current sizes.
     pub fn body(&self) -> &Body {
         &self.model.body
     }
 
-    /// The parameters.
+    /// Returns the configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// The last estimate.
+    /// Returns the last estimate.
     pub fn estimate(&self) -> &Estimate {
         &self.estimate
     }
 
-    /// The poses expected at a time to come, world frame; none without a pose.
+    /// Predicts the poses at a future time, world frame. `expected` is empty without a pose.
     pub(crate) fn predict(&self, stamp: f64, expected: &mut Vec<Pose>) {
         expected.clear();
         if self.is_started() {
@@ -81,12 +84,13 @@ impl Tracker {
         }
     }
 
-    /// A pose was set.
+    /// Whether the tracker has a pose.
     pub(super) fn is_started(&self) -> bool {
         !self.motion.poses.is_empty()
     }
 
-    /// Signed distances of world points to the surface of every limb, meters, negative inside: limb by limb, a point each.
+    /// Returns the signed distances of world points to the surface of every limb, meters, negative inside: one vector for each
+    /// limb, with one value for each point.
     pub fn limb_distances(&self, points: PointSlice) -> Result<Vec<Vec<f32>>, TrackError> {
         let queries = self.queries(points)?;
         let mut surface = SurfaceBatch::default();
@@ -99,13 +103,14 @@ impl Tracker {
             .collect())
     }
 
-    /// Signed distances of world points to the surface of the posed body, meters, negative inside.
+    /// Returns the signed distances of world points to the surface of the posed body, meters, negative inside.
     pub fn distance(&self, points: PointSlice) -> Result<Vec<f32>, TrackError> {
         let queries = self.queries(points)?;
         let mut least = vec![f32::INFINITY; points.len()];
         let (mut surface, mut near, mut chosen) = (SurfaceBatch::default(), Points::default(), Vec::new());
         for (limb, pose) in self.model.body.limbs().iter().zip(&self.motion.poses) {
-            // What is farther from the limb's box than from another limb needs no closest point; in the box it may be deeper.
+            // A point outside of the limb's box that is farther from the box than from another limb needs no closest point.
+            // Inside the box it may have a smaller signed distance.
             let bounds = limb.shape.aabb(pose);
             [&mut near.x, &mut near.y, &mut near.z].into_iter().for_each(Vec::clear);
             chosen.clear();
@@ -126,8 +131,8 @@ impl Tracker {
         Ok(least)
     }
 
-    /// Length of body between each of some places, inside the body as it is posed, and a camera's focal point, world, meters: what the
-    /// body hides a network guesses, with no less confidence.
+    /// Returns for each site position the length of the line of sight, towards the camera's focal point, that lies inside the
+    /// posed body; world frame, meters. Where the body occludes a joint, a network guesses its position with no less confidence.
     pub fn body_before(&self, sites: &[Vec3], camera: Vec3) -> Result<Vec<f64>, TrackError> {
         if !self.is_started() {
             return Err(TrackError::NotInitialized);
@@ -142,7 +147,7 @@ impl Tracker {
             let far = |step: usize| (step as f64 + 0.5) / PLACES as f64 * reach;
             for (limb, limb_from_world) in limbs() {
                 let (start, along) = (limb_from_world.transform_point(*site), limb_from_world.rotation * direction);
-                // Most limbs are beside the whole way.
+                // Most limbs do not meet the line of sight.
                 if passes_by(&limb.shape, [0, PLACES - 1].map(|step| start + far(step) * along)) {
                     continue;
                 }
@@ -155,7 +160,7 @@ impl Tracker {
         Ok(sites.iter().map(hidden).collect())
     }
 
-    /// World points in the working frame of the posed body.
+    /// Returns world points in the working frame of the posed body.
     fn queries(&self, points: PointSlice) -> Result<Points, TrackError> {
         if !self.is_started() {
             return Err(TrackError::NotInitialized);

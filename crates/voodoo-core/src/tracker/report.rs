@@ -1,4 +1,4 @@
-//! Filling the estimate from the tracker's state, without allocating once it is warm.
+//! Fills the estimate from the tracker's state, without allocation once its buffers have grown.
 
 use super::estimate::{Estimate, SourceReport};
 use crate::association::correspondence::Correspondences;
@@ -94,7 +94,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, moved, standing, with_context, without_background};
 
-    /// What is reported of the standing body, seen `off` meters behind where it is thought to be.
+    /// Estimate of the standing body and number of candidates, when the depth image shows it `off` meters behind its pose.
     fn filled(off: f64) -> (Estimate, usize) {
         let (model, poses) = standing();
         let config = without_background();
@@ -105,7 +105,7 @@ mod tests {
             let mut motion = Motion::default();
             (motion.poses, motion.origin) = (poses.clone(), Vec3::new(1.0, 2.0, 3.0));
             let mut estimate = Estimate::default();
-            // Nothing of an earlier frame is left.
+            // A second call replaces the results of the first.
             for _ in 0..2 {
                 estimate.fill(&model.body, &motion, fit.correspondences(), context.observation.candidates);
             }

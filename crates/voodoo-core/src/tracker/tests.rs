@@ -4,7 +4,7 @@
 use super::*;
 use crate::testing::{before_wall, farthest, moved, put_board, standing, with_frame};
 
-/// A tracker that has followed the standing body for three frames.
+/// Returns a tracker that has tracked the standing body for three frames, and the image.
 fn tracking() -> (Tracker, Vec<u16>) {
     let (model, poses) = standing();
     let pixels = before_wall(&model.body, &poses);
@@ -16,7 +16,7 @@ fn tracking() -> (Tracker, Vec<u16>) {
     (tracker, pixels)
 }
 
-/// Shows a frame; the status.
+/// Steps the tracker with a depth image and returns the status.
 fn feed(tracker: &mut Tracker, pixels: &[u16], frame: usize) -> Status {
     with_frame(pixels, frame as f64 / 30.0, |frame| tracker.step(frame).unwrap().status)
 }

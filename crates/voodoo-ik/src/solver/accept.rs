@@ -1,10 +1,10 @@
-//! What of a step is taken: no level may become worse than those above it must make it.
+//! Step acceptance: no level may become worse than the levels above it require.
 
 use super::{IkProblem, IkSolver, SETTLED};
 use voodoo_core::math::dot;
 
 impl IkSolver {
-    /// Takes the whole step, or as much of it as leaves no level worse than those above it must make it.
+    /// Takes the whole step, or as much of it as leaves no level worse than the levels above it require.
     pub(super) fn advance(
         &mut self,
         problem: &IkProblem,
@@ -22,7 +22,7 @@ impl IkSolver {
         self.evaluate(problem);
         let Some(failed) = self.first_failure(n, count, image, slack, last) else {
             for level in 0..count {
-                // Slow progress is the sign of a goal out of reach, where less damping would overshoot.
+                // Slow progress indicates an unreachable goal, where less damping would overshoot.
                 let shrink = if self.trial.cost[level] < 0.9 * self.here.cost[level] { 0.3 } else { 0.8 };
                 self.levels.trust[level] = (shrink * self.levels.trust[level]).max(1e-6);
             }
@@ -34,7 +34,7 @@ impl IkSolver {
         } else {
             self.gain *= 0.5;
         }
-        // Without what is below; then a quarter of its own part; then nothing but the levels above.
+        // First without the lower levels; then with a quarter of the failed level's own part; then with the levels above only.
         for (stage, fraction) in [(failed, 1.0), (failed, 0.25), (failed, 0.0)] {
             if (stage == last && fraction == 1.0) || (stage == 0 && fraction == 0.0) {
                 continue;
@@ -47,7 +47,7 @@ impl IkSolver {
                 return self.take_trial(angles);
             }
         }
-        // A refused step is not rest: more damping comes next.
+        // A rejected step does not count as converged: more damping comes next.
         if self.levels.trust.first().is_none_or(|trust| *trust < 1e5) { f64::INFINITY } else { 0.0 }
     }
 
@@ -57,13 +57,13 @@ impl IkSolver {
         for i in 0..n {
             let above = if stage == 0 { 0.0 } else { self.stages[(stage - 1) * n + i] };
             let step = above + fraction * (self.stages[stage * n + i] - above);
-            // The clamp only takes off rounding: stages end at the limits.
+            // The clamp only removes rounding errors: stages end at the limits.
             self.trial_angles[i] = (angles[i] + step).clamp(limits[i][0], limits[i][1]);
         }
     }
 
-    /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the
-    /// others' parts; `count` stands for the image.
+    /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the other
+    /// levels' parts; `count` stands for the image.
     fn first_failure(&self, n: usize, count: usize, image: bool, slack: bool, stage: usize) -> Option<usize> {
         let length = |from: Option<usize>| -> f64 {
             let step = &self.stages[stage * n..(stage + 1) * n];

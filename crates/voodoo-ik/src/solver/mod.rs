@@ -1,5 +1,5 @@
-//! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in what is left free, and
-//! a rest posture in what that leaves.
+//! The solver (J10 eq. 4): damped pseudo-inverse steps, strictly ordered levels, the image criterion in their null space, and a
+//! rest posture in what remains free.
 
 mod accept;
 mod rest;
@@ -17,30 +17,30 @@ pub use rest::Rest;
 
 /// Residual that a lower level may leave in a higher one, meters.
 const SETTLED: f64 = 1e-10;
-/// Turn that leaves a stationary pose with a residual, radians.
+/// Rotation that perturbs a stationary pose with a residual, radians.
 const NUDGE: f64 = 0.05;
-/// The same for an angle that stands at its limit: a knee bent backwards as far as it goes has its stretched pose, which is
-/// farther from a near goal, between itself and all that bend forwards.
+/// The perturbation of an angle at its limit. For a knee at its backward limit and a near goal, the straight pose is farther from
+/// the goal and lies between the knee and all forward-bent poses, so a larger rotation is needed.
 const NUDGE_AT_LIMIT: f64 = 0.35;
-/// The image is at rest when the criterion falls by less than this share in [`STALLED_STEPS`] steps, one after the other.
+/// The image has converged when the criterion falls by less than this fraction in [`STALLED_STEPS`] consecutive steps.
 const LEAST_FALL: f64 = 1e-3;
-/// Steps without a fall after which the image is at rest.
+/// Number of steps without such a fall after which the image has converged.
 const STALLED_STEPS: usize = 3;
 
-/// How to solve.
+/// Solver parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SolverOptions {
-    /// Most steps; J10 uses 15.
+    /// Maximum number of steps; J10 uses 15.
     pub steps: usize,
-    /// A single level with a residual below this is solved; meters.
+    /// A single level counts as solved when its residual is below this; meters.
     pub tolerance: f64,
-    /// A step that turns nothing by more is the last one; radians (root: meters).
+    /// Iteration stops when no unknown changes by more than this; radians (root: meters).
     pub still: f64,
-    /// Share of the image step `h / |grad h|^2` to take, 0 to 1: alpha of J10 eq. 4 over that step.
+    /// Fraction of the image step `h / |grad h|^2` to take, 0 to 1: alpha of J10 eq. 4 divided by that step.
     pub gain: f64,
-    /// Change of `h` per radian, as a share of the bones' length in the images, below which its gradient says little: damps the
-    /// image step where few samples lie outside, and along the line of sight. 0: Polyak's step undamped.
+    /// Change of `h` per radian, as a fraction of the bones' length in the images, below which its gradient is unreliable. It
+    /// damps the image step where few samples lie outside, and along the line of sight. 0: Polyak's step undamped.
     pub caution: f64,
     /// Largest change of an unknown in one step, radians.
     pub largest_turn: f64,
@@ -52,26 +52,26 @@ impl Default for SolverOptions {
     }
 }
 
-/// How it went.
+/// Result of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
     /// Steps used.
     pub steps: usize,
-    /// Postures tried, refused ones included.
+    /// Number of evaluated postures, including rejected ones.
     pub tried: usize,
     /// How many of them were compared with the images.
     pub compared: usize,
-    /// Whether the angles or the image criterion came to rest (or the only level was reached).
+    /// Whether the angles or the image criterion converged (or the only level was reached).
     pub converged: bool,
     /// Image criterion at the end, pixels; 0 without images.
     pub h: f64,
 }
 
-/// Working memory, and the posture at rest; nothing is allocated after the first call with a problem of the same size.
+/// Working memory, and the posture at rest. Nothing is allocated after the first call with a problem of the same size.
 #[derive(Clone, Debug, Default)]
 pub struct IkSolver {
-    /// The posture so far, and the one that is tried.
+    /// The current posture, and the trial posture.
     here: EvaluatedPosture,
     trial: EvaluatedPosture,
     trial_angles: Vec<f64>,
@@ -79,19 +79,19 @@ pub struct IkSolver {
     linear: LinearSystem,
     /// The step after each level, and after the image: `stages x freedoms`.
     stages: Vec<f64>,
-    /// Share of the image step.
+    /// Current fraction of the image step.
     gain: f64,
     phase_start: Vec<f64>,
-    /// From before a nudge.
+    /// The state before a perturbation.
     saved: Saved,
     trials: ImageTrials,
-    /// What angles are drawn to below all else; empty: nothing.
+    /// Rest values that pull the angles below all other levels; empty: none.
     rest: Vec<Rest>,
-    /// Gradients of the criterion where the images refused a step to rest.
+    /// Gradients of the criterion where the images rejected a step to rest.
     objections: Vec<f64>,
 }
 
-/// A posture, and what it costs: each level, and the images with their gradient.
+/// A posture and its costs: each level, and the images with their gradient.
 #[derive(Clone, Debug, Default)]
 struct EvaluatedPosture {
     at: Kinematics,
@@ -104,11 +104,11 @@ struct EvaluatedPosture {
 #[derive(Clone, Debug, Default)]
 struct Levels {
     ranges: Vec<Range<usize>>,
-    /// Damping over the squared residual, each level.
+    /// Damping divided by the squared residual, for each level.
     trust: Vec<f64>,
-    /// Residual each level would have before its own part of the step.
+    /// Residual that each level would have before its own part of the step.
     before: Vec<f64>,
-    /// Residual of the levels whose turn is over.
+    /// Best residual of the levels that are already solved.
     best: Vec<f64>,
 }
 
@@ -131,7 +131,8 @@ struct Saved {
     cost: Vec<f64>,
 }
 
-/// Postures that were tried, how many of them were compared with the images, and whether it is the images' turn.
+/// Number of evaluated postures, number of those compared with the images, and whether the current phase compares with the
+/// images.
 #[derive(Clone, Debug, Default)]
 struct ImageTrials {
     tried: usize,
@@ -148,10 +149,10 @@ struct IkProblem<'a> {
 }
 
 impl IkSolver {
-    /// Moves `angles` towards the goals (sorted by level) and, in what they leave free, the bones into the silhouettes.
+    /// Moves `angles` towards the goals (sorted by level) and, in the null space of the goals, the bones into the silhouettes.
     ///
-    /// Angles stay within the model's limits, whatever the goals; a start outside is moved onto them. Goals that cannot be
-    /// reached, or contradict each other within a level, end at the least sum of weighted squares.
+    /// Angles stay within the model's limits in every case; a start outside is clamped. Goals that cannot be reached, or
+    /// contradict each other within a level, end at the minimum of the weighted sum of squares.
     pub fn solve(
         &mut self,
         model: &ChainModel,
@@ -166,9 +167,9 @@ impl IkSolver {
         self.start(&problem, angles);
         let count = self.levels.ranges.len();
         let mut report = Report { converged: true, ..Report::default() };
-        // One level after the other joins, the image last: what a level reaches does not depend on those below it.
+        // Levels join one after the other, the image last. Thus the result of a level does not depend on those below it.
         for phase in 0..count + usize::from(criterion.is_some()) {
-            // The images are looked at when it is their turn: what the levels above do does not depend on them.
+            // The images are evaluated only in their own phase, so that the levels above do not depend on them.
             self.trials.comparing = phase == count;
             if self.trials.comparing {
                 self.evaluate_here(&problem, angles);
@@ -177,7 +178,7 @@ impl IkSolver {
             self.phase_start.extend_from_slice(angles);
             self.phase(&problem, phase, true, angles, &mut report);
             if phase > 0 && !self.correct_upper_levels(&problem, phase.min(count), angles) {
-                // Finite steps along curved null spaces led to another valley: again, with no rise allowed at all.
+                // Finite steps along curved null spaces led to another local minimum: repeat, with no rise allowed at all.
                 angles.copy_from_slice(&self.phase_start);
                 self.evaluate_here(&problem, angles);
                 self.phase(&problem, phase, false, angles, &mut report);
@@ -194,8 +195,8 @@ impl IkSolver {
         report
     }
 
-    /// Steps with the first `phase + 1` levels, or all and the image. `slack`: levels above may rise by the second order of a
-    /// step, to be made good by the next.
+    /// Steps with the first `phase + 1` levels, or with all levels and the image. With `slack`, levels above may rise by the
+    /// second-order effect of a step, which the next step corrects.
     fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64], report: &mut Report) {
         let (count, options) = (self.levels.ranges.len(), problem.options);
         let image = phase == count;
@@ -221,7 +222,7 @@ impl IkSolver {
                 rest = true;
                 break;
             }
-            // A saddle (a stretched arm whose hand shall come nearer) or the best there is: a nudge tells.
+            // Either a saddle (a stretched arm whose hand is to come nearer) or the optimum: a perturbation decides which.
             nudged = true;
             self.nudge(problem, angles);
         }
@@ -233,8 +234,8 @@ impl IkSolver {
         report.converged &= rest;
     }
 
-    /// Steps of the levels above alone (no more than a phase has), against what the lower ones' finite steps left; true when they
-    /// are as good as before the phase.
+    /// Steps with the upper levels alone (at most as many as a phase has), to correct errors from the lower levels' finite steps.
+    /// Returns true when the upper levels are as good as before the phase.
     fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, angles: &mut [f64]) -> bool {
         let comparing = self.trials.comparing;
         self.trials.comparing = false;
@@ -294,7 +295,7 @@ impl IkSolver {
         self.accept();
     }
 
-    /// Costs and kinematics at the trial angles, and the criterion if it is the images' turn.
+    /// Computes costs and kinematics at the trial angles, and the criterion in the image phase.
     fn evaluate(&mut self, problem: &IkProblem) {
         self.trials.tried += 1;
         problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
@@ -320,7 +321,7 @@ impl IkSolver {
         self.saved.cost.clear();
         self.saved.cost.extend_from_slice(&self.here.cost);
         for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
-            // Uneven, so that symmetric chains leave their symmetry; away from the nearer limit.
+            // Unequal perturbations break the symmetry of symmetric chains; each moves away from the nearer limit.
             let at_limit = *angle <= *low || *angle >= *high;
             let by = if at_limit { NUDGE_AT_LIMIT } else { NUDGE } * (1.0 + 0.37 * (i % 3) as f64);
             *angle = if *high - *angle < *angle - *low { *angle - by } else { *angle + by }.clamp(*low, *high);

@@ -1,35 +1,35 @@
-//! The lowest level: a posture the angles are drawn to where neither the goals nor the images object.
+//! The lowest level: a rest posture that pulls the angles where neither the goals nor the images constrain them.
 
 use super::super::goal::level_rows;
 use super::super::linear::largest;
 use super::{IkProblem, IkSolver, Report};
 
-/// What the image criterion may rise by, pixels: rounding.
+/// Allowed rise of the image criterion, pixels: rounding.
 const LEVEL: f64 = 1e-9;
-/// Shares of a step that are tried, one after the other.
+/// Fractions of a step that are tried in order.
 const FRACTIONS: [f64; 4] = [1.0, 0.25, 0.0625, 0.015_625];
 
-/// An unknown and where it is drawn to, below all goals and the images.
+/// An unknown and its value at rest, pulled at lower priority than all goals and the images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
     /// Index of the unknown.
     pub unknown: usize,
-    /// Its value at rest; beyond its limits: as near as these allow.
+    /// Its value at rest; a value outside its limits is clamped to them.
     pub angle: f64,
 }
 
 impl IkSolver {
-    /// A solver that draws angles to `rest`: least squares of what they are off, in what goals and images leave free.
+    /// A solver that pulls angles towards `rest`: least squares of the differences, in what goals and images leave free.
     pub fn with_rest(rest: Vec<Rest>) -> Self {
         Self { rest, ..Self::default() }
     }
 
-    /// Steps towards the rest posture, each made good by the goals; none is taken that leaves one of them or the images worse.
-    /// Few solves have one: it stays out of the way of the others.
+    /// Takes steps towards the rest posture, each corrected by the goals. A step that makes a goal or the images worse is
+    /// rejected. Few solves have a rest posture, so the function is marked cold.
     #[cold]
     #[inline(never)]
     pub(super) fn pull_to_rest(&mut self, problem: &IkProblem, angles: &mut [f64], report: &mut Report) {
-        // What lower levels improved in higher ones on their way counts, too.
+        // Improvements that lower levels made in higher ones also count.
         self.levels.best.clear();
         self.levels.best.extend(self.here.cost.iter().map(|cost| cost.sqrt()));
         let most = self.here.h + LEVEL;
@@ -44,7 +44,7 @@ impl IkSolver {
         report.converged &= rest;
     }
 
-    /// One step, `h` at most `most`; the largest change of an unknown, zero if there is none to be taken.
+    /// Takes one step with `h` at most `most`. Returns the largest change of an unknown; zero if no step is accepted.
     fn pull_once(&mut self, problem: &IkProblem, most: f64, angles: &mut [f64]) -> f64 {
         let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
         self.phase_start.clear();
@@ -78,14 +78,14 @@ impl IkSolver {
                     self.objections.extend_from_slice(&self.here.gradient);
                 }
                 angles.copy_from_slice(&self.phase_start);
-                // A border of the images is met nearer than this by going along it.
+                // Moving along a border of the image criterion gets closer than shorter fractions of the step.
                 if fraction < 1.0 && self.objections.len() > refused * n {
                     break;
                 }
             }
             self.trials.comparing = problem.criterion.is_some();
             self.evaluate_here(problem, angles);
-            // Along the border of where the images are content, if it is they who object to the least step.
+            // If the images rejected even the smallest step, continues along the border of the region where they are satisfied.
             if self.objections.len() == refused * n {
                 return 0.0;
             }
@@ -93,8 +93,8 @@ impl IkSolver {
         0.0
     }
 
-    /// The step to rest in the null space of all goals and of what the images objected to, within the limits. Its stage is
-    /// the one after those of the goals.
+    /// Computes the step to rest in the null space of all goals and of the image gradients that rejected earlier steps, within
+    /// the limits. Its stage follows those of the goals.
     fn rest_part(&mut self, problem: &IkProblem, angles: &[f64]) {
         let (n, count) = (angles.len(), self.levels.ranges.len());
         self.linear.taken.clear(n);
@@ -103,7 +103,7 @@ impl IkSolver {
             level_rows(problem.model, goals, &self.here.at, &mut self.linear.jacobian, &mut self.linear.residual);
             self.linear.taken.take(&self.linear.jacobian);
         }
-        // One by one: the images may object more or less strongly, but each objection counts.
+        // Adds the gradients one by one: they differ in strength, but each one counts.
         for gradient in self.objections.chunks_exact(n.max(1)) {
             self.linear.taken.take(gradient);
         }
@@ -121,7 +121,7 @@ impl IkSolver {
         }
     }
 
-    /// Sum of the squares of what the angles are off their rest.
+    /// Sum of the squared differences between the angles and their rest values.
     fn rest_error(&self, angles: &[f64]) -> f64 {
         let drawn = self.rest.iter().filter_map(|rest| angles.get(rest.unknown).map(|angle| angle - rest.angle));
         drawn.map(|off| off * off).sum()

@@ -5,11 +5,11 @@ use super::super::linear::largest;
 use super::{IkProblem, IkSolver};
 use voodoo_core::math::dot;
 
-/// Least damping, m^2: small beside `J J^T` of anything a person can see, so that the last steps are Newton's.
+/// Minimum damping, m^2: small relative to `J J^T` of any visible motion, so that the last steps are Newton steps.
 const LEAST_DAMPING: f64 = 1e-10;
 
 impl IkSolver {
-    /// One step of the first `count` levels, and of the image; the largest change of an unknown.
+    /// Computes one step of the first `count` levels, and of the image. Returns the largest change of an unknown.
     pub(super) fn step(
         &mut self,
         problem: &IkProblem,
@@ -34,8 +34,8 @@ impl IkSolver {
         moved
     }
 
-    /// The part of one level: `(J P)^+ (-e - J d)` after the step `d` of the levels above (Baerlocher and Boulic 2004), cut at
-    /// the limits and solved again without the unknowns that stand there.
+    /// Computes the part of one level: `(J P)^+ (-e - J d)` after the step `d` of the levels above (Baerlocher and Boulic 2004).
+    /// It is cut at the limits and solved again without the unknowns that are at a limit.
     fn level_part(&mut self, problem: &IkProblem, level: usize, angles: &[f64]) {
         let n = angles.len();
         let goals = &problem.goals[self.levels.ranges[level].clone()];
@@ -64,9 +64,9 @@ impl IkSolver {
         }
     }
 
-    /// The image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`, since the
-    /// least `h` is zero. Where the images hardly see the free motion (along the line of sight) the gradient is small and
-    /// says little, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
+    /// Computes the image's part: `-alpha (I - J^+ J) grad h` (J10 eq. 4) with Polyak's step `alpha = gain h / |P grad h|^2`,
+    /// because the minimum of `h` is zero. Where the free motion is hardly visible in the images (along the line of sight), the
+    /// gradient is small and unreliable, so `alpha = gain h / (|P grad h|^2 + (caution reach)^2)`.
     fn image_part(&mut self, problem: &IkProblem, count: usize, angles: &[f64]) {
         let n = angles.len();
         self.inherit(count, n);
@@ -86,7 +86,7 @@ impl IkSolver {
         }
     }
 
-    /// A stage starts from the one before it.
+    /// Copies the stage before as the start of this one.
     fn inherit(&mut self, stage: usize, n: usize) {
         if stage == 0 {
             self.stages[..n].fill(0.0);
@@ -95,7 +95,7 @@ impl IkSolver {
         }
     }
 
-    /// Adds the part to a stage as far as the limits allow; true when one was hit, whose unknown then is taken.
+    /// Adds the part to a stage as far as the limits allow. Returns true if a limit was reached; that unknown is then fixed.
     pub(super) fn add_part(&mut self, problem: &IkProblem, stage: usize, angles: &[f64]) -> bool {
         let n = angles.len();
         let most = largest(&self.linear.part);

@@ -2,10 +2,11 @@
 
 use voodoo_core::math::{CostTable, linear_sum_assignment};
 
-/// Pairs (site, candidate), each used once at most, that lie within the gate: as many as possible, and of those the ones with the
-/// least sum of squared distances; a candidate or site without a partner stays alone.
+/// Returns pairs (site, candidate), each index at most once, within the gate: as many pairs as possible, and among those the ones
+/// with the least sum of squared distances. Sites and candidates may stay unassigned.
 ///
-/// `alone` is the squared distance at which a site is rather left alone; none: as many pairs as possible. Infinite = impossible.
+/// `alone` is the cost of an unassigned site as a squared distance; `None` maximizes the number of pairs. Infinite distances are
+/// forbidden.
 pub(super) fn assign(cost: &CostTable, gate: f64, alone: Option<f64>) -> Vec<(usize, usize)> {
     let (rows, columns) = (cost.rows(), cost.columns());
     if rows == 0 || columns == 0 {
@@ -15,7 +16,7 @@ pub(super) fn assign(cost: &CostTable, gate: f64, alone: Option<f64>) -> Vec<(us
         let value = cost.at(row, column);
         if value <= gate { value * value } else { f64::INFINITY }
     };
-    // Beyond the gate a pair is as good as none; the price of none is one no sum within the gate can reach.
+    // A pair outside the gate gets the cost of no pair, which exceeds every possible sum within the gate.
     let price = match alone {
         Some(alone) => gate * gate + alone * (rows as f64 + 1.0),
         None => gate * gate * (rows.min(columns) as f64 + 1.0),
@@ -53,7 +54,7 @@ mod tests {
         assert_eq!(assign(&costs(&[&[0.85]]), 1.0, Some(0.8)), [(0, 0)]);
     }
 
-    /// The least sum of squares with the most pairs, tried out.
+    /// The least sum of squares with the most pairs, by exhaustive search.
     fn best(cost: &CostTable, row: usize, taken: &mut Vec<bool>) -> (usize, f64) {
         if row == cost.rows() {
             return (0, 0.0);

@@ -1,62 +1,62 @@
-//! Skin regions followed from picture to picture.
+//! Skin regions tracked from frame to frame.
 //!
-//! A face or hand tracker of K06 is a tracker of its own: it knows where its region was a moment ago. So a region keeps its name while
-//! it moves on continuously, even when the body model has fallen behind, and the model names regions where they appear. A name
-//! changes hands only when another region agrees with the model better for some time.
+//! In K06 each face or hand has a region tracker of its own, which knows where its region was in the last frame. So a region
+//! keeps its label (its site) while it moves continuously, even when the body model lags. The body model assigns labels to new
+//! regions. A label passes to another region only when that one agrees better with the model for some time.
 
 use crate::skin::assignment::assign;
 use voodoo_core::math::{CostTable, Vec3};
 
-/// A region is at most this far from where its motion would have it, from one picture to the next, meters.
+/// Greatest distance of a region from its extrapolated position between two frames, meters.
 const BLOB_JUMP: f64 = 0.12;
-/// The same for a region that was seen once: nothing is known about its motion.
+/// The same distance for a region that was detected only once, whose velocity is unknown.
 const UNKNOWN_JUMP: f64 = 0.24;
-/// What is within this share of the possible motion went on as expected.
+/// A distance below this fraction of the greatest one counts as continuous motion.
 const AS_EXPECTED: f64 = 0.5;
-/// A region that was not seen for so long has lost its name, seconds.
+/// A region that was not detected for this time loses its label, seconds.
 const FORGET: f64 = 0.25;
-/// No hand moves faster, meters a second.
+/// Greatest speed of a hand, meters per second.
 const FASTEST: f64 = 8.0;
-/// A region that is not seen gets away from its expected place this fast, meters a second.
+/// Growth of the position uncertainty of a region that is not detected, meters per second.
 const UNSEEN_SPEED: f64 = 2.0;
-/// Pictures come about this far apart, seconds: so long a region that was seen in the last one may have been away.
+/// Nominal interval between frames, seconds: an undetected time that a region of the last frame always has.
 const PERIOD: f64 = 1.0 / 30.0;
-/// Two candidates this near are one hand, meters.
+/// Two candidates within this distance are one hand, meters.
 pub(super) const ONE_HAND: f64 = 0.09;
 
-/// A candidate in space.
+/// A candidate in 3-D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
-    /// Unit vector in the world from the camera's focal point.
+    /// Unit direction from the camera's focal point, world frame.
     pub direction: Vec3,
-    /// On the surface, meters, or at a guessed distance.
+    /// Position on the surface, meters; at a guessed distance without depth.
     pub place: Vec3,
-    /// Whether a depth camera saw it.
+    /// Whether its distance was measured by a depth camera.
     pub deep: bool,
-    /// False where it cannot be a hand.
+    /// False if it cannot be a hand.
     pub hand: bool,
-    /// Number of its region.
+    /// Label of its region in the mask.
     pub region: i32,
-    /// Whether nothing behind it was ever seen: it may be a thing, not the person.
+    /// Whether no surface behind it was ever observed, so that it may be part of the scene.
     pub still: bool,
 }
 
-/// A region that is followed: where it was last seen, how it moves, and how far it was from each site.
+/// A tracked region: its last detection, its velocity and its distance from each site.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blob {
-    /// Where it was last seen.
+    /// Last detection.
     pub sight: Sight,
-    /// When, seconds.
+    /// Time of that detection, seconds.
     pub stamp: f64,
-    /// Meters a second.
+    /// Velocity, meters per second.
     pub velocity: Vec3,
-    /// Pictures in which it was seen.
+    /// Number of frames in which it was detected.
     pub count: usize,
-    /// Number of the site whose name it has.
+    /// Index of the site that it is assigned to.
     pub label: Option<usize>,
-    /// Of each site how far it was from there, squared shares of the gate; NaN: not known.
+    /// For each site the running mean of the squared distance, in units of the gate; NaN if unknown.
     pub far: Vec<f64>,
-    /// Of each site how long it has spoken against being it, seconds.
+    /// For each site, how long the region has contradicted it, seconds.
     pub mismatch: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ impl Blob {
         Self { sight, stamp, velocity: Vec3::ZERO, count: 1, label: None, far, mismatch }
     }
 
-    /// It was seen again.
+    /// Updates the region with a detection.
     fn update(&mut self, sight: Sight, stamp: f64) {
         let elapsed = stamp - self.stamp;
         if elapsed > 0.0 {
@@ -82,7 +82,7 @@ impl Blob {
         self.count += 1;
     }
 
-    /// It is the same as a blob that was seen just now, which takes over its name and history.
+    /// Takes over the label and history of a blob that is the same region as one detected in this frame.
     fn merge(self, newer: &mut Self) {
         if self.label.is_some() && newer.label.is_none() {
             (newer.label, newer.far, newer.mismatch) = (self.label, self.far, self.mismatch);
@@ -95,7 +95,7 @@ impl Blob {
         jump + UNSEEN_SPEED * (stamp - self.stamp - PERIOD).max(0.0)
     }
 
-    /// Distance of a sight from where the blob should be, in units of what is possible.
+    /// Distance of a detection from the extrapolated position, in units of the greatest possible one.
     fn pose_difference(&self, sight: &Sight, stamp: f64) -> f64 {
         let expected = self.sight.place + self.velocity * (stamp - self.stamp);
         let mut offset = sight.place - expected;
@@ -106,23 +106,24 @@ impl Blob {
     }
 }
 
-/// All regions of one camera's picture that are followed.
+/// All tracked regions of one camera.
 #[derive(Clone, Debug)]
 pub struct Blobs {
-    /// Those of the last picture first, in the order of its candidates.
+    /// Blobs of the last frame first, in the order of its candidates.
     pub items: Vec<Blob>,
-    /// Of each site when it was last seen, or first missed; NaN: never looked for.
+    /// For each site the time of its last detection or of its first miss; NaN if it was never searched for.
     pub(super) missed: Vec<f64>,
     pub(super) stamp: f64,
 }
 
 impl Blobs {
-    /// None yet, for so many sites.
+    /// Returns an empty tracker for this number of sites.
     pub fn new(sites: usize) -> Self {
         Self { items: Vec::new(), missed: vec![f64::NAN; sites], stamp: f64::NEG_INFINITY }
     }
 
-    /// Takes up the sights of a picture, each of which is then the blob of its number; those that were not seen for long are dropped.
+    /// Updates the blobs with the detections of a frame; detection `i` becomes blob `i`. Blobs that were not detected for long
+    /// are removed.
     pub fn follow(&mut self, sights: &[Sight], stamp: f64) {
         let apart = |row: usize, column: usize| self.items[row].pose_difference(&sights[column], stamp);
         let cost = CostTable::from_fn(self.items.len(), sights.len(), apart);
@@ -137,7 +138,7 @@ impl Blobs {
         let mut updated: Vec<Option<Blob>> = vec![None; sights.len()];
         for pair in &pairs {
             let Some(mut blob) = items[pair.0].take() else { continue };
-            // What reappears far from where it was going, as a part of a region that has a name, is that one's.
+            // A detection far from the extrapolated position belongs to the region of this frame that has a label already.
             if !near(pair) && kept.contains(&sights[pair.1].region) {
                 blob.label = None;
             }

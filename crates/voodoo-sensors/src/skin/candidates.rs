@@ -1,4 +1,4 @@
-//! Where in a mask of skin a head or a hand may be.
+//! Finds the pixels in a skin mask where a head or a hand may be.
 
 use std::f64::consts::PI;
 
@@ -11,37 +11,37 @@ use crate::skin::cutout::Cutout;
 pub const PALM: f64 = 0.045;
 /// Radius of a face, meters.
 pub const FACE: f64 = 0.085;
-/// A hand with stretched fingers in radii of its palm.
+/// Length of a hand with stretched fingers, in palm radii.
 const LONGEST_HAND: f64 = 4.6;
-/// Regions with less than this share of a palm's squared radius times pi are noise.
+/// Regions with less area than this fraction of a palm's disc are noise.
 const SMALLEST: f64 = 0.2;
-/// Nor is a region of fewer pixels anything, however far away.
+/// Regions with fewer pixels are noise at any distance.
 const FEWEST_PIXELS: f64 = 6.0;
-/// A region larger than so many faces is a door.
+/// Regions larger than this many faces are background, such as a door.
 const MOST_FACES: f64 = 4.0;
 
-/// A place in the picture where a head or hand may be.
+/// A pixel where a head or hand may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkinCandidate {
     /// Column and row.
     pub pixel: [f64; 2],
-    /// Number of the region it is of.
+    /// Label of its region.
     pub region: i32,
-    /// Of that region, pixels.
+    /// Area of that region, pixels.
     pub area: usize,
-    /// False for the middle of a region that is longer than a hand: it may be a face, but not a hand.
+    /// False for the center of a region longer than a hand, which may be a face but not a hand.
     pub hand: bool,
 }
 
-/// The candidates in a mask of so many columns for a palm of this radius, pixels, and the number of its region in each pixel.
+/// Returns the candidates in a mask of so many columns for a palm of this radius in pixels, and the region label of each pixel.
 ///
-/// Regions with less than a fifth of a palm's area are noise. Each other one offers its middle, unless it is larger than four faces;
-/// one that is longer than a hand also offers its tips: the middles of what lies within a palm's reach of the outline's farthest
-/// points.
+/// Regions with less than a fifth of a palm's area are noise. Every other region yields its center, unless it is larger than four
+/// faces. A region longer than a hand also yields its tips: the centers of what lies within a hand's reach of the contour's
+/// extremal points.
 pub fn candidates(skin: &[u8], width: usize, palm: f64) -> (Vec<SkinCandidate>, RegionLabels) {
     let smallest = (SMALLEST * PI * palm.powi(2)).max(FEWEST_PIXELS);
     let largest = MOST_FACES * PI * (FACE / PALM * palm).powi(2);
-    // Regions are numbered by two by two pixels: the part begins with whole ones.
+    // Regions are labeled in blocks of two by two pixels, so the crop starts at an even row and column.
     let [rows, columns] = bounds(skin, width).map(|span| span.start / 2 * 2..span.end);
     let part = cut(skin, width, &rows, &columns);
     let (regions, values) = regions(&part, columns.len());

@@ -1,4 +1,4 @@
-//! The color of one person's skin in the light of the moment: a histogram that is learned and forgets.
+//! The color model of one person's skin in the current light: a histogram that is learned with a forgetting factor.
 
 use std::ops::Range;
 
@@ -6,69 +6,69 @@ use crate::chroma::{BINS, CHROMA_BINS, Counter, LUMA_BINS, is_among};
 use crate::skin::discs::Disc;
 use voodoo_core::math::widest;
 
-/// Share of the old histograms that a picture leaves.
+/// Weight of the old histograms after each further image.
 const FORGETTING: f32 = 0.86;
-/// Pictures after which that holds: the first make the general skin this person's.
+/// Number of images with a smaller weight, in which the general skin colors become those of this person.
 const SETTLED_PICTURES: u32 = 5;
-/// The share that those leave.
+/// Weight of the old histograms in these first images.
 const FORGETTING_AT_FIRST: f32 = 0.5;
-/// Skin has to be this many times as likely as the rest.
+/// Least likelihood ratio of skin to the rest for a color to count as skin.
 const RATIO: f32 = 2.0;
-/// And to be learned, so many times: colors near to those that were skin.
+/// Least likelihood ratio of a color to be learned: colors close to those of skin.
 const NEAR_RATIO: f32 = 1.0;
 /// Standard deviation of the smoothing along luma, bins.
 const LUMA_SPREAD: f64 = 0.7;
-/// And along either axis of chroma.
+/// Standard deviation of the smoothing along either axis of chroma, bins.
 const CHROMA_SPREAD: f64 = 0.8;
-/// Bins to either side that smoothing reaches.
+/// Half width of the smoothing kernel, bins.
 const SMOOTHED_BINS: usize = 2;
-/// Two places that share less of their colors than this do not both show skin.
+/// Two sites whose color histograms overlap by less than this fraction do not both show skin.
 const IN_COMMON: f64 = 0.1;
-/// Middle of the chroma (Cr, Cb) of human skin of any tone under white light, of 256.
+/// Mean chroma (Cr, Cb) of human skin of any tone under white light, of 256.
 const PRIOR_MIDDLE: [f32; 2] = [150.0, 110.0];
-/// And its spread.
+/// Standard deviation of that chroma.
 const PRIOR_SPREAD: f32 = 8.0;
-/// A place with fewer pixels of about skin's color shows none.
+/// Least number of approximately skin-colored pixels for a site to show skin.
 const FEWEST_IN_PLACE: usize = 8;
-/// All places together show at least so many.
+/// Least number of such pixels at all sites together.
 const FEWEST: usize = 20;
-/// Share of the rest that is spread over all colors: one seen nowhere yet is not skin.
+/// Fraction of the background histogram that is spread evenly over all colors, so that a color never observed is not skin.
 const UNSEEN: f32 = 0.05;
-/// Bins that share a value of Cr.
+/// Number of bins with the same value of Cr.
 const PLANE: usize = CHROMA_BINS * LUMA_BINS;
 
-/// Decides by the ratio of two histograms, skin's and everything else's.
+/// Classifies colors by the ratio of two histograms, of skin and of everything else.
 #[derive(Clone, Debug)]
 pub struct SkinColors {
-    /// Of skin, by Cr, Cb and luma.
+    /// Histogram of skin, by Cr, Cb and luma.
     pub skin: Vec<f32>,
-    /// Of the rest.
+    /// Histogram of everything else.
     pub rest: Vec<f32>,
-    /// Which bins are skin's.
+    /// Which bins count as skin.
     pub table: Box<[bool; BINS]>,
-    /// Which are near to what skin was.
+    /// Which bins are close enough to skin to be learned.
     near: Box<[bool; BINS]>,
     pictures: u32,
     counter: Counter,
     scratch: [Vec<f32>; 4],
 }
 
-/// Where in a picture of `[height, width]` skin is and where not.
+/// The pixels of an image of `[height, width]` from which skin and background are learned.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lesson<'a> {
-    /// Of each pixel's color, see [`crate::chroma::bins`].
+    /// Bin of each pixel's color, see [`crate::chroma::bins`].
     pub bins: &'a [u16],
     pub size: [usize; 2],
-    /// Where the head is and where each hand is; of it only what has about skin's color is learned.
+    /// Circles at the head and at each hand; only their approximately skin-colored pixels are learned.
     pub inside: &'a [Disc],
-    /// 1 where no head or hand is.
+    /// 1 where neither head nor hand is.
     pub outside: &'a [u8],
-    /// Where the body is, if known: half of the rest is learned from its clothes.
+    /// Pixels of the body, if known: half of the background histogram is learned from its clothes.
     pub body: Option<&'a [bool]>,
 }
 
 impl Default for SkinColors {
-    /// The colors of all skins against evenly spread ones.
+    /// Returns the prior: the colors of all skin tones against a uniform background.
     fn default() -> Self {
         let axis = |middle: f32| {
             let place = move |bin: usize| (bin as f32 + 0.5) * (256 / CHROMA_BINS) as f32;
@@ -93,7 +93,7 @@ impl Default for SkinColors {
 }
 
 fn sum(values: &[f32]) -> f64 {
-    // Several sums, so that none waits for the last.
+    // Several partial sums, so that additions do not wait for each other.
     let (blocks, rest) = values.as_chunks::<8>();
     let mut sums = [0.0_f64; 8];
     for block in blocks {
@@ -111,9 +111,9 @@ impl SkinColors {
         }
     }
 
-    /// Learns from the pixels where skin must be, and from those far from it; whether there was enough skin to learn from.
+    /// Updates the histograms with an image; returns whether there was enough skin to learn from.
     ///
-    /// A color is learned as far as two places show it: a shirt behind one hand is not skin.
+    /// A color is learned to the degree that two sites show it, so that a shirt behind one hand is not learned as skin.
     pub(super) fn learn(&mut self, lesson: &Lesson) -> bool {
         let mut smoothed_most = std::mem::take(&mut self.scratch);
         let enough = self.learn_with(lesson, &mut smoothed_most);
@@ -133,7 +133,7 @@ impl SkinColors {
         }
         let (mut first, mut end) = (BINS, 0);
         for found in places {
-            // So few pixels are counted without rounding.
+            // Counts this small are exact in single precision.
             found.iter().for_each(|bin| frequencies[usize::from(*bin)] += 1.0);
             let planes = smooth(frequencies, work);
             let count = found.len() as f32;
@@ -165,7 +165,7 @@ impl SkinColors {
         true
     }
 
-    /// Bins of the pixels of a circle that have about skin's color.
+    /// Bins of the approximately skin-colored pixels in a circle.
     fn skin_in(&self, lesson: &Lesson, disc: &Disc) -> Vec<u16> {
         let [rows, columns] = disc.window(lesson.size);
         if rows.is_empty() || columns.is_empty() {
@@ -179,7 +179,7 @@ impl SkinColors {
         inside.map(|(bin, _)| bin).collect()
     }
 
-    /// Shares of bins where no skin is; half of them of the body's clothes, where it is known.
+    /// Normalized histogram of the background; half of it from the clothes, where the body is known.
     fn count_rest(&mut self, lesson: &Lesson, frequencies: &mut [f32]) {
         let outside = lesson.outside.iter().map(|outside| *outside != 0);
         let pixels = lesson.bins.iter().copied().zip(outside);
@@ -202,8 +202,8 @@ impl SkinColors {
     }
 }
 
-/// Smooths a histogram in place: the colors between those seen count too. Beyond its ends it goes on as in a mirror. What is not zero
-/// lies in the range that is returned.
+/// Smooths a histogram in place, so that colors between observed ones count too. The boundaries are mirrored. All nonzero entries
+/// lie in the returned range.
 fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
     work.clear();
     work.resize(values.len(), 0.0);
@@ -220,7 +220,7 @@ fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
             place
         }) as usize
     };
-    // Most colors are seen nowhere: only planes with some, and those around, hold anything.
+    // Most colors never occur, so only occupied planes and their neighbors are processed.
     let holds: Vec<bool> = values.chunks_exact(PLANE).map(|plane| plane.iter().any(|value| *value != 0.0)).collect();
     let first = holds.iter().position(|holds| *holds).unwrap_or(CHROMA_BINS).saturating_sub(SMOOTHED_BINS);
     let end = holds.iter().rposition(|holds| *holds).map_or(first, |last| (last + 1 + SMOOTHED_BINS).min(CHROMA_BINS));
@@ -256,13 +256,13 @@ fn smooth(values: &mut [f32], work: &mut Vec<f32>) -> Range<usize> {
     first * PLANE..end * PLANE
 }
 
-/// Shares of a bin two and one bins away, and of itself, of a Gaussian bell.
+/// Gaussian kernel weights at two bins, one bin and zero distance.
 fn kernel(spread: f64) -> [f64; SMOOTHED_BINS + 1] {
     let bell = [2.0, 1.0, 0.0].map(|away: f64| (-0.5 * (away / spread).powi(2)).exp());
     bell.map(|value| value / (2.0 * (bell[0] + bell[1]) + bell[2]))
 }
 
-/// Where the share of each bin of luma goes.
+/// Target bins and weights for each bin of luma.
 fn luma_kernel() -> [[f32; LUMA_BINS]; LUMA_BINS] {
     let [far, near, here] = kernel(LUMA_SPREAD);
     let mut to = [[0.0_f64; LUMA_BINS]; LUMA_BINS];

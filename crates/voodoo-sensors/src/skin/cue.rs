@@ -1,4 +1,4 @@
-//! The skin cue of one camera (K06 III-A): segmentation that adapts, regions, and their assignment.
+//! The skin cue of one camera (K06 III-A): adaptive segmentation, regions, and their assignment to sites.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -19,84 +19,84 @@ use voodoo_core::TrackError;
 use voodoo_core::Tracker;
 use voodoo_core::math::Vec3;
 
-/// Regions no longer than this, in radii of a palm, may be parts of one hand: a shadow between the fingers and the palm does not make
-/// two of it. Arms that lie near each other stay apart.
+/// Regions no longer than this, in palm radii, may be parts of one hand, so that a shadow between fingers and palm does not split
+/// it. Arms near each other stay separate.
 const LONGEST_JOINED: f64 = 3.0;
-/// A smaller share of a palm is a speck.
+/// A region below this fraction of a palm's area is too small for a hand.
 const SPECK: f64 = 0.7;
-/// The middle of a head lies this far behind its face, meters.
+/// Distance of the head's center behind the surface of the face, meters.
 const FACE_BEHIND: f64 = 0.075;
-/// And that of a hand behind its skin.
+/// Distance of a hand's center behind its surface, meters.
 const HAND_BEHIND: f64 = 0.04;
-/// Depth is looked for within so many radii of a palm around a candidate.
+/// Depth is sampled within this many palm radii around a candidate.
 const SURFACE_RADIUS: f64 = 1.5;
-/// Nearer to the camera no site is looked for, meters.
+/// Least distance from the camera at which sites are searched for, meters.
 const NEAREST_SITE: f64 = 0.1;
 
-/// How skin regions become rays.
+/// Parameters that turn skin regions into rays.
 #[derive(Clone, Debug)]
 pub struct SkinSettings {
-    /// Names of the sites; those of a hand begin with the letter of its side, and so do its limbs.
+    /// Names of the sites; those of hands start with the letter of their side, as do the names of their limbs.
     pub sites: Vec<String>,
-    /// A new region farther than this from the predicted site is not it, meters.
+    /// Gate of a new region around the predicted site, meters.
     pub gate: f64,
-    /// The gate grows by this while its site is not seen, meters a second.
+    /// Growth of the gate while its site is not detected, meters per second.
     pub growth: f64,
-    /// Up to this, meters.
+    /// Largest gate, meters.
     pub lost_gate: f64,
-    /// And for a hand that a depth camera sees up to this.
+    /// Largest gate of a hand whose distance a depth camera measures, meters.
     pub widest_gate: f64,
-    /// A region is taken far from where its site is expected only if it is this far outside the body, meters.
+    /// A region far from the predicted site is accepted only if it is at least this far outside the body, meters.
     pub unexplained: f64,
-    /// A second candidate that is not this many times as far as the first makes both useless.
+    /// If the second-best candidate is less than this many times as far as the best one, neither is accepted.
     pub ambiguity: f64,
 }
 
 impl SkinSettings {
-    /// Whether a site is the head's.
+    /// Whether a site is the head.
     pub fn is_head(&self, site: usize) -> bool {
         self.sites.get(site).is_some_and(|name| name.starts_with("head"))
     }
 
-    /// What the names of its side begin with.
+    /// Prefix of the limb names of the site's side.
     fn side(&self, site: usize) -> &str {
         let name = self.sites.get(site).map_or("", String::as_str);
         name.split_at_checked(1).map_or(name, |(side, _)| side)
     }
 }
 
-/// A picture, and what is known of the body at its time.
+/// A color image, and what is known of the body at its time.
 #[derive(Clone, Copy)]
 pub struct SkinInput<'a> {
     /// Blue, green, red, row by row.
     pub image: &'a [[u8; 3]],
-    /// Rows and columns.
+    /// Height and width of the image.
     pub size: [usize; 2],
     /// Time, seconds.
     pub stamp: f64,
     /// The camera.
     pub eye: Eye<'a>,
-    /// What a depth camera saw of the body in the picture.
+    /// Depth measurements near the body, registered to the image.
     pub body: Option<&'a Arc<BodyView>>,
-    /// What was learned.
+    /// The learned colors and background.
     pub teacher: &'a Teacher,
-    /// Whether enough was learned to tell skin.
+    /// Whether the colors were learned from enough images.
     pub settled: bool,
-    /// The sites that are looked for.
+    /// The sites that are searched for.
     pub expected: &'a [Expected],
-    /// The body that they belong to, in its last pose; none: not known.
+    /// The tracked body in its last pose; `None` if it is not known.
     pub tracker: Option<&'a Tracker>,
-    /// Other persons; what is nearer to them than to the body is theirs.
+    /// Other persons; a region nearer to them than to the body belongs to them.
     pub others: &'a [&'a Tracker],
 }
 
 impl SkinInput<'_> {
-    /// A site's depth along the optical axis, meters.
+    /// Depth of a site along the optical axis, meters.
     fn depth(&self, site: &Expected) -> f64 {
         self.eye.in_sensor(site.place).z
     }
 
-    /// The sites in front of the camera.
+    /// Returns the sites in front of the camera.
     fn in_front(&self) -> Vec<Expected> {
         let in_front = |site: &&Expected| {
             let place = self.eye.in_sensor(site.place);
@@ -105,19 +105,19 @@ impl SkinInput<'_> {
         self.expected.iter().filter(in_front).copied().collect()
     }
 
-    /// Unit vectors in the world through the candidates' pixels.
+    /// Unit directions through the candidates' pixels, world frame.
     fn directions(&self, candidates: &[SkinCandidate]) -> Vec<Vec3> {
         candidates.iter().map(|item| self.eye.direction(self.eye.undistorted(item.pixel))).collect()
     }
 
-    /// Distances of places from the surfaces of the body's limbs.
+    /// Distances of positions from the surfaces of the body's limbs.
     fn limb_distances(&self, places: &[[f64; 3]]) -> Result<LimbDistances, TrackError> {
         let Some(tracker) = self.tracker else { return Ok(LimbDistances::default()) };
         let names = tracker.body().limbs().iter().map(|limb| limb.name.clone()).collect();
         Ok(LimbDistances { names, away: tracker.limb_distances(PointSlice::F64(places))?.concat() })
     }
 
-    /// Distances of places from the nearest of the other persons; none without others.
+    /// Distances of positions from the nearest other person; `None` without other persons.
     fn others_distance(&self, places: &[[f64; 3]]) -> Result<Option<Vec<f32>>, TrackError> {
         let mut nearest: Option<Vec<f32>> = None;
         for other in self.others {
@@ -131,39 +131,39 @@ impl SkinInput<'_> {
     }
 }
 
-/// A site that was found in a picture.
+/// A site that was detected in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundSite {
-    /// Its number.
+    /// Index of the site.
     pub site: usize,
-    /// A point of the ray that it is on, world, meters.
+    /// A point of its ray, world frame, meters.
     pub origin: Vec3,
     /// The ray's unit direction.
     pub direction: Vec3,
-    /// Where on it the site is, if a depth camera saw it, meters.
+    /// Position of the site, if a depth camera measured it, meters.
     pub place: Option<Vec3>,
-    /// Where it is expected along the optical axis, meters.
+    /// Predicted depth of the site along the optical axis, meters.
     pub depth: f64,
 }
 
-/// The skin cue of one camera: what changes from picture to picture.
+/// The state of the skin cue of one camera.
 #[derive(Clone, Debug)]
 pub struct SkinCue {
-    /// How regions become rays.
+    /// Parameters.
     pub settings: SkinSettings,
-    /// Regions that are followed.
+    /// The tracked regions.
     pub blobs: Blobs,
-    /// The last picture.
+    /// The last image and its segmentation.
     pub picture: Arc<Picture>,
-    /// Pairs of a site's and a candidate's number.
+    /// Pairs of site index and candidate index.
     pub assigned: Vec<(usize, usize)>,
-    /// Where in the last picture a head or a hand may be.
+    /// The candidates for heads and hands in the last image.
     pub candidates: Vec<SkinCandidate>,
     spare: Option<Arc<Picture>>,
 }
 
 impl SkinCue {
-    /// Nothing was seen yet.
+    /// Returns a cue without any image.
     pub fn new(settings: SkinSettings) -> Self {
         Self {
             blobs: Blobs::new(settings.sites.len()),
@@ -175,14 +175,14 @@ impl SkinCue {
         }
     }
 
-    /// The same, without memory that it would reuse.
+    /// Copies everything but the buffers for reuse.
     pub fn twin(&self) -> Self {
         let mut twin = self.clone();
         twin.spare = None;
         twin
     }
 
-    /// Finds regions of skin in a picture, follows them, and tells which of them each site is and on which ray it was seen.
+    /// Segments and tracks the skin regions of an image and assigns them to sites; returns a ray for each detected site.
     ///
     /// # Errors
     /// [`TrackError`] when sizes do not fit together, or a tracker has no pose.
@@ -190,7 +190,7 @@ impl SkinCue {
         let expected = input.in_front();
         let depths = expected.iter().map(|site| input.depth(site));
         let nearest = Some(depths.fold(f64::INFINITY, f64::min)).filter(|nearest| nearest.is_finite()).unwrap_or(1.0);
-        // Of a palm at the nearest site.
+        // Radius of a palm at the nearest site.
         let radius = PALM * input.eye.focal() / nearest;
         self.assigned.clear();
         self.find_skin(input, radius)?;
@@ -231,7 +231,7 @@ impl SkinCue {
         let origin = input.eye.origin();
         let mut choices: Vec<Choice> =
             expected.iter().map(|site| self.choice(site, &sight_context, &theirs, origin)).collect();
-        // Names are given below; what could be a piece of a hand is known before.
+        // Labels are assigned below; which candidates may be pieces of a hand is known before.
         let pieces: Vec<Vec<bool>> = choices.iter().map(|choice| pieces(choice, &sights)).collect();
         let rules =
             Rules { gate: self.settings.gate, growth: self.settings.growth, ambiguity: self.settings.ambiguity };
@@ -246,9 +246,9 @@ impl SkinCue {
         Ok(named.iter().map(found).collect())
     }
 
-    /// Which pixels of a picture show skin, of a palm of so many pixels' radius.
+    /// Segments the skin pixels of an image for a palm of this radius in pixels.
     fn find_skin(&mut self, input: &SkinInput, radius: f64) -> Result<(), TrackError> {
-        // The last picture but one is needed no more.
+        // The buffer of the image before the last is free for reuse.
         let mut picture = self.spare.take().and_then(|spare| Arc::try_unwrap(spare).ok()).unwrap_or_default();
         find_bins(input.image, &mut picture.bins);
         let body = input.body.filter(|body| body.size == input.size);
@@ -270,7 +270,7 @@ impl SkinCue {
         Ok(())
     }
 
-    /// The candidates in space, and their depths along the optical axis: as the depth camera has them, else that of the nearest site.
+    /// The 3-D candidates and their depths along the optical axis: the measured depth, else that of the nearest site.
     fn sights(
         &self,
         input: &SkinInput,
@@ -314,7 +314,7 @@ impl SkinCue {
         let distance: Vec<f64> = sight_context.sights.iter().zip(&inside).map(away).collect();
         let mut allowed = sight_context.allowed(site, &inside);
         for (index, allowed) in allowed.iter_mut().enumerate() {
-            // A speck far from where the hand is expected is what is left of another region.
+            // A very small region far from the predicted hand is the remainder of another region.
             if theirs[index] || (distance[index] > self.settings.gate && sight_context.specks[index]) {
                 *allowed = 0;
             }
@@ -326,12 +326,12 @@ impl SkinCue {
     }
 }
 
-/// Where a site is when a sight is its surface.
+/// Position of a site if the candidate lies on its surface.
 fn inside(site: &Expected, sight: &Sight) -> Vec3 {
     sight.place + sight.direction * if site.head { FACE_BEHIND } else { HAND_BEHIND }
 }
 
-/// Of every sight whether it may be a piece of a site.
+/// For each candidate, whether it may be a piece of a site.
 fn pieces(choice: &Choice, sights: &[Sight]) -> Vec<bool> {
     let marks = choice.allowed.iter().zip(&choice.elsewhere).zip(sights);
     marks.map(|((allowed, elsewhere), sight)| *allowed > 0 && !elsewhere && sight.deep).collect()

@@ -1,26 +1,26 @@
-//! The outline of a region of a mask: how long the region is, however it lies, and where its tips are.
+//! The contour of a mask region: its length in any orientation, and its tips.
 
-/// A region cut out of a picture: row by row, 1 where it is, within the box that holds it.
+/// A region cropped from a mask: row by row, 1 inside the region, within its bounding box.
 #[derive(Clone, Debug)]
 pub(super) struct Cutout {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
     pub mask: Vec<u8>,
     /// Mean column and row.
     pub middle: [f64; 2],
 }
 
-/// At most so many tips of a region are looked at: two hands do not join more.
+/// Greatest number of tips that are evaluated; more than two hands do not join.
 const MOST_TIPS: usize = 4;
-/// A tip is farther out than all of the outline within this, radii of a palm.
+/// A tip is a maximum of the distance from the center along the contour within this many palm radii.
 const TIP_ALONE: f64 = 2.5;
-/// A tip is this far from the region's middle, radii of a palm: a palm has none.
+/// Least distance of a tip from the region's center, in palm radii; a palm alone has no tips.
 const FAR_OUT: f64 = 1.5;
-/// Two tips are this far apart, radii of a palm.
+/// Least distance between two tips, in palm radii.
 const TIPS_APART: f64 = 3.0;
-/// A hand at a tip reaches this far from it, radii of a palm.
+/// Extent of a hand from its tip, in palm radii.
 const HAND_AT_TIP: f64 = 3.2;
-/// Columns and rows from a pixel to its eight neighbors, counter-clockwise in the picture.
+/// Offsets (column, row) of the eight neighbors, counterclockwise in the image.
 const NEIGHBOR_STEPS: [[i32; 2]; 8] = [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
 
 impl Cutout {
@@ -35,7 +35,7 @@ impl Cutout {
         let Some(first) = self.mask.iter().position(|pixel| *pixel != 0) else { return Vec::new() };
         let start = [(first % self.width) as i32, (first / self.width) as i32];
         let step = |[u, v]: [i32; 2], turn: usize| [u + NEIGHBOR_STEPS[turn & 7][0], v + NEIGHBOR_STEPS[turn & 7][1]];
-        // Clockwise from the left, where nothing is, to the last pixel of the round.
+        // Clockwise from the left neighbor, which is outside, to the last border pixel.
         let Some(to_last) = (5..12).rev().find(|turn| self.contains(step(start, *turn))) else { return vec![start] };
         let last = step(start, to_last);
         let (mut here, mut back) = (start, to_last & 7);
@@ -51,7 +51,7 @@ impl Cutout {
         }
     }
 
-    /// The longer side of the narrowest box around the region, however turned, pixels.
+    /// Longer side of the narrowest box of any orientation around the region, pixels.
     pub(super) fn length(&self) -> f64 {
         let hull = self.hull();
         let mut best = (f64::INFINITY, 0.0);
@@ -100,18 +100,18 @@ impl Cutout {
                 }
                 hull.push(point);
             }
-            // The other way begins where this one ends.
+            // The opposite direction ends the border where this one begins.
             if hull.len() > begin + 1 {
                 hull.pop();
             }
         };
-        // By rows, and in them by columns, on the one side down and on the other up.
+        // Sorted by row, then by column: one chain downwards, the other upwards.
         add(&mut ends.iter().copied());
         add(&mut ends.iter().rev().copied());
         hull
     }
 
-    /// Middles (column, row) of the parts of the region around its tips, farthest first, for a palm of this radius, pixels.
+    /// Centers (column, row) of the parts of the region around its tips, farthest first, for a palm of this radius in pixels.
     pub(super) fn tips(&self, palm: f64) -> Vec<[f64; 2]> {
         let border = self.border();
         let count = border.len();
@@ -145,7 +145,7 @@ impl Cutout {
         tips
     }
 
-    /// Mean column and row of the region's pixels nearer than `reach` to a place.
+    /// Mean column and row of the region's pixels within `reach` of a pixel.
     fn middle_near(&self, place: [f64; 2], reach: f64) -> [f64; 2] {
         let (mut sums, mut count) = ([0.0; 2], 0.0);
         for (index, _) in self.mask.iter().enumerate().filter(|(_, pixel)| **pixel != 0) {

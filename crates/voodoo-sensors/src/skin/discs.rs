@@ -1,8 +1,8 @@
-//! Filled circles in masks, pixel by pixel as Bresenham's algorithm has them, and OpenCV.
+//! Filled circles in masks, rasterized with Bresenham's algorithm like in OpenCV.
 
 use std::ops::Range;
 
-/// A filled circle: column and row of its middle, and its radius, pixels.
+/// A filled circle: column and row of its center, and its radius, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Disc {
     pub middle: [i64; 2],
@@ -10,7 +10,7 @@ pub(super) struct Disc {
 }
 
 impl Disc {
-    /// Visits rows with the columns in them that lie in a picture of `[height, width]`; some come several times.
+    /// Visits the rows and column ranges of the circle within an image of `[height, width]`; some rows are visited several times.
     fn spans(&self, [height, width]: [usize; 2], mut visit: impl FnMut(usize, Range<usize>)) {
         let [u, v] = self.middle;
         let mut line = |row: i64, reach: i64| {
@@ -36,12 +36,12 @@ impl Disc {
         }
     }
 
-    /// Sets the pixels of a mask of `[height, width]` that lie in the circle.
+    /// Sets the pixels of the circle in a mask of `[height, width]`.
     pub(super) fn fill(&self, mask: &mut [u8], size: [usize; 2], value: u8) {
         self.spans(size, |row, columns| mask[row * size[1]..][columns].fill(value));
     }
 
-    /// Rows and columns of a picture of `[height, width]` that hold all of the circle that lies in it.
+    /// Ranges of rows and columns that contain the circle within an image of `[height, width]`.
     pub(super) fn window(&self, [height, width]: [usize; 2]) -> [Range<usize>; 2] {
         let within = |middle: i64, size: usize| {
             let inside = |value: i64| value.clamp(0, size as i64) as usize;

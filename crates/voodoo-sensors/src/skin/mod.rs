@@ -1,17 +1,18 @@
 //! Skin color as a cue for head and hands (K06 III-A).
 //!
-//! All regions become candidates without a label. They are followed in space (see `blobs`), so that a hand keeps its name while the body
-//! model falls behind. What keeps a hand with its owner:
+//! All regions are unlabeled candidates. They are tracked in 3-D (see `blobs`), so that a hand keeps its label while the body
+//! model lags. Four rules keep each region with its site:
 //!
-//! * A region that is larger than a hand (a bare forearm, a door) offers its tips, not its middle, and of the tips of a forearm the one
-//!   that is not the elbow's.
-//! * What has had skin's color for long where no head or hand was is background (a wooden door); with a depth image, so is what lies
-//!   nowhere near the body.
-//! * Where two new candidates could both be a site, neither is taken. A site that was lost is taken up far from where it is expected only
-//!   in a region that belongs to no other site and that the body does not explain where it is thought to be.
-//! * The colors are learned where two of head and hands show them, with a forgetting factor, so that they follow the light and the person.
+//! * A region larger than a hand (a bare forearm, a door) offers its tips as candidates instead of its middle. Of the tips of a
+//! forearm, the one at the elbow is excluded.
+//! * A pixel that has had the color of skin for long, away from head and hands, is background (a wooden door). With a depth
+//! image, so is everything far from the body.
+//! * If two new candidates are similarly near to a site, neither is accepted. A lost site is reassigned far from its predicted
+//! position only to a region that no other site has and that the estimated pose does not explain.
+//! * A color is learned only if at least two of head and hands show it, with a forgetting factor, so that the model follows the
+//! light and the person.
 //!
-//! With a depth image a region is a place in space, not only a ray.
+//! With a depth image a region has a 3-D position, not only a ray.
 
 mod assignment;
 pub mod blobs;

@@ -1,66 +1,66 @@
-//! Which of the skin regions that are followed is the head and which a hand.
+//! Assigns the tracked skin regions to the sites head and hands.
 
 use crate::skin::assignment::assign;
 use crate::skin::blobs::{Blob, Blobs, ONE_HAND};
 use voodoo_core::math::CostTable;
 
-/// Time over which agreement with the model is averaged, seconds.
+/// Time constant of the averaged squared distance to a site, seconds.
 const AGREEMENT: f64 = 0.15;
-/// Pictures a second for which that holds.
+/// Frame rate for which that holds, 1/s.
 const RATE: f64 = 30.0;
-/// What a region's distance can add to that average at most, shares of the gate: one that is farther is no worse.
+/// Distances are clipped to this before averaging, as a fraction of the gate.
 const FARTHEST_GATES: f64 = 2.0;
-/// Cost of keeping a name at the edge of the gate.
+/// Cost of keeping an assignment at the edge of the gate.
 const HELD: f64 = 0.3;
-/// And at most: a region that keeps its name costs less than none.
+/// Greatest cost of keeping an assignment; less than the cost of no region.
 const DRIFTED: f64 = 0.75;
-/// Of taking a name from another region: two that were swapped cost more than changing back.
+/// Cost of taking a site from another region; it makes undoing a swap cheaper than the swap.
 const TAKEN: f64 = 0.5;
-/// Of having no region.
+/// Cost of a site without a region.
 const NONE: f64 = 0.8;
-/// A name is given up after this time, seconds, in which the body did not come nearer to it than so many gates, or in which it lay on
-/// another limb.
+/// A region loses its site after the two have disagreed for this time, seconds: the body stayed farther than
+/// [`MISMATCH_DISTANCE`] from it, or it lay on another limb.
 const MISMATCH_TIME: f64 = 0.25;
-/// See [`MISMATCH_TIME`], shares of the gate.
+/// See [`MISMATCH_TIME`]; as a fraction of the gate.
 const MISMATCH_DISTANCE: f64 = 1.25;
-/// Pictures farther apart than this count as this, seconds: doubt needs several.
-const LONGEST: f64 = 0.1;
-/// Pictures in which a region was seen before it may be named from afar.
+/// Longest interval between two frames that counts towards [`MISMATCH_TIME`], seconds, so that a mismatch needs several frames.
+const LONGEST_PREDICTION: f64 = 0.1;
+/// Frames in which a region must have been detected before it may be assigned to a distant site.
 const OLD_ENOUGH: usize = 3;
-/// Another region this near, shares of the gate, makes a new name doubtful, however near the first.
+/// Another region within this fraction of the gate makes a new assignment ambiguous, however near the first one is.
 const RIVAL: f64 = 0.5;
 
-/// How regions get names.
+/// Parameters of the assignment of regions to sites.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rules {
-    /// A new region farther than this from where the site is expected is not it, meters.
+    /// Gate of a new region around the predicted site, meters.
     pub gate: f64,
-    /// Of the gate while its site is not seen, meters a second.
+    /// Growth of the gate while its site is not detected, meters per second.
     pub growth: f64,
-    /// A new name needs its second-best candidate this many times as far as the first.
+    /// A new assignment requires that the second-best candidate is this many times as far as the best one.
     pub ambiguity: f64,
 }
 
-/// A site, and what it could be.
+/// A site and its possible regions.
 #[derive(Clone, Debug)]
 pub(super) struct Choice {
-    /// Its number.
+    /// Index of the site.
     pub site: usize,
-    /// How wide its gate gets, meters.
+    /// Largest gate, meters.
     pub widest: f64,
-    /// From each blob, meters.
+    /// Distance from each blob, meters.
     pub distance: Vec<f64>,
-    /// Of each blob: 0 it cannot be the site, 1 only near where it is expected, 2 anywhere.
+    /// For each blob: 0 if it cannot be the site, 1 if only near the predicted position, 2 if anywhere.
     pub allowed: Vec<u8>,
-    /// Of each blob whether it is on another part of the body, as far as that is where it is thought to be.
+    /// For each blob, whether it lies on another part of the body in the estimated pose.
     pub elsewhere: Vec<bool>,
 }
 
 impl Blobs {
-    /// Which of the blobs seen in this picture, the first ones, each site is: pairs of a choice's and a blob's number.
+    /// Assigns the blobs of this frame, which come first in the list, to sites: pairs of choice index and blob index.
     pub(super) fn name(&mut self, choices: &mut [Choice], rules: &Rules, stamp: f64) -> Vec<(usize, usize)> {
         let count = choices.first().map_or(0, |choice| choice.distance.len());
-        let elapsed = (stamp - self.stamp).clamp(0.0, LONGEST);
+        let elapsed = (stamp - self.stamp).clamp(0.0, LONGEST_PREDICTION);
         self.stamp = stamp;
         for choice in choices.iter_mut() {
             for (column, blob) in self.items[..count].iter_mut().enumerate() {
@@ -104,7 +104,8 @@ impl Blobs {
 }
 
 impl Blob {
-    /// How long it has spoken against being a site: on another limb, or its name without the body going there.
+    /// Updates how long a blob has contradicted a site: it lies on another limb, or it has the site's label but the body does not
+    /// approach it.
     fn update_mismatch(&mut self, choice: &Choice, column: usize, gate: f64, elapsed: f64) {
         let named = self.label == Some(choice.site) && self.sight.deep;
         let against = choice.elsewhere[column] || (named && choice.distance[column] > MISMATCH_DISTANCE * gate);
@@ -112,7 +113,7 @@ impl Blob {
         *mismatch = (*mismatch + if against { elapsed } else { -elapsed }).clamp(0.0, 2.0 * MISMATCH_TIME);
     }
 
-    /// Takes a distance from a site into the average.
+    /// Updates the running mean with a distance from a site.
     fn update_distance(&mut self, site: usize, distance: f64, gate: f64) {
         let sample = (distance / gate).min(FARTHEST_GATES).powi(2);
         let weight = if self.count == 1 { 1.0 } else { 1.0 - (-1.0 / (RATE * AGREEMENT)).exp() };
@@ -121,7 +122,7 @@ impl Blob {
     }
 }
 
-/// What it costs that a blob is a site; none where it cannot be.
+/// Cost of assigning a blob to a site; `None` where that is impossible.
 fn naming_cost(
     blobs: &[Blob],
     choice: &Choice,

@@ -1,20 +1,20 @@
-//! A picture, as skin was looked for in it.
+//! A segmented color image.
 
 use std::sync::Arc;
 
 use crate::body_view::BodyView;
 
-/// A picture, as skin was looked for in it.
+/// A segmented color image.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
-    /// Rows and columns.
+    /// Height and width.
     pub size: [usize; 2],
-    /// Of each pixel's color, see [`crate::chroma::bins`].
+    /// Bin of each pixel's color, see [`crate::chroma::bins`].
     pub bins: Vec<u16>,
-    /// 1 where it has skin's color.
+    /// 1 where the pixel has the color of skin.
     pub colored: Vec<u8>,
-    /// 1 where that may be the body's.
+    /// 1 where such a pixel may belong to the body.
     pub skin: Vec<u8>,
-    /// What a depth camera saw.
+    /// Depth measurements registered to the image.
     pub body: Option<Arc<BodyView>>,
 }

@@ -1,47 +1,47 @@
-//! Which skin regions can be which site: what a body allows, whatever lies nearest.
+//! Which skin regions can be which site: anatomical constraints, regardless of the nearest region.
 
 use crate::skin::blobs::{Blob, Sight};
 use voodoo_core::math::Vec3;
 
-/// Endings of the names of limbs that show skin.
+/// Name endings of the limbs with bare skin.
 const BARE_LIMBS: [&str; 5] = ["head", "neck", "upperarm", "forearm", "hand"];
-/// Endings of the names of limbs that a hand is on.
+/// Name endings of the limbs that carry a hand.
 const OWN_LIMBS: [&str; 2] = ["forearm", "hand"];
-/// What is nearer to the bare limbs than this may be theirs, meters.
+/// A region within this distance of the bare limbs may belong to them, meters.
 const BARE: f32 = 0.08;
-/// A hand before trunk or legs stands out from them by as much, meters; a stripe of a shirt does not.
+/// A hand before the trunk or the legs is at least this far in front of them, meters; a stripe of a shirt is not.
 const STANDS_OUT: f32 = 0.02;
-/// A hand is no nearer to an elbow that is seen than this share of its forearm.
+/// Least distance of a hand from a visible elbow, as a fraction of the forearm.
 const NEAREST_HAND: f64 = 0.6;
-/// And not this much farther, meters.
+/// Greatest distance beyond the forearm's length, meters.
 const FARTHEST_HAND: f64 = 0.10;
-/// What is no farther than this from a limb may be its surface, meters.
+/// A region within this distance of a limb may be its surface, meters.
 const ON_LIMB: f32 = 0.03;
-/// And is, if it is this much farther from another limb, meters.
+/// It is the limb's surface if another limb is this much farther away, meters.
 const OFF_LIMB: f32 = 0.06;
-/// A hand is no farther from its shoulder than this share of its arm...
+/// Greatest distance of a hand from its shoulder, as a fraction of the arm's length...
 const ARM_FRACTION: f64 = 1.2;
-/// ... and so much more, meters: room for a model that is not where the person is.
+/// ... plus this margin for an error of the estimated pose, meters.
 const ARM_ROOM: f64 = 0.15;
-/// From the wrist to the fingertips, meters.
+/// Length from the wrist to the fingertips, meters.
 const HAND_LENGTH: f64 = 0.18;
-/// How far the middle of a hand with its fingers is beyond the middle of the palm, meters.
+/// Distance from the center of the palm to the center of a hand with its fingers, meters.
 const FINGERS: f64 = 0.015;
 
-/// A site that skin is looked for at, where the body is expected.
+/// A site that is searched for, at its predicted position.
 #[derive(Clone, Copy, Debug)]
 pub struct Expected {
-    /// Its number.
+    /// Index of the site.
     pub site: usize,
-    /// Whether it is the head's, not a hand's.
+    /// Whether it is the head rather than a hand.
     pub head: bool,
-    /// Where it is expected, meters.
+    /// Predicted position, meters.
     pub place: Vec3,
-    /// Shoulder, elbow and hand of its side.
+    /// Positions of shoulder, elbow and hand of its side.
     pub arm: [Option<Vec3>; 3],
-    /// Other sensors do not show its limb where the body has it.
+    /// Whether other sensors do not support the estimated pose of its limb.
     pub arm_lost: bool,
-    /// They show its upper arm there.
+    /// Whether other sensors support the estimated pose of its upper arm.
     pub upper_arm_visible: bool,
 }
 
@@ -50,7 +50,7 @@ impl Expected {
         self.arm[1]
     }
 
-    /// How far a hand can be from its shoulder, meters.
+    /// Greatest distance of a hand from its shoulder, meters.
     fn reach(&self) -> f64 {
         match self.arm {
             [Some(shoulder), Some(elbow), Some(hand)] => {
@@ -60,7 +60,7 @@ impl Expected {
         }
     }
 
-    /// From the middle of a hand with its fingers to the hand's site, meters; zero for a head or without an elbow.
+    /// Offset from the center of a hand with its fingers to the hand's site, meters; zero for a head or without an elbow.
     pub(super) fn to_palm(self) -> Vec3 {
         match self.elbow() {
             Some(elbow) if !self.head => {
@@ -72,24 +72,24 @@ impl Expected {
     }
 }
 
-/// Distances of all sights from the surfaces of limbs, by the limbs' names, meters.
+/// Distances of all candidates from the surfaces of limbs, by limb name, meters.
 #[derive(Clone, Debug, Default)]
 pub struct LimbDistances {
-    /// Names, such as `l_forearm`.
+    /// Limb names, such as `l_forearm`.
     pub names: Vec<String>,
-    /// Limb by limb, a sight each.
+    /// For each limb one distance per candidate.
     pub away: Vec<f32>,
 }
 
 impl LimbDistances {
-    /// Of a sight from the nearest of the limbs that are chosen; infinite without any.
+    /// Distance of a candidate from the nearest of the chosen limbs; infinite if none is chosen.
     pub(super) fn least(&self, sight: usize, chosen: impl Fn(&str) -> bool) -> f32 {
         let count = self.away.len() / self.names.len().max(1);
         let limbs = self.names.iter().enumerate().filter(|(_, name)| chosen(name));
         limbs.fold(f32::INFINITY, |least, (limb, _)| least.min(self.away[limb * count + sight]))
     }
 
-    /// The same of all limbs; zero where nothing is known of any.
+    /// Distance of a candidate from the nearest of all limbs; zero if no distances are known.
     pub(super) fn nearest(&self, sight: usize) -> f32 {
         if self.names.is_empty() { 0.0 } else { self.least(sight, |_| true) }
     }
@@ -99,26 +99,26 @@ fn is_bare(limb: &str) -> bool {
     BARE_LIMBS.iter().any(|ending| limb.ends_with(ending))
 }
 
-/// What is known of the sights of a picture.
+/// The candidates of a frame and what is known of them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SightContext<'a> {
     pub sights: &'a [Sight],
-    /// Theirs.
+    /// Distances of the candidates from the limbs.
     pub blobs: &'a [Blob],
-    /// Which are too small for a hand.
+    /// Which candidates are too small for a hand.
     pub specks: &'a [bool],
     pub limbs: &'a LimbDistances,
-    /// What is farther from the body than this, meters, it does not explain.
+    /// The body does not explain candidates farther from it than this, meters.
     pub unexplained: f32,
 }
 
 impl SightContext<'_> {
-    /// Of every sight: 0 it cannot be the site, 1 only near to where it is expected, 2 wherever it can reach. `inside` is where the
-    /// site is if a sight is its surface.
+    /// For each candidate: 0 if it cannot be the site, 1 if only near the predicted position, 2 wherever the limb can reach.
+    /// `inside` is the position of the site if the candidate is on its surface.
     ///
-    /// A site that was not seen is taken up far from where it is expected only in a region that no other site has, which is no
-    /// speck, and which the body does not explain where it is thought to be. A hand whose forearm is lost may also hang before trunk
-    /// or legs: those have no skin to show.
+    /// A site that was lost is reassigned far from its predicted position only to a region that no other site has, that is not
+    /// too small, and that the estimated pose does not explain. A hand whose forearm is lost may also lie before the trunk or the
+    /// legs, because they show no skin.
     pub(super) fn allowed(&self, site: &Expected, inside: &[Vec3]) -> Vec<u8> {
         let owned = |region| self.blobs.iter().any(|blob| blob.label.is_some() && blob.sight.region == region);
         let has_bare = self.limbs.names.iter().any(|name| is_bare(name));
@@ -143,14 +143,14 @@ impl SightContext<'_> {
         allowed
     }
 
-    /// False for those ends of a bare forearm that are nearer to its elbow than another end of the same region, both for where the
-    /// hand is expected, and, if its arm is lost, for anywhere.
+    /// Returns two flags per candidate, for an assignment near the predicted position and, if the arm is lost, for one anywhere.
+    /// A flag is false for an end of a bare forearm that is nearer to the elbow than another end of the same region.
     fn ends(&self, site: &Expected) -> Vec<bool> {
         let Some(elbow) = site.elbow() else { return vec![true; self.sights.len()] };
         let far = |sight: &Sight| -sight.place.distance(elbow);
         let mut ends = self.hand_ends(|sight| sight.place.distance(site.place) + far(sight));
         if site.arm_lost {
-            // Nothing speaks for where the hand is expected, but it may be there all the same.
+            // No evidence supports the predicted position, but the hand may still be there.
             ends.iter_mut().zip(self.hand_ends(far)).for_each(|(end, other)| *end |= other);
         }
         ends
@@ -164,8 +164,8 @@ impl SightContext<'_> {
         self.sights.iter().map(|sight| towards(sight) <= least(sight.region)).collect()
     }
 
-    /// Of every sight whether it is the surface of a limb other than a hand's own forearm, of a bare one if that is lost. `side` is
-    /// what the names of the hand's limbs begin with.
+    /// For each candidate, whether it is the surface of a limb other than the hand's own forearm, or of a bare one if the arm is
+    /// lost. `side` is the prefix of the limb names of the hand's side.
     pub(super) fn elsewhere(&self, site: &Expected, side: &str) -> Vec<bool> {
         let own = |name: &str| name.starts_with(side) && OWN_LIMBS.iter().any(|ending| name.ends_with(ending));
         if site.head || !self.limbs.names.iter().any(|name| own(name)) {
@@ -180,7 +180,7 @@ impl SightContext<'_> {
     }
 }
 
-/// Whether a hand can be at a sight by how far it is from shoulder and elbow; without depth that is not known.
+/// Whether the distances from shoulder and elbow allow a hand at the candidate; true without depth.
 fn within_arm(site: &Expected, sight: &Sight, inside: Vec3) -> bool {
     if !sight.deep {
         return true;
@@ -189,16 +189,16 @@ fn within_arm(site: &Expected, sight: &Sight, inside: Vec3) -> bool {
     let elbow = site.elbow().filter(|_| site.upper_arm_visible);
     reaches
         && elbow.is_none_or(|elbow| {
-            // What is much nearer is the forearm's middle, with the hand in the shade or cut off.
+            // A region much nearer is the middle of the forearm; the hand is in the shade or cut off.
             let (apart, forearm) = (inside.distance(elbow), site.place.distance(elbow));
             let most = if site.arm_lost { f64::INFINITY } else { forearm + FARTHEST_HAND };
             NEAREST_HAND * forearm < apart && apart < most
         })
 }
 
-/// Where the middle of a hand is whose region is at `place` and which may be in pieces: something lies across it, or is behind it and
-/// of its color. It is then anywhere between two pieces that are no farther apart than a hand is long: of those places, the one
-/// nearest to where it is expected.
+/// Center of a hand whose region is at `place` and which may be split by something across it, or behind it and of its color. The
+/// center then lies between two pieces no farther apart than a hand is long; returned is the point there that is nearest to the
+/// predicted position.
 pub(super) fn of_pieces(place: Vec3, pieces: impl Iterator<Item = Vec3>, expected: Vec3) -> Vec3 {
     let mut nearest = place;
     for piece in pieces {

@@ -1,4 +1,4 @@
-//! What is learned from pictures: the colors of skin, and what always has them where no head or hand is.
+//! Learns from images: the colors of skin, and the background that has such colors away from head and hands.
 
 use crate::chroma::bins;
 use crate::masks::{PIXEL_BLOCK, is_empty};
@@ -7,62 +7,63 @@ use crate::skin::colors::{Lesson, SkinColors};
 use crate::skin::discs::Disc;
 use crate::skin::picture::Picture;
 
-/// No skin is learned, and no background, within so many radii of a face or palm.
+/// Neither skin nor background is learned within this many radii of a face or palm.
 const NOTHING_LEARNED: f64 = 2.5;
-/// Skin is learned within this share of it.
+/// Skin is learned within this fraction of the radius.
 const WITHIN: f64 = 0.8;
-/// Sites that far outside a picture are not looked at, pixels.
+/// Sites farther than this outside the image are ignored, pixels.
 const FAR_OUTSIDE: f64 = 1e4;
 
-/// Colors and background of one camera's pictures.
+/// Color model and background model of one camera.
 #[derive(Clone, Debug, Default)]
 pub struct Teacher {
-    /// Of skin.
+    /// Color model of skin.
     pub colors: SkinColors,
-    /// Pictures that colors were learned from.
+    /// Number of images that the colors were learned from.
     pub learned: u32,
     pictures: u32,
-    /// How much of the time each pixel shows skin where no skin is.
+    /// For each pixel the running fraction of time in which it has the color of skin away from head and hands.
     always: Vec<f32>,
-    /// Which blocks of pixels ever showed any.
+    /// Blocks of pixels in which that fraction was ever above zero.
     visible: Vec<bool>,
     size: [usize; 2],
     away: Vec<u8>,
 }
 
-/// Where a head or hand is in a picture.
+/// A head or hand in an image.
 #[derive(Clone, Copy, Debug)]
 pub struct VisibleSite {
     /// Column and row.
     pub pixel: [f64; 2],
-    /// Along the optical axis, meters.
+    /// Depth along the optical axis, meters.
     pub depth: f64,
     /// Whether it is the head.
     pub head: bool,
-    /// Whether it was found there: its colors may be learned.
+    /// Whether it was detected there, so that its colors may be learned.
     pub found: bool,
 }
 
-/// How much is learned from a picture.
+/// Learning parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     /// Focal length, pixels.
     pub focal: f64,
-    /// What has skin's color for so many pictures is half the background.
+    /// Half-life of the background model, images.
     pub half_life: f64,
-    /// Colors are learned from every so manyth picture...
+    /// Colors are learned from every n-th image...
     pub every: u32,
-    /// ... once they were learned from so many.
+    /// ... after the first so many images.
     pub settled: u32,
 }
 
 impl Teacher {
-    /// How much of the time each pixel of a picture of that size shows skin where no skin is, if it is known.
+    /// For each pixel of an image of that size the fraction of time in which it shows background of skin color; `None` if
+    /// unknown.
     pub fn always(&self, size: [usize; 2]) -> Option<&[f32]> {
         (!self.always.is_empty() && self.size == size).then_some(&self.always[..])
     }
 
-    /// Learns from the picture that skin was looked for in, or from another one of the camera, `image`.
+    /// Learns from the segmented image, or from `image`, another one of the same camera.
     pub fn learn(
         &mut self,
         picture: &Picture,
@@ -96,7 +97,7 @@ impl Teacher {
             let before = body.and_then(|body| body.before.as_deref());
             self.learn_always(&picture.colored, before, size, 1.0 - 0.5_f64.powf(1.0 / pace.half_life));
         }
-        // Light does not change from picture to picture; learning is the dearest part.
+        // The light changes slowly, and learning colors is the most expensive part, so most images are skipped.
         if settled && !self.pictures.is_multiple_of(pace.every.max(1)) {
             return;
         }
@@ -106,7 +107,7 @@ impl Teacher {
         self.learned += u32::from(self.colors.learn(&lesson));
     }
 
-    /// A running mean of "skin's color, and no head or hand near".
+    /// Updates the running mean of "has the color of skin, and no head or hand is near".
     fn learn_always(&mut self, colored: &[u8], before: Option<&[bool]>, size: [usize; 2], rate: f64) {
         if self.size != size || self.always.len() != colored.len() {
             self.always = vec![0.0; colored.len()];
@@ -117,7 +118,7 @@ impl Teacher {
         self.visible.resize(colored.len().div_ceil(PIXEL_BLOCK), false);
         let blocks = self.always.chunks_mut(PIXEL_BLOCK).zip(colored.chunks(PIXEL_BLOCK)).zip(&mut self.visible);
         for (block, ((always, colored), visible)) in blocks.enumerate() {
-            // What never showed skin has nothing to forget.
+            // Blocks that never showed skin color have nothing to decay.
             *visible |= !is_empty(colored);
             if !*visible {
                 continue;

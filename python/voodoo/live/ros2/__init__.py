@@ -1,1 +1,1 @@
-"""ROS 2 as a guest who needs no ROS: topics over DDS, by the `cyclonedds` package."""
+"""ROS 2 topics without a ROS installation: DDS by the `cyclonedds` package."""

@@ -1,4 +1,4 @@
-"""A participant among ROS 2 nodes, by Cyclone DDS."""
+"""A participant in a ROS 2 network, by Cyclone DDS."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ _LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="
 _MS = 1_000_000
 _domains: dict[int, Any] = {}
 _quiet: set[str] = set()
-"""What nodes of this process publish, and other ones of it shall not take for an offer."""
+"""Publications of this process that its other nodes must not treat as offers."""
 _lock = threading.Lock()
 
 
 @dataclass(frozen=True)
 class Offer:
-    """What somebody publishes on a topic.
+    """A publication found on a topic.
 
     Args:
         kind: message type, e.g. "sensor_msgs/msg/Image".
-        reliable: what is lost is sent again.
-        latched: who comes late gets the last messages.
+        reliable: lost messages are sent again.
+        latched: late subscribers get the last messages.
     """
 
     kind: str
@@ -49,17 +49,17 @@ def domain_id() -> int:
 
 
 def on_loopback() -> bool:
-    """Whether the environment wants this machine only, by the variables that ROS 2 knows."""
+    """Whether the environment restricts ROS 2 to this machine, by the variables that ROS 2 defines."""
     return os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST" or (
         os.environ.get("ROS_LOCALHOST_ONLY", "") == "1"
     )
 
 
 class Node:
-    """Topics of a ROS 2 network; it uses ROS_DOMAIN_ID, and this machine only where the environment says so.
+    """Topics of a ROS 2 network. Respects ROS_DOMAIN_ID, and the restriction to this machine if the environment sets it.
 
     Args:
-        quiet: what it publishes is no offer to other nodes of this process.
+        quiet: its publications are hidden from other nodes of this process.
 
     Raises:
         VoodooError: `cyclonedds` is not installed, or no network.
@@ -86,7 +86,7 @@ class Node:
         self._is_quiet = quiet
 
     def offers(self) -> dict[str, Offer]:
-        """Topic -> what is published on it now; of several the last."""
+        """Topic -> current publication; of several the last."""
         from cyclonedds.qos import Policy
 
         for sample in self._publications.take(N=1000):
@@ -104,18 +104,18 @@ class Node:
         return dict(self._offers.values())
 
     def subscribe(self, topic: str, offer: Offer, *, depth: int = 5) -> Subscription:
-        """Take what comes on a topic."""
+        """Subscribe to a topic."""
         return Subscription(self._participant, self._waitset, topic, offer, depth)
 
     def advertise(self, topic: str, kind: str, *, depth: int = 10) -> Publication:
-        """Publish on a topic, reliably, as long as the publication is kept."""
+        """Publish on a topic, reliably, while the returned publication is alive."""
         made = Publication(self._participant, topic, kind, depth)
         if self._is_quiet:
             _quiet.add(made.key)
         return made
 
     def wait(self, seconds: float) -> None:
-        """Until something comes on a subscribed topic, for so long [s] at most."""
+        """Wait until a message arrives on a subscribed topic, at most this long [s]."""
         self._waitset.wait(timeout=max(int(seconds * 1000), 1) * _MS)
 
 
@@ -131,7 +131,7 @@ def _qos(reliable: bool, latched: bool, depth: int) -> Any:  # noqa: ANN401
 
 
 class Subscription:
-    """What comes on a topic.
+    """A subscription to a topic.
 
     Attributes:
         topic: its name.
@@ -152,21 +152,21 @@ class Subscription:
         self._condition = condition
 
     def take(self) -> list[bytes]:
-        """Messages that came, as they were sent."""
+        """Received messages, as they were sent."""
         return [sample.data_as_sent for sample in self._reader.take(N=100) if hasattr(sample, "data_as_sent")]
 
     def lost(self) -> int:
-        """How many messages the network has lost since the last time."""
+        """Number of messages that the network lost since the last call."""
         return int(self._reader.get_sample_lost_status().total_count_change)
 
     @property
     def publishers(self) -> int:
-        """How many publish on it."""
+        """Number of publishers."""
         return len(self._reader.get_matched_publications())
 
 
 class Publication:
-    """A topic that is published on."""
+    """A publication on a topic."""
 
     def __init__(self, participant: Any, topic: str, kind: str, depth: int) -> None:  # noqa: ANN401
         """Advertise."""
@@ -178,7 +178,7 @@ class Publication:
 
     @property
     def key(self) -> str:
-        """What tells it from all others."""
+        """Unique identifier."""
         return str(self._writer.guid)
 
     def write(self, message: bytes) -> None:
@@ -187,5 +187,5 @@ class Publication:
 
     @property
     def subscribers(self) -> int:
-        """How many listen."""
+        """Number of subscribers."""
         return len(self._writer.get_matched_subscriptions())

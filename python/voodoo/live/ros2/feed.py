@@ -1,4 +1,4 @@
-"""From the messages of ROS 2 topics to arrivals; it knows nothing of the network."""
+"""Converts messages of ROS 2 topics to arrivals; independent of the network."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CLOUD, SCAN = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan"
 CAMERA_INFO, TF = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
 MEASURED = (IMAGE, COMPRESSED, CLOUD, SCAN)
-"""Types that are measurements."""
+"""Message types of measurements."""
 STANDING = ("odom", "map", "base_link", "world")
-"""Root frames, best first: people and rooms stand still in the first two while a robot moves."""
+"""Root frames, best first: the first two are fixed to the room while a robot moves."""
 _KEPT_S = 10.0
 _JUMP_S = 1.0
 _TF_PATIENCE_S = 0.05
@@ -48,7 +48,7 @@ ROOT_PATIENCE_S = 1.0
 
 @dataclass
 class _Calibrated:
-    """The calibration of an image topic, and what it was made of."""
+    """The calibration of an image topic, and the message it was made from."""
 
     key: tuple[object, ...]
     camera: Camera
@@ -58,17 +58,17 @@ class RosFeed:
     """Turns messages into arrivals.
 
     Args:
-        topics: what is measured; the first one makes the frames.
-        faults: counts what cannot be used.
-        clock: of the host.
+        topics: topics of the measurements; the first one defines the frames.
+        faults: counts unusable messages.
+        clock: host clock.
         root_frame: None: the best of STANDING that transforms lead to, else the frame of the first topic.
-        meters_per_unit: of 16-bit depth.
-        tf_max_age: how old a changing transform may be [s].
+        meters_per_unit: scale of 16-bit depth.
+        tf_max_age: largest age of a changing transform [s].
         sensor_pose: root_from_sensor (4, 4) of the first topic instead of transforms, and the name of that root frame.
 
     Attributes:
         unusable: messages of the first topic that could not become an arrival.
-        expects_transforms: somebody publishes transforms; what comes before them waits for ROOT_PATIENCE_S, then it counts.
+        expects_transforms: transforms are published; earlier messages wait for them for ROOT_PATIENCE_S, then they are used.
     """
 
     def __init__(
@@ -82,27 +82,27 @@ class RosFeed:
         tf_max_age: float = 0.5,
         sensor_pose: tuple[str, FloatArray] | None = None,
     ) -> None:
-        """Nothing came yet."""
+        """Start without messages."""
         self.unusable = 0
         self._topics, self._faults, self._clock = tuple(topics), faults, clock
         self._scale, self._pose = meters_per_unit, sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
-        self._lock = threading.Lock()  # transforms come in one thread and are asked for in another
+        self._lock = threading.Lock()  # transforms arrive in one thread and are read in another
         self._newest = -math.inf
         self._root = root_frame if sensor_pose is None else sensor_pose[0]
         self._since: float | None = None
         self._cameras: dict[str, _Calibrated] = {}
         self.expects_transforms = True
         for kind in (*MEASURED, CAMERA_INFO, TF):
-            STORE.get_msgdef(kind)  # else the first message of a type takes tens of milliseconds
+            STORE.get_msgdef(kind)  # otherwise the first message of a type takes tens of milliseconds
 
     @property
     def root_frame(self) -> str:
-        """The frame that `root_from_sensor` leads to; "" until it is known."""
+        """The target frame of `root_from_sensor`; "" until it is known."""
         return self._root or ""
 
     def info_topic(self, topic: str) -> str:
-        """Where the calibration of an image topic comes."""
+        """Topic of the calibration of an image topic."""
         return f"{base_topic(topic).rsplit('/', 1)[0]}/camera_info"
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
@@ -115,10 +115,10 @@ class RosFeed:
             return self._tree.lookup(self.root_frame, frame, stamp)
 
     def take(self, topic: str, kind: str, raw: bytes) -> list[Arrival]:
-        """Take up a message.
+        """Process a message.
 
         Args:
-            topic: it came on.
+            topic: topic of the message.
             kind: its type, e.g. "sensor_msgs/msg/Image".
             raw: as it was sent (CDR, with its header of four bytes).
         """
@@ -131,7 +131,7 @@ class RosFeed:
         return self.take_message(topic, kind, message)
 
     def take_message(self, topic: str, kind: str, message: Message) -> list[Arrival]:
-        """The same of a message that was read."""
+        """Process a deserialized message."""
         now = self._clock.now()
         try:
             if kind == TF:
@@ -156,7 +156,7 @@ class RosFeed:
             stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
             if not static:
                 if stamp < self._newest - _JUMP_S:
-                    self._tree.keep(stamp - _KEPT_S, stamp)  # what is later is of a time that has not come
+                    self._tree.keep(stamp - _KEPT_S, stamp)  # later transforms are in the future
                     self._newest = stamp
                 self._newest = max(self._newest, stamp)
             try:
@@ -205,7 +205,7 @@ class RosFeed:
             return self._tree.covers(self.root_frame, frame, stamp)
 
     def _knows_root(self, topic: str, message: Message, now: float) -> bool:
-        """Choose the root frame, if that can be done by now; before, nothing is measured."""
+        """Choose the root frame if possible; until then no measurements are made."""
         if self._root is not None:
             return True
         if topic != self._topics[0]:
@@ -257,7 +257,7 @@ class RosFeed:
 
 
 def _measured_as(topic: str, kind: str, message: Message) -> str:
-    """What a message measures: "depth", "color", "points" or "scan".
+    """Kind of measurement of a message: "depth", "color", "points" or "scan".
 
     Raises:
         Fault: an image of neither depth nor color.
@@ -278,7 +278,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
 
 @contextmanager
 def _whole(message: Message) -> Iterator[None]:
-    """Name errors of sizes that do not fit together: of a message with fewer bytes than it announces."""
+    """Report inconsistent sizes: a message with fewer bytes than its fields announce."""
     try:
         yield
     except RecordingError as error:
@@ -288,5 +288,5 @@ def _whole(message: Message) -> Iterator[None]:
 
 
 def _one(item: Message) -> Message:
-    """A TFMessage of one transform: a bad one costs no other."""
+    """Split into TFMessages of one transform, so that an invalid one does not affect the others."""
     return STORE.types[TF](transforms=[item])

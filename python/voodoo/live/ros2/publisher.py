@@ -1,4 +1,4 @@
-"""Publishes poses on ROS 2: transforms, joint states, markers, and who is there, named by REP-155."""
+"""Publishes poses on ROS 2: transforms, joint states, markers, and the list of tracked persons, with names of REP-155."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TRACKED = "/humans/bodies/tracked"
 class Ros2Output(Output):
     """`/tf`, `/humans/bodies/body_<id>/joint_states`, `.../pose`, `.../markers`, and `/humans/bodies/tracked` (hri_msgs/IdsList).
 
-    Stamps are those of the data. Who is lost or searched for is not among the tracked, and has no transforms.
+    Stamps are those of the data. Persons that are lost or searched for are not listed as tracked and have no transforms.
 
     Args:
-        root_frame: tells the frame of the poses, once something came.
+        root_frame: returns the frame of the poses, once a frame has arrived.
         node: None: one of its own.
     """
 
@@ -38,7 +38,7 @@ class Ros2Output(Output):
         self._bodies: dict[int, Body] = {}
         self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
         self._publish_on(TRACKED, IDS, 1)
-        # Who listens finds them before the first pose.
+        # Subscribers can discover these topics before the first pose.
         self._publish_on(f"{_body(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
         self._publish_on(f"{_body(1)}/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10)
         self._publish_on(f"{_body(1)}/markers", "visualization_msgs/msg/MarkerArray", 10)
@@ -49,7 +49,7 @@ class Ros2Output(Output):
         for number in sorted(observed):
             self._write_person(number, step.estimates[number], step.bodies[number])
         for number in sorted(self._displayed - observed):
-            # Their markers go, once.
+            # Markers of persons who left are deleted once.
             self._write_person(number, nobody(step.stamp), step.bodies.get(number, self._bodies[number]))
         self._displayed = observed
         self._bodies = {number: step.bodies[number] for number in observed}

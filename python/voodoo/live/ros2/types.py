@@ -1,7 +1,7 @@
-"""ROS 2 message types for DDS, made from their definitions; messages themselves stay bytes.
+"""ROS 2 message types for DDS, made from their definitions; the messages themselves remain bytes.
 
-`cyclonedds` wants a class for each type, and would turn an image into a list of numbers. The classes here describe the type and
-hand its bytes (CDR) on, which rosbags reads and writes, as those of bags.
+`cyclonedds` requires a class for each type, and would convert an image to a list of numbers. The classes here describe the type
+and pass its bytes (CDR) on; rosbags reads and writes them like those of bags.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from voodoo.errors import VoodooError
 
 IDS = "hri_msgs/msg/IdsList"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
-"""Messages of other releases that are used here have the same fields."""
+"""Release whose definitions are used; the messages used here have the same fields in other releases."""
 STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
 
 _BASE = {
@@ -48,7 +48,7 @@ def dds_name(kind: str) -> str:
 
 
 def ros_name(name: str) -> str:
-    """The other way; "" of what is no ROS message."""
+    """The inverse mapping; "" if the type is not a ROS message."""
     parts = name.split("::")
     if len(parts) != 4 or parts[1:3] != ["msg", "dds_"] or not parts[3].endswith("_"):
         return ""
@@ -69,7 +69,7 @@ def _serialize(
 
 
 def message_of(kind: Any, data: bytes) -> Any:  # noqa: ANN401
-    """A message of a class of `dds_type`, of its bytes (CDR with its header of four bytes), kept as `data_as_sent`."""
+    """A message of a class of `dds_type` from its bytes (CDR with its header of four bytes), kept as `data_as_sent`."""
     message = kind.__new__(kind)
     message.data_as_sent = bytes(data)
     return message

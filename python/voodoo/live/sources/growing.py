@@ -20,18 +20,18 @@ from voodoo.recordings.pictures import decode_color, decode_depth_png
 
 _POLL_S = 0.005
 _PATIENCE_S = 0.5
-"""A picture that does not decode is looked at again for so long: somebody may be writing it."""
+"""An undecodable image is retried for this time, because it may still be being written."""
 _SUFFIXES = {"depth": (".png",), "rgb": (".png", ".jpg", ".jpeg")}
 
 
 class GrowingSource(Source):
-    """New images in depth/ and rgb/ of a folder, see `voodoo.recordings.folder.FolderRecording`; what lay there before is left.
+    """New images in depth/ and rgb/ of a folder, see `voodoo.recordings.folder.FolderRecording`; older ones are ignored.
 
     Args:
-        path: the folder; it may come later.
+        path: the folder; it may be created later.
         calibration: None: calibration.toml in the folder.
         rate: images per second where names are numbers of images; None: 30.
-        sleep: waits for so many seconds.
+        sleep: waits for a number of seconds.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class GrowingSource(Source):
         rate: float | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Nothing is looked at yet."""
+        """Store the settings; the folder is not read yet."""
         self.name, self._path = path.resolve().name, path
         self._rate, self._sleep = rate, sleep
         self._file = path / "calibration.toml" if calibration is None else calibration
@@ -63,11 +63,11 @@ class GrowingSource(Source):
             raise SourceGone(f"{self._path}: expected a folder and {self._file.name}, found none yet")
         self._calibration = read_calibration(self._file)
         if not self._names:
-            # What comes while the source is gone is looked at when it is there again.
+            # Images added while the source is gone are read when it is available again.
             self._names = {kind: set(self._listed(kind)) for kind in _SUFFIXES}
 
     def _listed(self, kind: str) -> list[str]:
-        """Names of a kind's images, if the folder has changed since the last time."""
+        """Names of the images of a kind, if the folder has changed since the last call."""
         folder = self._path / kind
         try:
             changed = os.stat(folder).st_mtime_ns  # noqa: PTH116 - called hundreds of times a second
@@ -106,7 +106,7 @@ class GrowingSource(Source):
         return sorted(arrivals, key=lambda arrival: (arrival.stamp, arrival.drives))
 
     def _arrival(self, kind: str, path: Path, since: float, now: float) -> list[Arrival] | None:
-        """The arrival of a file; none of one that cannot be used, None while it may still be written."""
+        """The arrival of a file; none if it is unusable, None while it may still be being written."""
         assert self._calibration is not None
         place = self._calibration.depth if kind == "depth" else self._calibration.color
         if place is None:

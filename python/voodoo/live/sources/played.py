@@ -1,4 +1,4 @@
-"""A recording played at its own pace, as if its sensors were there."""
+"""A recording replayed in real time, as if its sensors were live."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from voodoo.sensors.adapters import adapter_of
 
 
 class PlayedSource(Source):
-    """A recording, frame by frame when it is due; the time of measurement is when it is due.
+    """Replays a recording, each frame when it is due; the due time is used as the time of measurement.
 
     Args:
-        recording: what is played.
-        rate: how many times as fast as it was recorded.
-        loop: begin again at its end; stamps go on.
-        left_out: what the recording leaves out because it is damaged; it is told as it comes.
-        sleep: waits for so many seconds.
+        recording: recording to replay.
+        rate: playback speed relative to real time.
+        loop: start again at the end; stamps continue to rise.
+        left_out: damaged measurements that the recording leaves out; they are reported as they occur.
+        sleep: waits for a number of seconds.
     """
 
     stays = False
@@ -39,7 +39,7 @@ class PlayedSource(Source):
         left_out: LeftOut | None = None,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Nothing is read yet."""
+        """Store the settings; nothing is read yet."""
         self.name, self.recording = recording.name, recording
         self._rate, self._loop, self._sleep = rate, loop, sleep
         self._left_out = LeftOut() if left_out is None else left_out

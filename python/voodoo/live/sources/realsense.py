@@ -1,4 +1,4 @@
-"""A RealSense camera through its maker's library, `pyrealsense2`."""
+"""A RealSense camera, through the vendor's library `pyrealsense2`."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from voodoo.model.camera import Camera
 from voodoo.recordings.calibration import read_calibration
 
 _SIZE, _RATE = (640, 480), 30
-"""What is asked for where the camera has it."""
+"""Requested resolution and rate, if the camera supports them."""
 _WAITING = 4
 _SILENT_S = 5.0
-"""A stream that stops is opened again: some do after minutes."""
+"""A stream that stops for this long is opened again; some stop after minutes."""
 _LENSES = {
     "brown_conrady": "plumb_bob",
     "modified_brown_conrady": "plumb_bob",
@@ -33,15 +33,15 @@ _LENSES = {
 
 
 class RealSenseSource(Source):
-    """Depth, and color where there is a stream of it, of a RealSense camera.
+    """Depth, and color if available, of a RealSense camera.
 
     Args:
         serial: of the camera; None: the first one.
-        calibration: a calibration.toml whose `root_frame` and `root_from_sensor` say where the depth camera is.
-        size: (width, height) [px] that is asked for.
-        rate: images per second that are asked for.
+        calibration: a calibration.toml whose `root_frame` and `root_from_sensor` give the pose of the depth camera.
+        size: (width, height) [px] to request.
+        rate: images per second to request.
         color: whether color is used.
-        device: a device of `pyrealsense2`, instead of one that is looked for.
+        device: a device of `pyrealsense2`, instead of a search for one.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class RealSenseSource(Source):
         self._streams[profile.unique_id()] = take
 
     def _profile(self, sensor: Any, stream: Any, formats: Sequence[Any]) -> Any:  # noqa: ANN401
-        """The stream of a sensor that is nearest to what is asked for; None: it has none."""
+        """The stream of a sensor that is nearest to the requested one; None: it has none."""
         profiles = [
             profile.as_video_stream_profile()
             for profile in sensor.get_stream_profiles()
@@ -207,7 +207,7 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
     """The camera of `pyrealsense2.intrinsics`.
 
     Raises:
-        VoodooError: numbers that make no camera, or a lens model that is not known.
+        VoodooError: invalid numbers, or an unknown lens model.
     """
     lens = intrinsics.model.name
     coefficients = [float(value) for value in intrinsics.coeffs]
@@ -232,7 +232,7 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
 
 
 def _pose(extrinsics: Any) -> FloatArray:  # noqa: ANN401
-    """(4, 4) of `pyrealsense2.extrinsics`, whose rotation stands column by column."""
+    """(4, 4) of `pyrealsense2.extrinsics`, whose rotation is stored by columns."""
     pose = np.eye(4)
     turn = np.array(extrinsics.rotation, dtype=np.float64).reshape(3, 3).T
     u, _, v = np.linalg.svd(turn)  # single precision is no rotation for the tracker

@@ -19,18 +19,18 @@ from voodoo.recordings.calibration import read_calibration
 _DISCOVERY_S = 3.0
 _POLL_S = 0.05
 _DEPTH, _TF_DEPTH = 30, 100
-"""Messages that wait for a busy machine, which are counted then; what comes on top nobody counts."""
+"""Queue length for a busy machine. Messages dropped from it are counted; those lost before it are not."""
 
 
 class Ros2Source(Source):
     """Depth or color images (raw, compressed), clouds and scans of ROS 2 topics, with CameraInfo and transforms.
 
     Args:
-        topics: what is measured; the first one makes the frames.
+        topics: topics of the measurements; the first one defines the frames.
         root_frame: see RosFeed.
-        calibration: a calibration.toml that says where the first topic's camera is, instead of transforms.
-        meters_per_unit: of 16-bit depth.
-        tf_max_age: how old a changing transform may be [s].
+        calibration: a calibration.toml with the pose of the first topic's camera, instead of transforms.
+        meters_per_unit: scale of 16-bit depth.
+        tf_max_age: largest age of a changing transform [s].
 
     Raises:
         VoodooError: no topics.
@@ -89,7 +89,7 @@ class Ros2Source(Source):
             self._node.wait(_POLL_S)
 
     def _discover(self) -> bool:
-        """Subscribe to what is offered by now; whether all topics are."""
+        """Subscribe to the topics offered so far; returns whether all are."""
         assert self._node is not None
         assert self._feed is not None
         offers = self._node.offers()
@@ -120,7 +120,7 @@ class Ros2Source(Source):
         assert self._feed is not None
         self._node.wait(timeout)
         arrivals: list[Arrival] = []
-        # Transforms and calibrations first: they are what images wait for.
+        # Transforms and calibrations first, because images wait for them.
         for subscription in sorted(self._subscriptions.values(), key=lambda one: one.kind in MEASURED):
             for raw in subscription.take():
                 arrivals += self._feed.take(subscription.topic, subscription.kind, raw)
@@ -132,7 +132,7 @@ class Ros2Source(Source):
         return arrivals
 
     def _check_states(self) -> None:
-        """Tell once that nobody publishes any more, and look for topics that come later."""
+        """Report once that there are no publishers any more, and search for topics that are offered later."""
         self._discover()
         gone = self._subscriptions[self._topics[0]].publishers == 0
         if gone and not self._gone:

@@ -1,4 +1,4 @@
-"""Which source a word means: realsense, ros2:TOPIC, grow:FOLDER, or a recording."""
+"""Parses the name of a source: realsense, ros2:TOPIC, grow:FOLDER, or a recording."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ def source_of(
     options: Mapping[str, Any] | None = None,
     calibration: Path | None = None,
 ) -> Source:
-    """The source that a word means.
+    """The source with a given name.
 
     Args:
         word: "realsense", "realsense:SERIAL", "ros2:TOPIC[,TOPIC...]", "grow:FOLDER", or the path of a recording.
-        rate: of a recording: how many times as fast it is played.
-        loop: of a recording: begin again at its end.
-        root_frame: of a recording or of ROS 2, instead of its own.
-        options: of the recording's loader.
-        calibration: of a camera or a topic: a calibration.toml that says where it is; its `root_frame` and `root_from_sensor` are
-            used, of a folder all of it.
+        rate: for a recording: playback speed relative to real time.
+        loop: for a recording: start again at its end.
+        root_frame: for a recording or ROS 2: root frame to use instead of its own.
+        options: options of the recording's loader.
+        calibration: a calibration.toml. For a camera or a topic, only the pose in it (`root_frame` and `root_from_sensor`) is
+            used; for a folder, all of it.
 
     Raises:
         VoodooError: no such recording, or an option out of range.

@@ -1,4 +1,4 @@
-"""First poses from whatever a recording offers: one file a source, best first."""
+"""Sources of first poses: one module for each kind of input."""
 
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.pipeline.starts.cameras import CamerasStart

@@ -1,4 +1,4 @@
-"""What a source of first poses is: it looks at frames until it has joints."""
+"""Interface of a source of first poses: it evaluates frames until it has joints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.settings import FrontEndSettings
 
 TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
-"""Sites of a person's trunk: three that do not lie on a line say where it is and which way it faces."""
+"""Sites of a person's trunk: three that are not collinear determine its position and orientation."""
 BONES_M: dict[tuple[str, str], tuple[float, float]] = {
     ("l_shoulder", "r_shoulder"): (0.12, 0.60),
     ("l_hip", "r_hip"): (0.06, 0.45),
@@ -33,20 +33,20 @@ BONES_M: dict[tuple[str, str], tuple[float, float]] = {
         )
     },
 }
-"""Least and greatest distance [m] of two sites, from a child of 1 m to a man of 2.1 m, with 5 cm of error at either end; parents
-first."""
+"""Smallest and largest distance [m] of two sites, from a child of 1 m to a man of 2.1 m, with 5 cm of error at either end;
+parents first."""
 _ON_A_LINE_M = 0.04
 
 
 @dataclass(frozen=True, eq=False)
 class StartFrame:
-    """What a finder may look at: one frame, before anybody is tracked.
+    """Input of a finder: one frame, before a person is tracked.
 
     Args:
         stamp: of the frame [s].
         measurements: those of the kinds in use, without frozen sensors.
-        body: what is to be tracked.
-        settings: of the front end.
+        body: the body to track.
+        settings: settings of the front end.
     """
 
     stamp: float
@@ -60,9 +60,9 @@ class FoundStart:
     """A first pose.
 
     Args:
-        joints: site name -> (3,) [m], root frame; they fix the pose of the body.
+        joints: site name -> (3,) [m], root frame; they determine the pose of the body.
         sigma: site name -> standard deviation of its position [m].
-        by: which finder found it.
+        by: name of the finder.
     """
 
     joints: Mapping[str, FloatArray]
@@ -71,11 +71,11 @@ class FoundStart:
 
 
 class StartFinder(ABC):
-    """Looks at frames, one after the other, until it has a first pose.
+    """Evaluates frames, one after the other, until it has a first pose.
 
     Attributes:
-        name: for messages.
-        given: somebody vouches for the pose; what is wrong with it is an error.
+        name: name in messages.
+        given: whether the user set the pose, so that an invalid pose is an error.
     """
 
     name: ClassVar[str]
@@ -83,11 +83,11 @@ class StartFinder(ABC):
 
     @abstractmethod
     def find(self, frame: StartFrame) -> FoundStart | None:
-        """The first pose, if this frame (with those before it) shows one."""
+        """The first pose, if this frame and the previous ones are sufficient for one."""
 
 
 def fixes_pose(joints: Mapping[str, npt.ArrayLike], body: Body) -> bool:
-    """Whether three of the positions do not lie on a line; of a person, three of the trunk's."""
+    """Whether three of the positions are not collinear; for a person, three positions of the trunk."""
     of_trunk = [name for name in TRUNK if name in body.site_names]
     names = [name for name in joints if name in body.site_names and (len(of_trunk) < 3 or name in of_trunk)]
     if len(names) < 3:
@@ -98,9 +98,10 @@ def fixes_pose(joints: Mapping[str, npt.ArrayLike], body: Body) -> bool:
 
 
 def without_impossible(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """The joints, without those that make a bone no person has, and without what hangs on them.
+    """The joints, without those that give a bone an implausible length, and without the descendants of these joints.
 
-    Of a bad bone of an arm or leg the far end goes. A trunk with a bad bone leaves nothing.
+    For an implausible bone of an arm or leg the distal end is removed. If a bone of the trunk is implausible, the result is
+    empty.
     """
     kept = dict(joints)
     for (near, far), (least, most) in BONES_M.items():
@@ -116,10 +117,10 @@ def without_impossible(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray
 
 
 def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """The joints, without those that make a bone out of proportion to the trunk, and without what hangs on them.
+    """The joints, without those that give a bone out of proportion to the trunk, and without the descendants of these joints.
 
-    A hidden joint has the depth of what hides it, which makes its bones too short or too long. A trunk seen from the side,
-    whose far half is hidden, leaves nothing.
+    An occluded joint gets the depth of its occluder, which makes its bones too short or too long. For a trunk observed from
+    the side, whose far half is occluded, the result is empty.
     """
     trunk = [
         np.linalg.norm(joints[f"{s}_shoulder"] - joints[f"{s}_hip"])
@@ -144,7 +145,7 @@ def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 
 _SHORTER, _LONGER = 0.6, 1.6
-"""Bones of people differ from these shares by a tenth; the rest is 4 cm of error at either end."""
+"""Tolerance: bones of persons differ from these proportions by 10 percent; further 4 cm of error are allowed at either end."""
 _OF_STATURE: dict[tuple[str, str], float] = {
     ("l_shoulder", "r_shoulder"): 0.224,
     ("l_hip", "r_hip"): 0.104,
@@ -163,7 +164,7 @@ _OF_STATURE: dict[tuple[str, str], float] = {
     ("l_shoulder", "head_center"): 0.164,
     ("l_shoulder", "skull_tip"): 0.211,
 }
-"""Distances of sites in statures, those of the default human; parents first."""
+"""Distances of sites of the default human, as fractions of the stature; parents first."""
 _BEYOND = {
     f"{side}_{joint}": tuple(f"{side}_{name}" for name in beyond)
     for side in "lr"
@@ -174,4 +175,4 @@ _BEYOND = {
         "ankle": ("ankle", "toe"),
     }.items()
 }
-"""A joint and what hangs on it."""
+"""A joint and its descendants."""

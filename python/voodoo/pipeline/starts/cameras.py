@@ -16,32 +16,33 @@ from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.triangulation import TriangulatedSite, place_of
 
 _TOGETHER_S = 0.05
-"""Pictures of one instant: a walking wrist goes 10 cm in that time."""
+"""Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""
 _BASELINE_M = 0.1
-"""Cameras nearer to each other see no depth with 4 px of error."""
+"""Cameras with a shorter baseline give no usable depth with 4 px of error."""
 _SAME_PERSON_M = 0.15
-"""Median distance of a person's rays in one camera from the places that others found: half the way to a neighbor."""
+"""Largest median distance of a person's rays in one camera from the triangulated positions: half the distance to a neighbor."""
 _LEAST_SITES = 6
 _WORST_SIGMA_M = 0.10
 _TYPICAL_RANGE_M = 3.0
-"""At this range a pixel's error is taken before the place is known."""
+"""Range at which a pixel error is converted to meters before the position is known."""
 
 
 @dataclass(frozen=True, eq=False)
 class _CameraPerson:
-    """Somebody in one camera: a ray for each site."""
+    """A person in one camera: a ray for each site."""
 
     camera: str
     rays: dict[str, SiteRay]
 
 
 class CamerasStart(StartFinder):
-    """The first frame in which two cameras agree on a whole trunk and some limbs; of several people, the one seen best."""
+    """Finds the first frame in which two cameras agree on a whole trunk and some limbs; of several persons it selects the one
+    observed best."""
 
     name = "keypoints of several cameras"
 
     def __init__(self) -> None:
-        """Nothing seen yet."""
+        """Start without observations."""
         self._latest: dict[str, KeypointImage] = {}
 
     def find(self, frame: StartFrame) -> FoundStart | None:
@@ -55,9 +56,10 @@ class CamerasStart(StartFinder):
 
 
 def everybody(frame: StartFrame, *, cameras: int) -> list[FoundStart]:
-    """All persons of whom so many cameras show the keypoints in one frame, the one seen best first.
+    """All persons whose keypoints are in at least so many cameras in one frame, the one observed best first.
 
-    Who is seen by fewer is left out: in the background of one or two pictures stand others, and what is wrong agrees by chance.
+    Persons in fewer cameras are left out: other people stand in the background of one or two images, and wrong matches may
+    agree by chance.
     """
     views = _views([item for item in frame.measurements if isinstance(item, KeypointImage)], frame)
     found = []
@@ -71,24 +73,24 @@ def everybody(frame: StartFrame, *, cameras: int) -> list[FoundStart]:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """One person in several cameras, and where their sites are."""
+    """One person in several cameras, and the positions of their sites."""
 
     persons: Sequence[_CameraPerson]
     places: dict[str, TriangulatedSite]
 
     @property
     def score(self) -> float:
-        """How many rays agree."""
+        """Number of rays that agree."""
         return sum(float(place.trust.sum()) for place in self.places.values())
 
 
 def _views(images: Sequence[KeypointImage], frame: StartFrame) -> list[list[_CameraPerson]]:
-    """Who is seen in each camera."""
+    """Persons in each camera."""
     return [[person for rows in item.people if (person := _person(item, rows, frame))] for item in images]
 
 
 def _best(views: Sequence[Sequence[_CameraPerson]], frame: StartFrame) -> _Group | None:
-    """The person on whom most rays agree."""
+    """The person with the most agreeing rays."""
     best: _Group | None = None
     for one, other in combinations([view for view in views if view], 2):
         for pair in ((first, second) for first in one for second in other):
@@ -108,7 +110,7 @@ def _joints(places: dict[str, TriangulatedSite]) -> dict[str, FloatArray]:
 
 
 def _stands(places: dict[str, TriangulatedSite], frame: StartFrame) -> bool:
-    """Whether places are a person that the body can be fitted to."""
+    """Whether positions form a person to which the body can be fitted."""
     joints = _joints(places)
     return len(joints) >= _LEAST_SITES and fixes_pose(joints, frame.body)
 
@@ -131,7 +133,7 @@ def _person(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> _Camera
 
 
 def _together(pair: Sequence[_CameraPerson], views: Sequence[Sequence[_CameraPerson]]) -> _Group | None:
-    """A person seen in two cameras, with those in other cameras that are the same person."""
+    """A person in two cameras, with the matching detections in other cameras."""
     persons = list(pair)
     places = _places(persons) if _gap(*pair) < 2.0 * _SAME_PERSON_M else {}
     if len(places) < _LEAST_SITES:
@@ -145,7 +147,7 @@ def _together(pair: Sequence[_CameraPerson], views: Sequence[Sequence[_CameraPer
 
 
 def _gap(one: _CameraPerson, other: _CameraPerson) -> float:
-    """Median distance [m] of the rays of the same sites in two cameras: people who are not the same are far apart."""
+    """Median distance [m] of the rays of the same sites in two cameras; it is large for different persons."""
     common = [name for name in one.rays if name in other.rays]
     if len(common) < _LEAST_SITES:
         return float("inf")
@@ -156,7 +158,7 @@ def _gap(one: _CameraPerson, other: _CameraPerson) -> float:
 
 
 def _away(person: _CameraPerson, places: dict[str, TriangulatedSite]) -> float:
-    """Median distance [m] of a person's rays from places."""
+    """Median distance [m] of a person's rays from positions."""
     common = [name for name in person.rays if name in places]
     if len(common) < _LEAST_SITES:
         return float("inf")
@@ -167,7 +169,7 @@ def _away(person: _CameraPerson, places: dict[str, TriangulatedSite]) -> float:
 
 
 def _places(group: Sequence[_CameraPerson]) -> dict[str, TriangulatedSite]:
-    """Where the rays of one person in several cameras meet."""
+    """Positions where the rays of one person in several cameras intersect."""
     origins = [next(iter(person.rays.values())).origin for person in group]
     if max(float(np.linalg.norm(a - b)) for a, b in combinations(origins, 2)) < _BASELINE_M:
         return {}

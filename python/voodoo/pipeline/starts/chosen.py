@@ -1,4 +1,4 @@
-"""Which sources of first poses are asked, best first."""
+"""Selects the sources of first poses, best first."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from voodoo.pipeline.starts.markers import MarkersStart
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """Where a front end takes the first pose from.
+    """Sources of the first pose for a front end.
 
     Args:
-        finders: asked in this order, frame by frame.
-        by_tracker: where none of them finds anybody, the tracker looks into the depth images itself.
+        finders: evaluated in this order in every frame.
+        by_tracker: if none of them finds a person, the tracker itself searches the depth images.
     """
 
     finders: Sequence[StartFinder]
@@ -26,5 +26,6 @@ class Starts:
 
 
 def automatic_starts() -> Starts:
-    """Whatever a recording offers: markers, keypoints of several cameras, keypoints with depth, depth, two legs in a laser."""
+    """All sources for the inputs of a recording: markers, keypoints of several cameras, keypoints with depth, depth, legs in a
+    laser."""
     return Starts((MarkersStart(), CamerasStart(), KeypointsDepthStart(), LegsStart()))

@@ -1,4 +1,4 @@
-"""A first pose that somebody gave, for a certain time; and the poses of an earlier result."""
+"""First poses set by the user for a given time, and from an earlier result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from voodoo.export.track import Track
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose
 
 _SAME_TIME_S = 0.02
-"""Stamps that differ by less are one frame's, by no more than half a period of the result."""
+"""Stamps that differ by less belong to one frame; at most half a period of the result."""
 _ROUNDED_S = 1e-6
 _GIVEN_SIGMA_M = 0.03
 _USABLE = ("tracking", "degraded")
@@ -28,7 +28,7 @@ class GivenStart(StartFinder):
     given = True
 
     def __init__(self, joints: Mapping[str, Sequence[float]], stamp: float) -> None:
-        """Keep both."""
+        """Store joints and stamp."""
         self._joints = {name: np.asarray(position, dtype=np.float64) for name, position in joints.items()}
         self._stamp = stamp
 
@@ -50,7 +50,7 @@ class EarlierStart(StartFinder):
     given = True
 
     def __init__(self, result: Track) -> None:
-        """Keep the frames that can be relied on."""
+        """Keep the reliable frames."""
         steps = np.diff(result.stamps)
         self._near = min(_SAME_TIME_S, 0.5 * float(np.median(steps))) if len(steps) else _SAME_TIME_S
         self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))

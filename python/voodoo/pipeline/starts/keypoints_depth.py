@@ -1,4 +1,4 @@
-"""A first pose from keypoints and depth: each keypoint lies behind the surface that a depth camera sees there."""
+"""A first pose from keypoints and depth: each keypoint lies behind the surface that a depth camera measures there."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ from voodoo.sensors.keypoints.surface import behind_surface
 from voodoo.sensors.pixels import FloatArray, in_sensor, world_rays
 
 _TOGETHER_S = 0.05
-"""Pictures of one instant: a walking wrist goes 10 cm in that time."""
+"""Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""
 _LEAST_SITES = 6
 _AROUND = 2.5
-"""The surface is looked for within so many pixels, as in a window of 5 x 5; of a coarser depth camera, so many of its."""
+"""The surface is searched for within this many pixels, as in a 5 x 5 window; for a coarser depth camera, in its pixels."""
 
 _Person: TypeAlias = dict[str, tuple[FloatArray, float]]
-"""Site -> place (3,) and standard deviation [m]."""
+"""Site -> position (3,) and standard deviation [m]."""
 
 
 class KeypointsDepthStart(StartFinder):
-    """The first frame with a person whose trunk and some limbs a depth camera sees, too; of several people, the nearest."""
+    """Finds the first frame with a person whose trunk and some limbs a depth camera also measures; of several persons it
+    selects the nearest."""
 
     name = "keypoints with depth"
 
@@ -57,7 +58,7 @@ class KeypointsDepthStart(StartFinder):
 
 
 def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame) -> Iterator[_Person]:
-    """The people of an image that can be started from, with the depth image that is nearest in time."""
+    """The persons of an image that can give a first pose, with the depth image that is nearest in time."""
     near = [depth for depth in depths if abs(depth.stamp - item.stamp) <= _TOGETHER_S]
     if not near or not item.people:
         return
@@ -74,7 +75,7 @@ def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame
 
 
 def _points_in_view(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, FloatArray]:
-    """Where the points of a depth image are in the keypoints' image, (N, 2), and their depths there (N,) [m]."""
+    """Pixels (N, 2) of the points of a depth image in the image of the keypoints, and their depths there (N,) [m]."""
     points, valid = depth_points(depth)
     local = in_sensor(item.root_from_sensor, points[valid])
     local = local[local[:, 2] > 0.0]

@@ -1,4 +1,4 @@
-"""A first pose from a planar laser: two things of a leg's size that walk."""
+"""A first pose from a planar laser: two moving objects of the size of a leg."""
 
 from __future__ import annotations
 
@@ -18,41 +18,42 @@ from voodoo.sensors.settings import Box, within_boxes
 
 SITES = ("l_hip", "r_hip", "l_ankle", "r_ankle")
 _GAP_M = 0.10
-"""Neighboring returns farther apart than this are of two things."""
+"""Neighboring returns farther apart than this belong to two objects."""
 _WIDTH_M = (0.04, 0.28)
-"""From a child's shin, of which half is seen, to wide trousers; the middle of a leg is half a shin behind its surface."""
+"""Widths from a child's shin, half of which is visible, to wide trousers; the center of a leg is half a shin behind its
+surface."""
 _SHIN_RADIUS_M = 0.05
 _APART_M = (0.08, 0.70)
-"""Distance of the middles of two legs, from standing to a long step."""
+"""Distance of the centers of two legs, from standing to a long step."""
 _COME = 0.6
-"""So much of a leg must stand where nothing stood: its rim may lie in a cell with something else."""
+"""Fraction of a leg that must be in formerly free space: its rim may share a cell with another object."""
 _FASTEST = 2.5
-"""A swinging shin of somebody who walks [m/s]."""
+"""Speed of the swinging shin of a walking person [m/s]."""
 _PATIENCE_S = 0.6
-"""The one leg may hide the other for so long [s]."""
+"""One leg may occlude the other for this time [s]."""
 _STATURE_M, _SHIN_HEIGHT_M = 1.75, 0.30
-"""Of whoever it is, and the height of a laser over a floor that is not known."""
+"""Uncertainty of the person's size and of the laser's height above an unknown floor."""
 _MOVED_M = 0.05
-"""A pair that went less far tells nothing of where it faces."""
+"""A pair that moved less gives no evidence for its facing direction."""
 _SIGMA_M = 0.10
 _LEVEL = 0.97
-"""Cosine of the tilt up to which a laser cuts shins."""
+"""Cosine of the largest tilt at which a laser plane intersects the shins."""
 
 
 class LegsStart(StartFinder):
-    """Two legs that have come, in two scans one after the other; of several people, the nearest.
+    """Finds two legs that have moved into free space, in two consecutive scans; of several persons it selects the nearest.
 
-    What stands where the laser looked through before has come, and is no furniture. Somebody who has not moved since the
-    first scan cannot be told from it.
+    An object in formerly free space has moved there and is not furniture. A person who has not moved since the first scan
+    cannot be distinguished from furniture.
 
-    It serves bodies of legs only (`voodoo.model.legs`): a laser cannot tell how a whole person stands. The root frame must
-    stand still on the floor, as odom does; from a frame that drives along, nobody is found.
+    Works only for bodies that consist of legs (`voodoo.model.legs`): a laser does not determine the posture of a whole
+    person. The root frame must be fixed to the floor, as odom is; in a frame that moves with the robot nobody is found.
     """
 
     name = "legs in a laser"
 
     def __init__(self) -> None:
-        """Nothing seen yet."""
+        """Start without scans."""
         self._free: dict[str, FreeSpace] = {}
         self._last: tuple[float, list[FloatArray]] | None = None
 
@@ -69,7 +70,7 @@ class LegsStart(StartFinder):
         return None
 
     def _pair(self, scan: LaserScan, middles: list[FloatArray]) -> tuple[FloatArray, FloatArray] | None:
-        """Two legs (2, 2) [m] that were seen before, and how they went on since (2,); the nearest to the laser."""
+        """Two legs (2, 2) [m] that were also in the previous scan, and their motion since (2,); the nearest to the laser."""
         before, self._last = self._last, (scan.stamp, middles) if len(middles) > 1 else self._last
         if before is None or not 0.0 < scan.stamp - before[0] <= _PATIENCE_S:
             return None
@@ -90,12 +91,12 @@ class LegsStart(StartFinder):
 
 
 def serves(body: Body) -> bool:
-    """Whether a body is one of legs, which a laser can find."""
+    """Whether a body consists of legs, which a laser can find."""
     return set(SITES) <= set(body.site_names) and "l_shoulder" not in body.site_names
 
 
 def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> list[FloatArray]:
-    """Middles (2,) [m], in the root frame, of what is of a leg's size and has come; the map learns the scan."""
+    """Centers (2,) [m], in the root frame, of leg-sized objects in formerly free space; updates the map with the scan."""
     points = scan.points()
     come = free.come(scan) & ~within_boxes(transform(scan.root_from_sensor, points), exclude)
     free.learn(scan)
@@ -114,7 +115,7 @@ def _leg_middles(scan: LaserScan, free: FreeSpace, exclude: Sequence[Box]) -> li
 
 
 def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, frame: StartFrame) -> FoundStart:
-    """Legs that stand under the middle of the pair; across their line they face where they went."""
+    """Legs below the center of the pair; they face perpendicular to their connecting line, in the walking direction."""
     between = legs[1] - legs[0]
     middle = legs.mean(axis=0)
     ahead = np.array([-between[1], between[0]])

@@ -1,4 +1,4 @@
-"""A first pose from markers and magnetic trackers: they say where sites are."""
+"""A first pose from markers and magnetic trackers, which measure positions of sites."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from voodoo.sensors.pixels import FloatArray
 
 
 class MarkersStart(StartFinder):
-    """The first frame whose markers fix the pose."""
+    """Finds the first frame whose markers determine the pose."""
 
     name = "markers"
 

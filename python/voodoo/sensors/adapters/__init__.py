@@ -1,4 +1,4 @@
-"""Adapters: all that front end, overlay and viewer know of a sensor.
+"""Adapters: the interface of a sensor to front end, overlay and viewer.
 
 One adapter a file; `register` makes a new one known, see examples/uwb_tag.py. A measurement that serves several inputs has an
 adapter for each.

@@ -1,4 +1,4 @@
-"""What a sensor is to the rest of the package: one adapter, from its measurement to the tracker's frame and to pictures."""
+"""The base class of adapters, which convert a sensor's measurements for the tracker's frame and for display."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ _TYPICAL_RANGE_M = 3.0
 
 
 class Memory:
-    """What the adapters of one front end keep from frame to frame, by name and sensor."""
+    """State that the adapters of one front end keep from frame to frame, by name and sensor."""
 
     def __init__(self) -> None:
-        """Nothing kept yet."""
+        """Start empty."""
         self._kept: dict[tuple[str, str], Any] = {}
 
     def __copy__(self) -> Memory:
-        """The same, each thing copied: what a refused frame changed is put back."""
+        """Copy every entry, to restore the state after a rejected frame."""
         twin = Memory()
         twin._kept = {key: copy(value) for key, value in self._kept.items()}
         return twin
 
     def all(self, name: str) -> dict[str, Any]:
-        """Sensor -> what is kept of it under a name."""
+        """Sensor -> its entry under a name."""
         return {sensor: value for (kept, sensor), value in self._kept.items() if kept == name}
 
     def get(self, name: str, sensor: str, make: Callable[[], T]) -> T:
-        """What is kept of a sensor; made when there is nothing yet."""
+        """Returns the entry of a sensor; creates it if there is none."""
         key = (name, sensor)
         if key not in self._kept:
             self._kept[key] = make()
@@ -57,28 +57,28 @@ class Memory:
         return value
 
     def drop(self, name: str) -> None:
-        """Forget what is kept under a name, of all sensors."""
+        """Remove the entries of all sensors under a name."""
         self._kept = {key: value for key, value in self._kept.items() if key[0] != name}
 
     def put(self, name: str, sensor: str, value: object) -> None:
-        """Keep something of a sensor in place of what was kept."""
+        """Set or replace the entry of a sensor."""
         self._kept[name, sensor] = value
 
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What an adapter may read while one frame is made.
+    """The context that an adapter may read while a frame is built.
 
     Attributes:
         stamp: of the frame [s].
-        measurements: all of the frame, without those of frozen sensors.
-        predicted: site name -> (3,) expected at the frame's time [m], root frame; empty while nobody is tracked.
-        settings: what is used, and how much it is believed.
-        tracker: not yet stepped; its estimate is the last one.
-        gate: around the predicted sites.
-        memory: of this front end.
-        others: those who are followed beside the one whose frame is made.
-        rays: to put rays of named sites into; they are weighed against each other before they join the frame.
+        measurements: all measurements of the frame, without those of frozen sensors.
+        predicted: site name -> predicted position (3,) at the frame's time [m], root frame; empty while no person is tracked.
+        settings: settings of the front end.
+        tracker: the tracker before the step; its estimate is the last one.
+        gate: gate around the predicted sites.
+        memory: state of this front end's adapters.
+        others: the other tracked persons.
+        rays: collects rays of named sites; their mutual agreement is evaluated before they are added to the frame.
     """
 
     stamp: float
@@ -93,23 +93,23 @@ class Context:
 
     @cached_property
     def estimate(self) -> Estimate:
-        """The tracker's last one; with the tracker it is made anew at every look."""
+        """The tracker's last estimate, cached because the tracker creates a new object at every access."""
         return self.tracker.estimate
 
     @cached_property
     def depth_images(self) -> list[DepthImage]:
-        """Those of the frame, if depth is used."""
+        """The depth images of the frame, if depth is used."""
         if "depth" not in self.settings.use:
             return []
         return [item for item in self.measurements if isinstance(item, DepthImage)]
 
     def range_weight(self, noise: RangeNoise | None, sharing: float, root_from_sensor: FloatArray) -> float:
-        """Weight of a range at the body's distance from a sensor, 3 m while nobody is tracked; 1 without a noise."""
+        """Weight of a range at the body's distance from a sensor, 3 m while no person is tracked; 1 if `noise` is None."""
         if noise is None:
             return 1.0
         if not self.predicted:
             return self.settings.model.weight(noise.sigma(_TYPICAL_RANGE_M), sharing=sharing)
-        # Numbers by themselves: a few of them are faster without arrays.
+        # For a few numbers plain Python is faster than arrays.
         sums = map(sum, zip(*(place.tolist() for place in self.predicted.values()), strict=True))
         body = [value / len(self.predicted) for value in sums]
         away = max(math.dist(body, root_from_sensor[:3, 3].tolist()), 0.1)
@@ -118,7 +118,7 @@ class Context:
     def motion_compensated(
         self, points: npt.NDArray[Any], root_from_sensor: FloatArray, stamp: float
     ) -> npt.NDArray[Any]:
-        """Points of a sensor (N, 3) [m] measured at `stamp`, those on the body where they are at the frame's time."""
+        """Extrapolates the points (N, 3) [m] of a sensor on the body from `stamp` to the frame's time."""
         moved = _core.carried(
             points, self.tracker._core, elapsed=self.stamp - stamp, world_from_sensor=root_from_sensor
         )
@@ -132,9 +132,9 @@ class Adapter(ABC, Generic[M]):
         kind: the input it serves, as in `voodoo track --use`.
         measurement: class of the measurements; each has `sensor` and `stamp`.
         recorded_as: what recordings call such a sensor (`SensorInfo.kind`); "": as `kind`.
-        panel: place of its pictures in an overlay, the least first; None: it has none.
-        panel_of_its_own: False: no panel where another camera's picture shows the same.
-        while_searching: whether `add` is called when nobody is tracked; then nothing is predicted.
+        panel: sort key of its images in an overlay; None: it has no image.
+        panel_of_its_own: False: no panel if another camera's image shows the same view.
+        while_searching: whether `add` is called while no person is tracked; then there is no prediction.
     """
 
     kind: ClassVar[str]
@@ -145,7 +145,7 @@ class Adapter(ABC, Generic[M]):
     while_searching: ClassVar[bool] = False
 
     def content(self, item: M) -> npt.NDArray[Any] | None:
-        """What was measured, to tell a frozen sensor from one that has noise; None: it may repeat itself."""
+        """Returns the measured data, to detect a frozen sensor by missing noise; None: it may legitimately repeat itself."""
         return None
 
     @abstractmethod
@@ -157,17 +157,17 @@ class Adapter(ABC, Generic[M]):
         """
 
     def learn(self, item: M, estimate: Estimate, memory: Memory, *, trusted_start: bool) -> None:
-        """Learn from the estimate of a frame; `trusted_start`: somebody set the pose it started from."""
+        """Learn from the estimate of a frame; `trusted_start`: the user set the initial pose."""
 
     def forget(self, memory: Memory) -> None:
-        """The person is gone: forget what belongs to them alone."""
+        """Discard what was learned of a person who has left."""
 
     def picture(self, item: M) -> npt.NDArray[Any] | None:
-        """What a camera saw: colors (H, W, 3) BGR uint8, or depths (H, W) float32 [m]; None: no picture is known."""
+        """Returns the camera's image: colors (H, W, 3) BGR uint8, or depths (H, W) float32 [m]; None: no image."""
         return None
 
     def draw(self, item: M, canvas: Canvas, memory: Memory) -> None:
-        """Draw a measurement into an overlay; depth pixels need nothing, they are the picture."""
+        """Draw a measurement into an overlay; for depth images nothing is drawn, because they are the background image."""
 
     def log(self, item: M, log: Log, memory: Memory) -> None:
         """Show a measurement in Rerun."""

@@ -1,4 +1,4 @@
-"""Color regions of pictures as an input: where the colors of a limb end, its contour is."""
+"""Color regions of images as an input: the contour of a limb lies where its colors end."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from voodoo.sensors.silhouettes.regions import LIKELY
 from voodoo.tracker import Tracker
 
 _FARTHEST_S = 0.25
-"""A picture that is older or newer than its frame by more [s] shows another pose; the tracker would refuse the frame."""
+"""Greatest time between an image and its frame [s]; beyond it the pose differs, and the tracker would reject the frame."""
 _INK = (90, 240, 250)
 _GRAY = 2
-"""Channels of a gray camera's picture differ by no more than coding makes of it."""
+"""Greatest difference between the channels of a gray camera's image, from compression."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What is kept of a camera: its lens, whether it sees no colors, the tracker that was told of the empty scene, and whether
-    what it tells is drawn."""
+    """State of a camera: its lens, whether it is a gray camera, the tracker that has its empty scene, and whether its regions
+    are drawn."""
 
     lens: Pinhole
     gray: bool
@@ -35,7 +35,7 @@ class _Known:
     drawn: bool
 
     def picture(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-        """What the tracker is given of a picture (H, W, 3): without distortion, (H, W) of a gray camera."""
+        """Converts an image (H, W, 3) for the tracker: undistorted, and (H, W) for a gray camera."""
         observed = self.lens.apply(image)
         return np.ascontiguousarray(observed[:, :, 1]) if self.gray else observed
 

@@ -1,4 +1,4 @@
-"""Depth images as inputs: every pixel is a point on the body, or is not."""
+"""Depth images as inputs; each pixel may be a point on the body."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class DepthAdapter(Adapter[DepthImage]):
         z = item.image[::step, ::step].astype(np.float32) * np.float32(item.meters_per_unit)
         valid = np.isfinite(z) & (z > 0.0)
         points = np.column_stack([item.camera.rays()[::step, ::step][valid] * z[valid, None], z[valid]])
-        # What is behind the person stands in the image, which is shown in space as well.
+        # The background is already visible in the depth image, which is shown in 3-D as well.
         cloud = f"world/points/{log.entity(item.sensor)}"
         limbs = log.body_points(cloud, points, item.root_from_sensor, background=False)
         log.silhouettes(path, item)

@@ -1,4 +1,4 @@
-"""What adapters draw on; `voodoo.visualization` brings pictures and Rerun streams of this form."""
+"""Drawing interfaces of adapters; `voodoo.visualization` implements them for images and Rerun streams."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Log(Protocol):
 
     @property
     def most_points(self) -> int:
-        """Of larger clouds and images only a part is shown."""
+        """Greatest number of points shown of a cloud or an image; larger ones are subsampled."""
 
     def send(self, path: str, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own
         """Log archetypes of Rerun at a path."""
@@ -61,10 +61,10 @@ class Log(Protocol):
         """A sensor's name as part of a path."""
 
     def camera(self, item: Pictured) -> str:
-        """Log pose and calibration of a camera; the path of its picture."""
+        """Log pose and calibration of a camera; returns the path of its image."""
 
     def silhouettes(self, path: str, item: Pictured) -> None:
-        """Log the outlines of the limbs as the camera sees them, into the picture at a path."""
+        """Log the silhouettes of the limbs in the camera's image at a path."""
 
     def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:
         """Log a depth image (H, W), compressed: to a quarter of a percent, and in a file not more pixels than `most_points`."""
@@ -77,10 +77,10 @@ class Log(Protocol):
 
 
 def every(pixels: int, most: int) -> int:
-    """So manyth rows and columns of an image with so many pixels leave about `most`."""
+    """Returns the subsampling step of rows and columns that reduces an image to approximately `most` pixels."""
     return math.ceil(math.sqrt(pixels / most))
 
 
 def grown(image: npt.NDArray[Pixel], step: int, shape: tuple[int, ...]) -> npt.NDArray[Pixel]:
-    """An image of `shape` (H, W) of every `step`-th row and column of one: where it was, every pixel is larger."""
+    """Enlarges a subsampled image (every `step`-th row and column) to `shape` (H, W) by repeating its pixels."""
     return image.repeat(step, axis=0).repeat(step, axis=1)[: shape[0], : shape[1]]

@@ -19,7 +19,7 @@ KEYPOINT = (255, 120, 255)
 
 
 class KeypointsAdapter(Adapter[KeypointImage]):
-    """What 2-D networks saw; the person nearest to the prediction is the tracked one."""
+    """Keypoints of 2-D networks; the person nearest to the prediction is the tracked one."""
 
     kind = "keypoints"
     measurement = KeypointImage

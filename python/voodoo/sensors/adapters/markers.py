@@ -14,7 +14,7 @@ MARKER = (60, 60, 255)
 
 
 class MarkersAdapter(Adapter[MarkerSet]):
-    """Sets of markers; those on sites that the body has not are left out."""
+    """Sets of markers; markers on sites that the body does not have are ignored."""
 
     kind = "markers"
     measurement = MarkerSet

@@ -1,4 +1,4 @@
-"""Point clouds and laser scans as inputs: points that may be on the body, each where it is at the frame's time."""
+"""Point clouds and laser scans as inputs; points that may be on the body are extrapolated to the frame's time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The adapters that are known: one for each kind of input, which may be several for a measurement."""
+"""The registered adapters: one for each kind of input. A class of measurements may have several."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from voodoo.sensors.kinds import add_kind, remove_kind
 
 _adapters: dict[str, Adapter[Any]] = {}
 _by_class: dict[type, tuple[Adapter[Any], ...]] = {}
-"""What `adapters_of` found for classes of measurements: a front end asks some ten times a frame."""
+"""Cache of `adapters_of` by class of measurement; a front end calls it some ten times per frame."""
 
 
 def register(adapter: Adapter[Any]) -> None:
-    """Make a sensor known to front ends, overlays and viewers.
+    """Register an adapter with front ends, overlays and viewers.
 
     Raises:
         MeasurementError: its kind has an adapter already.
@@ -31,14 +31,14 @@ def register(adapter: Adapter[Any]) -> None:
 
 
 def unregister(kind: str) -> None:
-    """Forget an adapter; nothing happens if there is none."""
+    """Unregister an adapter; does nothing if there is none."""
     _adapters.pop(kind, None)
     _by_class.clear()
     remove_kind(kind)
 
 
 def all_adapters() -> tuple[Adapter[Any], ...]:
-    """All that are known."""
+    """Returns all registered adapters."""
     return tuple(_adapters.values())
 
 
@@ -61,7 +61,7 @@ def adapters_of(item: object) -> tuple[Adapter[Any], ...]:
 
 
 def adapter_of(item: object) -> Adapter[Any]:
-    """The first adapter of a measurement: what it looks like is the same for all of them.
+    """Returns the first adapter of a measurement, for display, which is the same for all adapters of one measurement.
 
     Raises:
         MeasurementError: there is none.

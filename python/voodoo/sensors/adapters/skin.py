@@ -18,7 +18,7 @@ from voodoo.sensors.skin.tracker import SkinTracker
 SKIN = (80, 255, 255)
 """Color in overlays, BGR."""
 SCENE = "scene"
-"""Under this `Memory` keeps what may be the still scene of a depth camera."""
+"""Name under which `Memory` keeps the still scene of a depth camera."""
 
 
 class SkinAdapter(Adapter[ColorImage]):
@@ -62,11 +62,11 @@ class SkinAdapter(Adapter[ColorImage]):
         """Colors and background of the picture."""
         skin = memory.all(self.kind).get(item.sensor)
         if skin is not None:
-            # The first frame shows the pose that was set; without it a color camera alone would never begin.
+            # Learning from the first frame with its set pose lets a color camera alone start.
             skin.learn(item.image, item.camera, item.root_from_sensor, estimate, trusted_start=trusted_start)
 
     def forget(self, memory: Memory) -> None:
-        """The next person's skin has other colors."""
+        """Discard the learned colors, since the next person's skin has others."""
         memory.drop(self.kind)
 
     def picture(self, item: ColorImage) -> npt.NDArray[Any]:
@@ -97,7 +97,7 @@ class SkinAdapter(Adapter[ColorImage]):
 
 
 def _body_view(item: ColorImage, context: Context, predicted: Mapping[str, FloatArray]) -> BodyView | None:
-    """What the frame's first depth camera sees of the body, in this picture; None without one."""
+    """The depth measurements of the frame's first depth camera, registered to this image; None without one."""
     depth = next(iter(context.depth_images), None)
     if depth is None:
         return None

@@ -1,4 +1,4 @@
-"""Whose keypoints are whose: networks give those of several people in no order."""
+"""Association of keypoints with persons; networks report several people in arbitrary order."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from voodoo.sensors.keypoints.sites import site_pixels
 from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
 
 WRONG_M = 0.3
-"""Keypoints whose rays pass a person by more than this in the median are not theirs."""
+"""Greatest median distance of the rays of keypoints from a person that they belong to."""
 _FEWEST = 4
 
 
 @dataclass(frozen=True, eq=False)
 class AssignedKeypoints:
-    """The keypoints of one picture by person.
+    """The keypoints of one image by person.
 
     Args:
-        of: number of a person -> the picture with their keypoints alone.
-        rest: the picture with the keypoints that are nobody's.
+        of: id of a person -> the image with only that person's keypoints.
+        rest: the image with the keypoints that were assigned to no person.
     """
 
     of: Mapping[int, KeypointImage]
@@ -34,18 +34,18 @@ class AssignedKeypoints:
 def assign_keypoints(
     item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDArray[np.float64]]]
 ) -> AssignedKeypoints:
-    """Give the keypoints of a picture to persons, all of them at once, by the distances of their rays.
+    """Assign the keypoints of an image to persons jointly, by the distances of their rays from the predicted sites.
 
     Args:
-        item: the picture.
-        predicted: number of a person -> site -> where it is expected (3,) [m], root frame.
+        item: the image.
+        predicted: id of a person -> site -> predicted position (3,) [m], root frame.
     """
     numbers = list(predicted)
     costs = np.array([[_away(item, rows, predicted[number]) for rows in item.people] for number in numbers])
     of: dict[int, KeypointImage] = {}
     taken: set[int] = set()
     if costs.size:
-        # What is not theirs costs more than any that may be.
+        # A forbidden pair gets a cost above all possible ones.
         for row, column in _core.linear_sum_assignment(np.where(costs < WRONG_M, costs, 1e3)):
             if costs[row, column] < WRONG_M:
                 of[numbers[row]] = replace(item, people=(item.people[column],))
@@ -55,7 +55,7 @@ def assign_keypoints(
 
 
 def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, npt.NDArray[np.float64]]) -> float:
-    """Median distance [m] of the rays of keypoints from where sites are expected; infinite with too few."""
+    """Median distance [m] of the rays of keypoints from the predicted sites; infinite with too few keypoints."""
     observed = [site for site in site_pixels(rows, layout=item.layout)[0] if site.site in predicted]
     if len(observed) < _FEWEST:
         return float("inf")

@@ -30,16 +30,16 @@ from voodoo.sensors.rays import SiteRay, add_rays
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 POINT_SIGMA_M = 0.03
-"""Least standard deviation of a 3-D point from depth: how well `BEHIND_SURFACE_M` is known."""
+"""Least standard deviation of a 3-D point from depth: the uncertainty of `BEHIND_SURFACE_M`."""
 
 
 @dataclass(frozen=True)
 class KeypointReport:
-    """What became of the keypoints of one image: site names.
+    """How the keypoints of one image were used; each field lists site names.
 
     Args:
-        rays: given to the frame as rays.
-        points: given as 3-D points.
+        rays: added to the frame as rays.
+        points: added as 3-D points.
         unseen: keypoints missing or below the least confidence.
         dropped: too far from where the site was predicted, or outside the lens model.
     """
@@ -50,7 +50,7 @@ class KeypointReport:
     dropped: tuple[str, ...] = ()
 
     def __copy__(self) -> KeypointReport:
-        """Itself: it never changes."""
+        """Returns itself, because it is immutable."""
         return self
 
 
@@ -62,11 +62,11 @@ class KeypointSensor:
         layout: name in LAYOUTS.
         camera: calibration; keypoints are in the pixels of the distorted image.
         world_from_sensor: (4, 4) pose of the camera's optical frame.
-        noise: pixels to standard deviation; the layout's own spreads apply.
-        model: standard deviation to weight.
+        noise: converts pixels to standard deviations; the spreads of the layout are added.
+        model: converts standard deviations to weights.
         min_confidence: see site_pixels.
         source: name for `Estimate.sources`.
-        sites: use only these; None means all the layout has.
+        sites: use only these; None means all sites of the layout.
 
     Raises:
         MeasurementError: an unknown layout or site, no calibration, no rigid pose, or no finite least confidence.
@@ -82,7 +82,7 @@ class KeypointSensor:
     sites: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Check what does not depend on a picture."""
+        """Check the settings."""
         parts = layout_of(self.layout).parts
         if self.sites and (unknown := sorted(set(self.sites) - {part.site for part in parts})):
             known = [part.site for part in parts]
@@ -130,21 +130,21 @@ class KeypointSensor:
         meters_per_unit: float = 0.001,
         before: Mapping[str, float] | None = None,
     ) -> tuple[KeypointReport, list[SiteRay], dict[str, tuple[FloatArray, float]]]:
-        """What the keypoints of one person say: rays, and with depth points.
+        """Converts the keypoints of one person into rays and, with depth, 3-D points.
 
         Without depth each site becomes a ray. With a registered depth image (same camera, same size) it becomes a 3-D
         point: the median depth of the nearest surface in a 5 x 5 window, moved behind the surface by BEHIND_SURFACE_M;
-        where the image has no return, or the point is refused by the gate (the site is hidden), it stays a ray.
+        where the image has no return, or the gate rejects the point (the site is occluded), it stays a ray.
 
         Args:
             keypoints: (K, 3), see site_pixels.
             stamp: [s], for the gate.
             predicted: site name -> (3,) in the world, e.g. `tracker.estimate.joints`; sites not in it are not used.
-            gate: drops what is too far from the prediction; None takes everything.
+            gate: rejects measurements too far from the prediction; None accepts all.
             depth: (H, W) uint16 or float32.
             meters_per_unit: of `depth`.
-            before: site name -> how much of the person's body lies between it and the camera [m], see
-                `Tracker.body_before`; None: not known. Networks are as sure of what they guess as of what they see.
+            before: site name -> length of the person's own body between it and the camera [m], see `Tracker.body_before`;
+                None: not known. It raises the standard deviation, because networks report guessed sites with high confidence.
 
         Returns:
             The report, the rays, and site name -> (position (3,) in the world, standard deviation) [m].

@@ -1,4 +1,4 @@
-"""From the keypoints of an image to the sites that were seen in it."""
+"""Converts the keypoints of an image to pixels of body sites."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.keypoints.surface import behind_surface
 
 MIN_CONFIDENCE = 0.1
-"""Keypoints that a network itself believes less than this are not measurements."""
+"""Keypoints with a lower confidence are not used."""
 
 
 @dataclass(frozen=True, eq=False)
 class SitePixel:
-    """A site seen in an image: pixel (u, v), confidence in (0, 1], and distance of the feature from the site [m]."""
+    """A site detected in an image: pixel (u, v), confidence in (0, 1], and spread of the feature around the site [m]."""
 
     site: str
     pixel: tuple[float, float]
@@ -34,16 +34,16 @@ class SitePixel:
 def site_pixels(
     keypoints: npt.ArrayLike, *, layout: str, min_confidence: float = MIN_CONFIDENCE
 ) -> tuple[list[SitePixel], list[str]]:
-    """Sites seen by a network.
+    """Returns the sites that a network detected.
 
     Args:
-        keypoints: (K, 3) rows (u, v, confidence), pixels; (0, 0, 0) or NaN = not seen.
+        keypoints: (K, 3) rows (u, v, confidence), pixels; (0, 0, 0) or NaN = not detected.
         layout: name in LAYOUTS.
-        min_confidence: a site of which any keypoint has less is unseen.
+        min_confidence: a site with any keypoint below this confidence is not detected.
 
     Returns:
-        The sites seen, and the names of those not seen. A site made of several keypoints has the least of their
-        confidences.
+        The detected sites, and the names of the others. The confidence of a site defined by several keypoints is the least
+        of theirs.
 
     Raises:
         MeasurementError: unknown layout, wrong shape or no finite least confidence.
@@ -73,7 +73,7 @@ def checked_rows(keypoints: npt.ArrayLike, layout: str) -> npt.NDArray[np.float6
 
 @lru_cache(maxsize=32)
 def compiled(layout: str) -> _core.KeypointLayout:
-    """A layout as the core holds it."""
+    """The core's object for a layout."""
     return _core.KeypointLayout(
         [
             (part.site, list(part.weights.items()), part.spread, behind_surface(part.site))
@@ -83,12 +83,12 @@ def compiled(layout: str) -> _core.KeypointLayout:
 
 
 def check_confidence(least: object) -> None:
-    """Refuse a least confidence that is no finite number.
+    """Check that a least confidence is a finite number.
 
     Raises:
-        MeasurementError: it is none.
+        MeasurementError: it is not.
     """
-    # Nothing is less than NaN: with it every keypoint would be believed.
+    # No comparison with NaN is true: every keypoint would pass.
     if not isinstance(least, (int, float, np.floating)) or not math.isfinite(least):
         raise MeasurementError(f"min_confidence: expected a finite number, found {least!r}")
 

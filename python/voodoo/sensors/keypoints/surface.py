@@ -1,4 +1,4 @@
-"""Keypoints with depth: the surface around a pixel, and how far behind it a site lies."""
+"""Depth at keypoints: the surface around a pixel, and the distance of a site behind it."""
 
 from __future__ import annotations
 

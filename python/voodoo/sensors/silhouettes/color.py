@@ -20,11 +20,11 @@ _INPAINT_PX = 5
 
 
 class Silhouettes:
-    """What moves in front of a background that does not, for one camera that stands still.
+    """Segments the moving foreground of one static camera.
 
-    A mixture of Gaussians for each pixel (Zivkovic 2004, OpenCV's MOG2) learns the background; shadows do not count,
-    specks are removed and holes closed. A person who stands still for `seconds` starts to become background, unless
-    `learn` is False.
+    A mixture of Gaussians for each pixel (Zivkovic 2004, OpenCV's MOG2) learns the background. Shadows do not count as
+    foreground, specks are removed and holes closed. A person who stands still for `seconds` starts to become background,
+    unless `learn` is False.
 
     Args:
         rate_hz: pictures a second.
@@ -52,7 +52,7 @@ class Silhouettes:
 
         Args:
             image: (H, W, 3) BGR uint8.
-            learn: take the picture up into the background; False once the person is there and the background known.
+            learn: update the background with the image; False once the person is there and the background is known.
 
         Raises:
             MeasurementError: another type, or another size than before.
@@ -64,20 +64,22 @@ class Silhouettes:
 
 
 class StillBackground:
-    """What a camera that stands still sees behind the person: in each pixel the median color of those pictures in which the
-    person cannot be there. Where that is never the case (`unknown`) the background around is continued (Telea 2004).
+    """The background of one static camera: the median color of each pixel over the images in which the person cannot be there.
+
+    Pixels without such an image (`unknown`) are inpainted from their surroundings (Telea 2004).
 
     Args:
-        pictures: some tens spread over a recording, (H, W, 3) BGR uint8.
-        occupied: for each picture, (H, W) where the person may be; None: anywhere, so that the person must leave every place in
-            more than half of the pictures.
-        threshold: least difference of the foreground in any color, 0 to 255, or
-        chroma: in color alone, whatever the light (CIE 1976 a*, b*): skin in the shade is as dark as a dark floor, but redder.
+        pictures: some tens of images spread over a recording, (H, W, 3) BGR uint8.
+        occupied: for each image, (H, W) where the person may be; None: anywhere, so that the person must be absent from every
+            pixel in more than half of the images.
+        threshold: least difference of the foreground in any color channel, 0 to 255.
+        chroma: least difference in chroma (CIE 1976 a*, b*), an alternative to `threshold` that is independent of lightness:
+            skin in the shade is as dark as a dark floor, but redder.
         smallest: regions of less area are specks [px].
 
     Raises:
-        MeasurementError: no picture, pictures or masks of different sizes, a number that cannot be used, or a person who may be
-            everywhere in all pictures.
+        MeasurementError: no image, images or masks of different sizes, a number that cannot be used, or a person who may be
+            everywhere in all images.
     """
 
     def __init__(
@@ -125,7 +127,7 @@ class StillBackground:
         _check(picture, self._shape)
         smooth = _smooth(picture)
         differs = cv2.absdiff(smooth, self._background).max(axis=2) > self._threshold
-        # A low threshold: smoothing carries vivid colors a pixel beyond their border.
+        # The chroma threshold is low and smoothing spreads vivid colors by a pixel, so the mask is eroded.
         colorful = np.linalg.norm(_colors(smooth) - self._colors, axis=2) > self._chroma
         differs |= cv2.erode(colorful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
         return _large(differs.astype(np.uint8), self._smallest)
@@ -148,6 +150,6 @@ def _colors(picture: ByteImage) -> npt.NDArray[np.float32]:
 
 
 def _large(mask: ByteImage, smallest: int) -> Mask:
-    """What is large enough of a mask, small gaps closed."""
+    """Closes small gaps of a mask and removes specks."""
     closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
     return without_specks(np.asarray(closed != 0, dtype=bool), smallest=smallest)

@@ -1,5 +1,5 @@
-"""Masks of the person in depth pictures, for voodoo.ik: what hangs together with the known sites, and what stands before the
-still scene near them. Those of color pictures are in voodoo.sensors.silhouettes.color."""
+"""Masks of the person in depth images, for voodoo.ik: pixels connected to known sites, and pixels in front of the still scene
+near them. Masks from color images are in voodoo.sensors.silhouettes.color."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from voodoo.sensors.silhouettes.sites import known_place
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _STEP = 0.03
-"""Two neighbors whose depths differ by more than this share lie on different things."""
+"""Two neighbors whose depths differ by more than this fraction lie on different objects."""
 _FLOOR_M = 0.05
 _IN_FRONT_M, _BEHIND_M = 0.30, 0.05
-"""A body's surface lies in front of its joints: depths around a known site that belong to the person."""
+"""Range of depths around a known site that belong to the person; the surface lies in front of the joints."""
 _REACH_M = 0.6
 """No elbow or knee is farther from a known shoulder, hand, hip or ankle, girth included."""
 _BEFORE = (0.04, 0.012)
-"""What stands before the scene is nearer by this: meters, and share of the depth (three deviations of a structured-light camera
-at 4 m)."""
+"""An object in front of the scene is nearer by at least this: meters, and a fraction of the depth (three standard deviations of
+a structured-light camera at 4 m)."""
 _SPECK_PX = 30
 
 
 class StillScene:
-    """How far a depth camera that stands still sees without the person: in each pixel what it saw farthest away."""
+    """The scene of a static depth camera without the person: the farthest depth measured in each pixel."""
 
     def __init__(self, images: Sequence[DepthImage]) -> None:
         """Learn the scene from images spread over a recording, some tens.
@@ -45,7 +45,7 @@ class StillScene:
             raise MeasurementError(f"images: expected some of one size, found {len(images)}")
         depths = np.sort(np.stack([meters(image) for image in images]), axis=0)  # NaN comes last
         last = np.isfinite(depths).sum(axis=0)[None] - 1
-        # The farthest but one, since one alone may be an error; then the middle of what lies as deep.
+        # The second-farthest depth, since the farthest may be an outlier; then the median of all depths near it.
         deep = np.take_along_axis(depths, np.maximum(last - 1, 0), axis=0)
         with np.errstate(invalid="ignore"):
             first = (depths < _nearest_of(deep)).sum(axis=0)[None]
@@ -66,19 +66,19 @@ class StillScene:
 def from_depth(
     depth: DepthImage, known: Mapping[str, FloatArray], *, scene: StillScene | None = None, level: bool = True
 ) -> Mask:
-    """The person in a depth image: all that hangs together in depth with a known site.
+    """Mask of the person in a depth image: all pixels connected in depth with a known site.
 
-    With a scene also what stands before it within 0.6 m of a known site, so that a leg behind the other one is not lost; and
-    nothing of the scene farther from all of them, if the person touches it.
+    With `scene`, pixels in front of it within 0.6 m of a known site are added, so that a leg behind the other one is included,
+    and pixels of the scene farther from all known sites are removed, in case the person touches it.
 
     Args:
         depth: the image.
-        known: positions (3,) [m] of sites of the person in the root frame; none of the others is used.
+        known: positions (3,) [m] of the person's known sites in the root frame.
         scene: the still scene behind the person.
-        level: z is up and 0 on the floor in the root frame: what is lower than 5 cm is floor.
+        level: z is up and 0 on the floor in the root frame, so that points lower than 5 cm are floor.
 
     Returns:
-        (height, width); all false when no known site is seen.
+        (height, width); all false if no known site is visible.
 
     Raises:
         MeasurementError: a position is not three finite numbers, or the scene has another size.
@@ -110,14 +110,14 @@ def from_depth(
 
 
 def _nearest_of(scene: FloatArray) -> FloatArray:
-    """Depths [m] from which on a return belongs to a scene at depths [m]."""
+    """Least depths [m] of returns that belong to a scene at these depths [m]."""
     return np.asarray(scene - _BEFORE[0] - _BEFORE[1] * scene)
 
 
 def _connected(z: FloatArray, seeds: Sequence[tuple[int, int]]) -> Mask:
-    """All (height, width) that hangs together with the pixels (u, v) of the seeds in depths (height, width) [m]."""
+    """Mask (height, width) of the pixels connected to the seed pixels (u, v) in a depth image (height, width) [m]."""
     height, width = z.shape
-    # A share of the depth is a difference of its logarithm.
+    # A relative difference of depths is an absolute difference of their logarithms.
     logarithm = np.log(np.where(np.isfinite(z), z, 1.0)).astype(np.float32)
     reached = np.zeros((height + 2, width + 2), dtype=np.uint8)
     reached[1:-1, 1:-1] = ~np.isfinite(z)

@@ -13,7 +13,7 @@ Mask: TypeAlias = npt.NDArray[np.bool_]
 
 
 def without_specks(mask: Mask, *, smallest: int) -> Mask:
-    """A mask without pieces of fewer pixels than `smallest`."""
+    """Removes regions of fewer than `smallest` pixels from a mask."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     large = stats[:, cv2.CC_STAT_AREA] >= smallest
     large[0] = False  # label 0 is the background
@@ -21,8 +21,8 @@ def without_specks(mask: Mask, *, smallest: int) -> Mask:
 
 
 def filled(mask: Mask, *, hole: int = 40) -> Mask:
-    """A mask without cracks and without holes of up to `hole` pixels: sensors leave out single pixels, and a distance
-    transform takes each of them for background."""
+    """Closes cracks and holes of up to `hole` pixels in a mask. Sensors miss single pixels, which a distance transform would
+    treat as background."""
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - closed, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] <= hole

@@ -1,5 +1,5 @@
-"""Silhouettes by region segmentation with the posed body as the shape prior (R07 section 3.1): neither depth nor a still
-background is needed, but a posture that is near."""
+"""Silhouettes by region segmentation with the posed body as the shape prior (R07 section 3.1). This needs neither depth nor a
+static background, but an approximate posture."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from voodoo.sensors.silhouettes.masks import Mask, filled, without_specks
 from voodoo.tracker import Tracker
 
 LIKELY = 0.5
-"""From this likelihood on a pixel is the body's."""
+"""Least probability for a pixel to belong to the body."""
 _SMALLEST_PX = 60
 
 
 class RegionSilhouettes:
-    """What of pictures is the body, by colors that are learned where it was.
+    """Segments the body in color images by colors that are learned from known postures.
 
     Args:
-        body: in the sizes that its postures have.
+        body: the body with the sizes of the postures.
     """
 
     def __init__(self, body: Body) -> None:
-        """Nothing is learned yet."""
+        """Start without learned colors."""
         self._tracker = Tracker(body)
         self._lenses: dict[str, Pinhole] = {}
 
     def of(
         self, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
     ) -> list[tuple[Mask, Camera]]:
-        """The masks of pictures of one time and the cameras without distortion that they belong to, one a picture, near a
-        posture: limb name -> (4, 4) in the pictures' root frame.
+        """Returns the mask of the body and the undistorted camera for each of several images of one instant.
 
-        A camera that is new learns the colors at that posture, which must be right, then.
+        `world_from_limb` is an approximate posture: limb name -> (4, 4) in the root frame of the images. A camera's first image
+        teaches its colors at that posture, which must then be accurate.
 
         Raises:
             VoodooError: a picture or posture that cannot be used.
@@ -51,7 +51,7 @@ class RegionSilhouettes:
         return [(mask, self._lenses[item.sensor].camera) for mask, item in zip(masks, pictures, strict=True)]
 
     def learn(self, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]) -> None:
-        """Learn the colors in pictures of one time, where the body was found in them.
+        """Learn the colors from images of one instant with the posture of the body in them.
 
         Raises:
             VoodooError: a picture or posture that cannot be used.

@@ -1,4 +1,4 @@
-"""Known sites of a person, as silhouettes take them."""
+"""Checks the known sites that silhouettes are computed from."""
 
 from __future__ import annotations
 

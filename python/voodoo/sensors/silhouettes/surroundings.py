@@ -1,4 +1,4 @@
-"""Where in a picture a person may be, as far as known sites tell."""
+"""The pixels of an image where a person may be, given known sites."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from voodoo.sensors.silhouettes.masks import Mask
 from voodoo.sensors.silhouettes.sites import known_place
 
 _BESIDE_M, _TRUNK_M, _GIRTH_M = 0.35, 0.15, 0.12
-"""How far the person reaches beyond known sites: any, those of the trunk, the bones of arms and legs."""
+"""How far the person extends beyond known sites [m]: beyond any, beyond those of the trunk, beyond the bones of the limbs."""
 
 
 _TRUNK = {"l_shoulder", "r_shoulder", "l_hip", "r_hip"}
@@ -29,17 +29,17 @@ _LIMBS = tuple(
         ("hip", "knee", "ankle", 0.491),
     )
 )
-"""Joints of arms and legs, and their length as a share of the stature (Winter, fig. 4.1)."""
+"""Joints of arms and legs, and their length as a fraction of the stature (Winter, fig. 4.1)."""
 
 
 def surroundings(
     known: Mapping[str, FloatArray], camera: Camera, root_from_sensor: FloatArray, *, height: float = 1.75
 ) -> Mask:
-    """Where in a picture (height, width) the person may be, as far as known sites tell.
+    """Mask (height, width) of the pixels where the person may be, given known sites.
 
-    Arms and legs with both ends known are segments, widened by as much as they can be bent and by their girth, or two segments
-    of their girth if elbow or knee are known, too; all else is the hull of the known sites, widened by 15 cm if shoulders and
-    hips are among them, else by 35 cm.
+    An arm or leg with both ends known is a segment, widened by how far it can be bent and by its girth; if its elbow or knee
+    is known too, it is two segments of its girth. The rest of the body is the convex hull of the known sites, widened by 15 cm
+    if shoulders and hips are among them, else by 35 cm.
 
     Args:
         known: positions (3,) [m] of sites in the root frame.

@@ -1,4 +1,4 @@
-"""Where in a picture a head or a hand may be."""
+"""Candidates for heads and hands in an image."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A place in the image where a head or hand may be.
+    """A pixel where a head or hand may be.
 
     Args:
         pixel: (u, v).
-        region: number of the region it is of.
+        region: label of its region.
         area: of that region [px].
-        hand: False for the middle of a region that is longer than a hand: it may be a face, but not a hand.
+        hand: False for the center of a region longer than a hand, which may be a face but not a hand.
     """
 
     pixel: tuple[float, float]

@@ -15,22 +15,22 @@ class SkinSettings:
     """How skin regions become rays.
 
     Args:
-        sites: site -> how far [m] a region's middle may always be from it, see `SiteRay.bias`. A face is the front of the
+        sites: site -> greatest systematic error [m] of a region's center, see `SiteRay.bias`. A face is the front of the
             head.
-        visible_bias: the same while a depth camera shows the site's limb: a face is always to the same side of the head's
-            middle, and would pull for ever at a head that is where it was seen.
-        gate: a new region farther than this from the predicted site is not it [m]; one that has its name keeps it.
-        lost_gate: see gate_growth [m].
-        gate_growth: a gate grows by this while its site is not seen [m/s], up to `lost_gate`, or to `widest_gate` for a
-            hand that a depth camera sees.
-        widest_gate: see above [m].
-        unexplained: a region is taken far from where its site is expected only if it is this far outside the body [m].
-        ambiguity: a second candidate that is not this many times as far as the first makes both useless.
-        noise: of a region's center in the image; and how much it changes from picture to picture.
-        static_seconds: what has skin's color for so long away from head and hands is background [s].
-        settled_frames: pictures to learn from before the cue is used.
-        learn_every: of the pictures after those, every n-th is learned from.
-        each: with several persons, of each of them; it costs about as much for everybody as for one.
+        visible_bias: such errors that apply while a depth camera measures the site's limb. A face is always on the same side
+            of the head's center and would pull constantly at a head that is estimated correctly from depth.
+        gate: gate of a new region around the predicted site [m]; a region that is assigned already is kept outside it.
+        lost_gate: largest gate without depth [m], see `gate_growth`.
+        gate_growth: growth of the gate while its site is not detected [m/s], up to `lost_gate`, or to `widest_gate` for a
+            hand that a depth camera measures.
+        widest_gate: largest gate with depth [m].
+        unexplained: a region far from the predicted site is accepted only if it is at least this far outside the body [m].
+        ambiguity: if the second-best candidate is less than this many times as far as the best one, neither is accepted.
+        noise: of a region's center in the image, and how much it changes from image to image.
+        static_seconds: pixels that have the color of skin for this time, away from head and hands, are background [s].
+        settled_frames: images to learn from before the cue is used.
+        learn_every: after those images, every n-th one is learned from.
+        each: use the cue for each of several persons; the cost for all of them is approximately that for one.
 
     Raises:
         MeasurementError: a number that is not above zero.

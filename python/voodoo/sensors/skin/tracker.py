@@ -1,8 +1,8 @@
-"""Skin color as a cue for head and hands (K06 III-A): segmentation that adapts, regions, and their assignment.
+"""Skin color as a cue for head and hands (K06 III-A): adaptive segmentation, regions, and their assignment to sites.
 
-All regions become candidates without a label. They are followed in space, so that a hand keeps its name while the body
-model falls behind; `voodoo_core::skin` says what keeps a hand with its owner. With a depth image a region is a place in
-space, not only a ray.
+All regions are unlabeled candidates. They are tracked in 3-D, so that a hand keeps its label while the body model lags; the
+documentation of `voodoo_core::skin` lists the rules that keep each region with its site. With a depth image a region has a
+3-D position, not only a ray.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ _NOWHERE = np.full(3, np.nan)
 
 
 class FollowedRegion(NamedTuple):
-    """A region that is followed.
+    """A tracked skin region.
 
     Args:
-        label: the site whose name it has.
-        pictures: in which it was seen.
-        stamp: when it was last seen [s].
+        label: the site that it is assigned to.
+        pictures: number of images in which it was detected.
+        stamp: time of its last detection [s].
         velocity: (3,) [m/s].
-        far: of each site how far it was from there, squared shares of the gate.
-        mismatch_s: of each site how long it has spoken against being it [s].
+        far: for each site the running mean of the squared distance, in units of the gate.
+        mismatch_s: for each site, how long the region has contradicted it [s].
     """
 
     label: str | None
@@ -58,7 +58,7 @@ class SkinTracker:
     """The skin cue of one camera."""
 
     def __init__(self, settings: SkinSettings | None = None) -> None:
-        """Start with the colors of all skins; `learn` makes them one person's."""
+        """Start with the colors of all skin tones; `learn` adapts them to one person."""
         self.settings = chosen = settings or SkinSettings()
         self._sites = tuple(chosen.sites)
         self._teacher = _core.SkinTeacher()
@@ -75,7 +75,7 @@ class SkinTracker:
         self._image: ByteImage | None = None
 
     def __copy__(self) -> SkinTracker:
-        """As it is, for what `observe` changes; what `learn` changes is shared."""
+        """Copy the state that `observe` changes; the models that `learn` changes are shared."""
         twin = SkinTracker.__new__(SkinTracker)
         vars(twin).update(vars(self))
         twin._cue = copy(self._cue)
@@ -83,33 +83,33 @@ class SkinTracker:
 
     @property
     def settled(self) -> bool:
-        """True when enough pictures were learned from."""
+        """True if the colors were learned from enough images."""
         return self._teacher.learned >= self.settings.settled_frames
 
     @property
     def colors(self) -> npt.NDArray[np.float32]:
-        """Histogram of skin's colors (64, 64, 8), by Cr, Cb and Y."""
+        """Histogram of skin colors (64, 64, 8), by Cr, Cb and Y."""
         return self._teacher.skin
 
     @property
     def mask(self) -> Mask | None:
-        """(H, W): skin in the last picture, without what was ruled out; None before the first picture."""
+        """(H, W): skin of the body in the last image, without excluded pixels; None before the first image."""
         return self._cue.mask
 
     @property
     def candidates(self) -> list[Candidate]:
-        """Where in the last picture a head or a hand may be."""
+        """Candidates for heads and hands in the last image."""
         return [Candidate(*item) for item in self._cue.candidates]
 
     @property
     def assigned(self) -> dict[str, Candidate]:
-        """Site -> which of the candidates it is."""
+        """Site -> the candidate that is assigned to it."""
         found = self.candidates
         return {self._sites[site]: found[number] for site, number in self._cue.assigned}
 
     @property
     def followed(self) -> list[FollowedRegion]:
-        """All regions that are followed."""
+        """All tracked regions."""
         return [
             FollowedRegion(None if site is None else self._sites[site], count, stamp, *map(tuple, rest))
             for site, count, stamp, *rest in self._cue.followed
@@ -132,23 +132,23 @@ class SkinTracker:
         source: str = "skin",
         moved: Mapping[str, FloatArray] | None = None,
     ) -> list[SiteRay]:
-        """Rays of those sites that were found.
+        """Updates the cue with an image and returns a ray for each detected site.
 
         Args:
             image: (H, W, 3) BGR uint8.
             camera: calibration.
             world_from_sensor: (4, 4).
             predicted: site name -> (3,) in the world at the time of the picture.
-            stamp: of the picture [s]; None: 1/30 s after the last.
-            body: what a depth camera saw near the body; None: not known. A candidate must then lie at about the depth
-                of its site, so that a hand hidden behind the body does not jump to what is in front.
-            tracker: who follows the body, with its last pose; None: where the body's surface is, is not known.
-            others: other persons; what is nearer to them than to the body is theirs.
-            arm_lost: sites whose limb the other sensors do not show where the body has it.
-            upper_arm_visible: sites whose upper arm they do show there: its hand is a forearm away from that elbow.
-            head_visible: sites whose own limb they show there, see `SkinSettings.visible_bias`.
+            stamp: time of the image [s]; None: 1/30 s after the last.
+            body: depth measurements near the body; None: not known. With them a candidate must lie approximately at the depth
+                of its site, so that the track of a hand hidden behind the body does not jump to a region in front.
+            tracker: the tracker of the body, with its last pose; None: the position of the body's surface is not known.
+            others: other persons; a region nearer to them than to the body belongs to them.
+            arm_lost: sites whose limb is not supported by other sensors at its estimated pose.
+            upper_arm_visible: sites whose upper arm is supported there; the hand is then one forearm away from that elbow.
+            head_visible: sites whose own limb is supported there, see `SkinSettings.visible_bias`.
             source: name for `Estimate.sources`.
-            moved: site name -> (3,) where it is at the time of the rays; None: that of the picture.
+            moved: site name -> position (3,) at the time of the rays; None: the rays have the time of the image.
 
         Raises:
             MeasurementError: the image is not of the camera's size, or `tracker` has no pose yet.
@@ -192,16 +192,16 @@ class SkinTracker:
         rate_hz: float = 30.0,
         trusted_start: bool = False,
     ) -> None:
-        """Learn colors and background from a picture and the estimate of its time; only while tracking is good.
+        """Learn colors and background from an image and the estimate at its time, if its status is "tracking".
 
-        Colors are learned around the sites that were matched (all of them before the cue has settled), and only from
-        pixels that were skin already, or nearly: the hair on a head seen from behind is not skin.
+        Colors are learned around the sites that were detected (all sites before the cue has settled). Only pixels whose
+        colors are close to those of skin are used, because a head seen from behind shows hair.
 
         Args:
             image, camera, world_from_sensor: as in `observe`.
-            estimate: of the picture's time.
-            rate_hz: of the pictures.
-            trusted_start: the pose is right whatever the status says: somebody set it.
+            estimate: the estimate at the time of the image.
+            rate_hz: frame rate of the camera.
+            trusted_start: the pose was set by the user and is learned from whatever the status is.
 
         Raises:
             MeasurementError: the image is not of the camera's size.

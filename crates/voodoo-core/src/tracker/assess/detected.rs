@@ -1,12 +1,13 @@
-//! What a detector that looked at a frame says of a limb.
+//! Evidence of a detection for the pose of a limb.
 
 use crate::body::Body;
 use crate::detect::Detected;
 use crate::math::{Pose, Vec3};
 use crate::visibility::evidence::EXPLAINED;
 
-/// Log odds that a limb is right, by where a detector sees its near end and that of the `next` one: where it sees all of a limb
-/// aside, the limb is wrong however sure one joint may be. Poses are in a frame with this `origin` in the world.
+/// Returns the log odds that a limb's pose is right, from the detected positions of its near end and of the near end of the
+/// `next` limb. The sum over both joints makes a limb wrong if the detection is far from all of it, even if one joint agrees.
+/// Poses are in a frame whose origin is `origin` in the world.
 pub(super) fn detection_log_odds(
     detected: Detected,
     body: &Body,
@@ -23,8 +24,9 @@ pub(super) fn detection_log_odds(
     limbs.into_iter().flatten().filter_map(apart).sum()
 }
 
-/// The same of a joint that a detector, with this standard deviation along each axis, sees aside, meters: of a right one the mean
-/// square is the variance. What is tracked is as near to the truth as points to the limb that explains them.
+/// Returns the log odds that a joint is right which lies `apart` from its detected position, meters; `sigma` is the detection's
+/// standard deviation along each axis. For a right joint the expected square along an axis is the variance. The tracked position
+/// has the tolerance `EXPLAINED`, the distance within which a limb explains a point.
 fn joint_log_odds(apart: Vec3, sigma: f64) -> f64 {
     let variance = sigma * sigma + EXPLAINED * EXPLAINED;
     apart.to_array().iter().map(|along| 0.5 * (1.0 - along * along / variance)).sum()
@@ -36,7 +38,7 @@ mod tests {
     use crate::detect::{DetectedJoint, Detection, JointMap};
     use crate::testing::standing;
 
-    /// What a detector with this standard deviation says of the first arm's limbs that sees everything so far aside.
+    /// Log odds of the first arm's limbs for a detection with this standard deviation that is displaced by `aside`.
     fn log_odds(aside: Vec3, sigma: f64) -> [f64; 2] {
         let (model, poses) = standing();
         let body = &model.body;

@@ -1,5 +1,5 @@
-//! Whether arms and legs are where they are thought to be, where pictures are all that shows them: what is not known to a few
-//! centimeters by what edges told is not called measured.
+//! Status of arms and legs when color pictures are the only evidence: a limb whose position is not known to a few centimeters
+//! from color edges is not reported as measured.
 
 use super::Assessor;
 use crate::association::correspondence::RegionSupport;
@@ -9,14 +9,15 @@ use crate::tracker::estimate::LimbStatus;
 use crate::uncertainty::FittedPose;
 use crate::visibility::evidence::EXPLAINED;
 
-/// How much less sure a limb is whose second opinion ends so many meters away, as a factor of its standard deviation: where both agree
-/// as well as a point with the limb that explains it, as sure as by edges alone.
+/// Factor on a limb's standard deviation when the second branch puts its end at a distance of `apart` meters. It is 1 where the
+/// branches differ by as much as a point may lie from the limb that explains it.
 fn sigma_factor(apart: f64) -> f64 {
     (apart / EXPLAINED).sqrt()
 }
 
 impl Assessor {
-    /// Takes what a frame's edges told, and how far away the far end of a limb is by a second opinion, if there is one.
+    /// Updates the uncertainty of each limb with a frame's color edges. `branch_distance` gives the distance of a limb's far end
+    /// to that in the second branch, if there is one.
     pub(in crate::tracker) fn follow_edges(
         &mut self,
         model: &Model,
@@ -37,23 +38,24 @@ impl Assessor {
             let support = correspondences.region_support.get(limb).copied();
             let RegionSupport { own, visible, .. } = support.unwrap_or_default();
             let sigma = edges.end_sigma(limb) * branch_distance(limb).map_or(1.0, sigma_factor);
-            // To be known as well as a point is explained is enough. What speaks for all of a limb makes it surer by a factor of e.
+            // A standard deviation of `EXPLAINED` suffices. Full support of a limb by color reduces its uncertainty by a factor
+            // of e.
             *known = (sigma / EXPLAINED).ln() - own[0] * visible;
         }
     }
 
-    /// Nothing that edges told before counts.
+    /// Discards all evidence from color edges.
     pub(super) fn forget_edges(&mut self) {
         self.edges.forget();
         self.edge_uncertainty.clear();
     }
 
-    /// Edges of pictures are all there is.
+    /// Whether color edges are the only evidence.
     pub(super) fn is_by_edges_alone(&self) -> bool {
         !self.edge_uncertainty.is_empty()
     }
 
-    /// Statuses of arms and legs by what edges told, if that is all there is.
+    /// Sets the status of arms and legs from color-edge uncertainty when no other evidence is available.
     pub(super) fn report_edges(&self, extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
         for chain in extremities.iter().filter(|_| self.is_by_edges_alone()) {
             for limb in [chain.upper, chain.lower] {

@@ -1,4 +1,4 @@
-//! What each limb explains and no other but its neighbors.
+//! Points that a limb explains exclusively: no other limb does, except its neighbors.
 
 use crate::body::Body;
 use crate::hypotheses::ROUGH_SAMPLE;
@@ -6,21 +6,21 @@ use crate::math::{Points, Pose, widest};
 use crate::observation::candidates::Candidates;
 use crate::visibility::evidence::EXPLAINED;
 
-/// Weight of such candidates, and working memory.
+/// Total weight of the exclusively explained candidates, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct Exclusive {
-    /// By limb.
+    /// Total weight by limb.
     pub(super) weight: Vec<f64>,
-    /// The part of it that no depth image gave.
+    /// The part of `weight` from point clouds, that is, not from depth images.
     pub(super) clouds: Vec<f64>,
     sample: Points,
     distances: Vec<f32>,
-    /// Distances of the whole sample, limb after limb.
+    /// Distances of all sample points, limb after limb.
     all: Vec<f32>,
     nearest: SampleNearest,
 }
 
-/// Of each point of the sample the nearest limb, how far it is, and how many are near enough to explain it.
+/// For each sample point the nearest limb, the distance to it, and the number of limbs near enough to explain the point.
 #[derive(Debug, Default)]
 struct SampleNearest {
     limb: Vec<u32>,
@@ -29,7 +29,7 @@ struct SampleNearest {
 }
 
 impl SampleNearest {
-    /// Of so many points, before any limb is known.
+    /// Resets the arrays for `count` points, before any limb was compared.
     fn begin(&mut self, count: usize) {
         self.distance.clear();
         self.distance.resize(count, f32::INFINITY);
@@ -39,7 +39,7 @@ impl SampleNearest {
         }
     }
 
-    /// Takes in how far all points are from a limb.
+    /// Updates the arrays with the distances of all sample points to one limb.
     fn offer(&mut self, limb: u32, distances: &[f32]) {
         let own = self.limb.iter_mut().zip(&mut self.distance).zip(&mut self.near);
         widest(
@@ -57,7 +57,7 @@ impl SampleNearest {
 }
 
 impl Exclusive {
-    /// Counts anew.
+    /// Recomputes the weights for these poses and candidates.
     pub(super) fn count(&mut self, body: &Body, poses: &[Pose], candidates: &Candidates) {
         let Self { weight, clouds, sample, distances, all, nearest } = self;
         let count = poses.len();
@@ -105,13 +105,14 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
-    /// Weight of what each limb alone explains of an image of `truth`, at `poses`; the weight of all candidates.
+    /// Weight of the candidates that each limb explains exclusively, for an image of `truth` and a body at `poses`, and the
+    /// weight of all candidates.
     fn counted(truth: &[Pose], poses: &[Pose], change: impl Fn(&Candidates, &mut Exclusive)) -> (Vec<f64>, f64) {
         let (model, config) = (standing().0, without_background());
         with_context(&before_wall(&model.body, truth), &config, &model, poses, |context| {
             let candidates = context.observation.candidates;
             let mut exclusive = Exclusive::default();
-            // What was counted before is forgotten.
+            // A second count replaces the first one.
             exclusive.count(&model.body, poses, candidates);
             exclusive.count(&model.body, poses, candidates);
             change(candidates, &mut exclusive);
@@ -135,7 +136,7 @@ mod tests {
         let (raised, _) = raised(&model, &poses, 0.2);
         let on = |(weight, _): &(Vec<f64>, f64)| weight[arm.lower];
         let right = counted(&poses, &poses, |_, _| ());
-        // The other forearm put on this one.
+        // The other forearm in the same pose as this one.
         let mut twice = poses.clone();
         let other = model.extremities.iter().find(|chain| !chain.leg && chain.lower != arm.lower).unwrap().lower;
         twice[other] = poses[arm.lower];

@@ -1,33 +1,34 @@
-//! What is known about one limb, over a few frames: evidence flickers.
+//! Evidence for one limb, accumulated over a few frames because single frames are noisy.
 
 use super::two_state::{EVEN, TwoState};
 use crate::math::Vec3;
 use crate::tracker::estimate::LimbStatus;
 use crate::visibility::LITTLE;
 
-/// Share of the past frames in what is known of a limb's support.
+/// Weight of past frames in the running means of a limb's support.
 const MEMORY: f64 = 0.6;
 
-/// Running means of what frames said about a limb.
+/// Running means of the evidence for a limb.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LimbHistory {
-    /// Share of the visible patches explained by this limb alone.
+    /// Fraction of the visible patches that this limb explains exclusively.
     exclusive: f64,
-    /// Share of the facing patches that cameras see past.
+    /// Fraction of the front-facing patches violated by free space.
     contradicted: f64,
-    /// Share of the facing patches not hidden.
+    /// Fraction of the front-facing patches that are unoccluded.
     visible: f64,
-    /// That images show this limb, and no other, where it is, and so that of its far end; of limbs of which an image says
-    /// something.
+    /// Filters for two events: the images show this limb in its pose, and they show its far end. `None` for limbs without
+    /// evidence from images.
     states: Option<[TwoState; 2]>,
     frames: usize,
-    /// How its far end moved in the last frame, and by how much otherwise than in the one before, meters.
+    /// Displacement of the far end in the last frame, and its difference to the displacement in the frame before, meters.
     motion: Vec3,
     unexpected: f64,
 }
 
 impl LimbHistory {
-    /// Takes a frame's shares: explained by it alone, seen past, not hidden.
+    /// Updates the running means of three fractions of the limb's surface: explained exclusively, violated by free space,
+    /// unoccluded.
     pub(super) fn update(&mut self, now: [f64; 3]) {
         let keep = if self.frames == 0 { 0.0 } else { MEMORY };
         let means = [&mut self.exclusive, &mut self.contradicted, &mut self.visible];
@@ -37,33 +38,33 @@ impl LimbHistory {
         self.frames += 1;
     }
 
-    /// Takes how its far end moved since the frame before, meters.
+    /// Updates with the displacement of the far end since the last frame, meters.
     pub(super) fn moved(&mut self, motion: Vec3) {
         self.unexpected = motion.distance(self.motion);
         self.motion = motion;
     }
 
-    /// By how many meters its far end moved otherwise than from the last frame but one to the last.
+    /// Difference between the last two displacements of the far end, meters.
     pub(super) fn unexpected(&self) -> f64 {
         self.unexpected
     }
 
-    /// Takes what a frame's images say of the limb and of its far end, and what a detector says of it, log odds, after a motion that
-    /// was unexpected by so many meters.
+    /// Updates both filters with the log odds from this frame's images for the limb and for its far end, and with those from a
+    /// detection. `unexpected` is the unexpected part of the motion, meters.
     pub(super) fn observe(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
         let mut states = self.states.unwrap_or_default();
         states.iter_mut().zip(evidence).for_each(|(state, evidence)| state.observe(evidence, detected, unexpected));
         self.states = Some(states);
     }
 
-    /// No image says anything of the limb.
+    /// Clears both filters: no image gives evidence for this limb.
     pub(super) fn clear_states(&mut self) {
         self.states = None;
     }
 
-    /// The status by what the limb alone explains.
+    /// Returns the status by exclusive support.
     pub(super) fn supported(&self) -> LimbStatus {
-        // What it alone explains has to be twice that at which images leave it open.
+        // The exclusive fraction must be twice the one at which images give even odds.
         if self.exclusive >= 2.0 * EVEN && self.contradicted <= LITTLE {
             LimbStatus::Measured
         } else if self.visible < LITTLE && self.contradicted <= LITTLE {
@@ -73,7 +74,7 @@ impl LimbHistory {
         }
     }
 
-    /// The status of a limb of an arm or leg: the one by support, or what images show of it.
+    /// Returns the status of a limb of an arm or leg: by the evidence of images, or `supported` without any.
     pub(super) fn status(&self, supported: LimbStatus) -> LimbStatus {
         match self.states {
             None => supported,
@@ -83,12 +84,12 @@ impl LimbHistory {
         }
     }
 
-    /// Whether the limb is right or wrong may as well be the other way round.
+    /// Whether the images leave it open if the limb is right.
     pub(super) fn is_uncertain(&self) -> bool {
         self.states.is_some_and(|[whole, _]| whole.is_uncertain())
     }
 
-    /// The far end of the limb shows: what hangs on it is where it is.
+    /// Whether the far end of the limb is supported, and so the position of its child limb.
     pub(super) fn is_end_supported(&self) -> bool {
         self.states.is_none_or(|[_, end]| end.is_likely())
     }

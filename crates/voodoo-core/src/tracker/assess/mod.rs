@@ -1,15 +1,15 @@
-//! What the frame says about every limb, and so about the body: measured, inferred or lost.
+//! Assesses every limb, and from the limbs the body: measured, inferred or lost.
 //!
-//! A limb that lies on another explains points that the other explains as well, and the cameras see it where it is: neither
-//! proves it right. What only this limb explains, against what of it should show, does; and a camera that sees past it proves
-//! it wrong. For arms and legs, `limb_support` looks closer at what the depth images show; without any, an arm or leg is as
-//! good as what it hangs on.
+//! A limb that overlaps another one explains points that the other explains as well, and it is visible to the cameras in its
+//! pose; neither is evidence that its pose is right. Evidence for a limb is what it alone explains, compared with the visible
+//! part of its surface. A free-space violation is evidence against it. For arms and legs, `limb_support` evaluates the depth
+//! images in more detail; without any depth image, the status of an arm or leg follows from its parent.
 //!
-//! All of an arm or leg has to be right for its lower limb to be: a forearm on an arm that nothing proves may be anything that is
-//! seen there. An upper limb ends where its outer part shows or its lower limb begins.
+//! A lower limb is right only if the whole arm or leg is: without evidence for the upper arm, a forearm may have been fitted to
+//! any object. The far end of an upper limb is supported where its outer part is visible or where its lower limb begins.
 //!
-//! The body's own status rests on support alone, because a lost body is searched: arms on the trunk must not start that. But no
-//! body is called tracked of which more than a quarter of the limbs is not measured.
+//! The internal status of the body depends on support alone, because a lost body starts a search and arms in front of the trunk
+//! must not start one. However, a body with more than a quarter of its limbs not measured is never reported as tracked.
 
 mod detected;
 mod edges;
@@ -37,19 +37,19 @@ use exclusive::Exclusive;
 use limb_history::LimbHistory;
 use two_state::{EVEN, all_log_odds, any_log_odds, support_log_odds};
 
-/// Share of the past frames in what is known of how round a body is: a blurred frame is no cupboard.
+/// Weight of past frames in the running mean of the roundness: a single blurred frame must not make the body flat.
 const ROUNDNESS_MEMORY: f64 = 0.9;
-/// Of a tracked body no larger share of the limbs is not measured. One of which no larger share is measured is lost, and so is one of
-/// which less than twice that is where the root is not.
+/// Limits for the fraction of limbs. A tracked body has at most this fraction not measured. A body is lost if less than this
+/// fraction is measured, or, where the root is not measured, less than twice this fraction.
 const SOME: f64 = 0.25;
 
-/// Assesses every frame, and remembers what past ones said.
+/// Assesses every frame and keeps running means of past assessments.
 #[derive(Debug, Default)]
 pub(super) struct Assessor {
     limbs: Vec<LimbHistory>,
-    /// Roundness of what is seen where the body is thought to be.
+    /// Running mean of the roundness of the surface observed at the tracked pose.
     round: Option<f64>,
-    /// The status of body and limbs that the tracker goes by; none of a limb before the first frame.
+    /// Internal status of the body and of its limbs, which the tracker itself uses; `internal` is empty before the first frame.
     status: Status,
     internal: Vec<LimbStatus>,
     exclusive: Exclusive,
@@ -57,67 +57,68 @@ pub(super) struct Assessor {
     supports: Vec<LimbSupport>,
     uncertainty: Uncertainty,
     edges: EdgeFilter,
-    /// Of every limb by what edges told, a logarithm: above 0 it is in doubt. Empty where they are not all there is.
+    /// Logarithm of each limb's uncertainty from color edges, relative to its limit: a limb is uncertain above 0. Empty unless
+    /// color edges are the only evidence.
     edge_uncertainty: Vec<f64>,
 }
 
 impl Assessor {
-    /// A pose that somebody vouches for is taken to be on a body until many frames say otherwise.
+    /// Trusts a pose that the user set: it counts as right until many frames contradict it.
     pub(super) fn trust_pose(&mut self) {
         self.forget_limbs();
         self.status = Status::Tracking;
         self.round = Some(1.0);
     }
 
-    /// Limbs were changed while the body had the reported `status`.
+    /// Restarts the assessment after an edit of the limbs; the body keeps the reported `status`.
     pub(super) fn edited(&mut self, status: Status) {
         self.forget_limbs();
         self.status = status;
     }
 
-    /// The body is somewhere else: nothing speaks for the new place but what is seen now.
+    /// Restarts the evidence after the body was moved: only the current frame counts at the new position.
     pub(super) fn moved(&mut self) {
         self.limbs.clear();
         self.round = None;
     }
 
-    /// A pose that nobody vouches for: what is seen of it now decides.
+    /// Starts with a pose that the user did not set: the evidence of the current frame decides.
     pub(super) fn distrust_pose(&mut self) {
         self.forget_limbs();
         self.round = None;
     }
 
-    /// Whether the body, or one of its limbs, was not where it should have been.
+    /// Whether the last assessment found the body not tracked or one of its limbs lost.
     pub(super) fn has_suspect_limb(&self) -> bool {
         self.status != Status::Tracking || self.internal.contains(&LimbStatus::Lost)
     }
 
-    /// The body is given up.
+    /// Sets the body and all its limbs to lost.
     fn give_up(&mut self) {
         self.status = Status::Lost;
         self.internal.fill(LimbStatus::Lost);
     }
 
-    /// The status of the body that the tracker goes by.
+    /// Internal status of the body, which the tracker itself uses.
     pub(super) fn status(&self) -> Status {
         self.status
     }
 
-    /// Whether it is in doubt if one of the arms and legs is right.
+    /// Whether the status of an arm or leg has low confidence.
     pub(super) fn is_uncertain(&self) -> bool {
         self.limbs.iter().any(LimbHistory::is_uncertain)
     }
 
-    /// Whether the tracker relies on a limb.
+    /// Whether the tracker relies on a limb: its internal status is measured.
     pub(super) fn is_reliable(&self, limb: usize) -> bool {
         self.internal.get(limb) == Some(&LimbStatus::Measured)
     }
 
-    /// The status that the tracker goes by, of the body and its limbs; `detected` is what a detector says of this frame, if it looked
-    /// and the pose is not taken from it.
+    /// Updates the internal status of the body and its limbs. `detected` is the detection of this frame, if there is one and the
+    /// pose was not taken from it.
     pub(super) fn assess(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
         if context.observation.candidates.is_empty() && matched.correspondences.sites.is_empty() {
-            // Nothing was measured: what was known before does not speak for this frame.
+            // Nothing was measured, and earlier evidence does not count for this frame.
             self.limbs.clear();
         }
         self.update_limbs(context, matched, detected);
@@ -131,7 +132,7 @@ impl Assessor {
             }
         }
         inherit_status(extremities, internal);
-        // By support alone: a lost body is searched, and arms on the trunk must not start that.
+        // By support alone: a lost body starts a search, and arms in front of the trunk must not start one.
         self.status = overall(internal);
         for limb in extremities.iter().flat_map(|chain| [chain.upper, chain.lower]) {
             internal[limb] = limbs[limb].status(internal[limb]);
@@ -146,23 +147,23 @@ impl Assessor {
         }
     }
 
-    /// Reports the status of the body and its limbs: the one place that writes them into an estimate. No body is tracked of which
-    /// too many limbs are not measured.
+    /// Writes the status of the body and its limbs into an estimate; no other function does. A body with too many limbs not
+    /// measured is not reported as tracked.
     pub(super) fn report_status(&self, model: &Model, estimate: &mut Estimate) {
         let statuses = &mut estimate.limb_status;
         statuses.clear();
         if self.internal.is_empty() {
-            // Nothing was seen of a pose that was set.
+            // A pose that was set, before its first frame.
             statuses.resize(model.body.limbs().len(), LimbStatus::Inferred);
             estimate.status = self.status;
             return;
         }
         statuses.extend_from_slice(&self.internal);
         self.report_edges(&model.extremities, statuses);
-        // A body that is lost altogether has no limb that is not.
+        // If all limbs are lost, the ends stay lost, too.
         if statuses.iter().any(|status| *status != LimbStatus::Lost) {
             for chain in &model.extremities {
-                // A forearm may be known by its inner part, but not the hand.
+                // The inner part of a forearm may be measured while its far end and the hand are not.
                 let hidden =
                     statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].is_end_supported();
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
@@ -178,7 +179,7 @@ impl Assessor {
         self.internal.clear();
     }
 
-    /// What this frame says about every limb.
+    /// Updates the history of every limb with this frame.
     fn update_limbs(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
         let (body, views, poses) = (&context.model.body, context.observation.views, matched.poses);
         self.limbs.resize(poses.len(), LimbHistory::default());
@@ -196,7 +197,7 @@ impl Assessor {
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
-            // The hips tell where the pelvis is, the shoulders the clavicles: where no depth image looks, that is measured.
+            // Hip sites measure the pelvis, and shoulder sites the clavicles, where no depth image covers these limbs.
             let unseen = visibility.front_facing == 0.0;
             let joined = |pair: &SitePair| unseen && near(pair) && limb_joined_at(body, poses, pair) == Some(limb);
             let support = &mut self.supports[limb];
@@ -204,11 +205,11 @@ impl Assessor {
                 now = [1.0, 0.0, 1.0];
                 support.known = false;
             }
-            // Where no depth image looks, pictures tell.
+            // Without depth coverage, color pictures give the evidence.
             if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
                 now = [colors.own[0] * colors.visible, colors.against[0], colors.visible];
             }
-            // What other sensors than depth cameras see of a limb no depth image disproves.
+            // Depth images do not contradict a limb that point clouds of other sensors measure.
             support.known &= self.exclusive.clouds[limb] < FEW;
             history.update(now.map(|value| value.min(1.0)));
             let far_end =
@@ -219,7 +220,7 @@ impl Assessor {
         self.weigh_images(context, poses, detected);
     }
 
-    /// What this frame's images, and a detector that looked at them, say about arms and legs.
+    /// Updates arms and legs with the evidence of this frame's images and of a detection, if there is one.
     fn weigh_images(&mut self, context: Context, poses: &[Pose], detected: Option<Detected>) {
         let Self { limbs, supports, .. } = self;
         let (model, origin) = (context.model, context.observation.origin());
@@ -249,15 +250,15 @@ impl Assessor {
     }
 }
 
-/// The limb that a site at a joint tells of besides its own: the one that its own hangs on. Models put hips and shoulders a little
-/// apart.
+/// Returns the parent of the site's limb if the site lies at the joint between the two, so that it measures the parent, too. Body
+/// models place hips and shoulders at slightly different positions.
 fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize> {
     let (parent, joint) = body.limbs()[pair.limb].parent.as_ref()?;
     let center = poses[pair.limb].transform_point(joint.limb_from_joint.translation);
     ((pair.x - center).length() < EXPLAINED).then_some(*parent)
 }
 
-/// Hands and feet show too few patches to tell on their own: they have the status of what they hang on.
+/// Sets the status of hands and feet to that of the lower limb: they have too few patches for a status of their own.
 fn inherit_status(extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
     for chain in extremities {
         chain.ends.iter().for_each(|end| statuses[*end] = statuses[chain.lower]);
@@ -268,7 +269,8 @@ fn measured_fraction(limbs: &[LimbStatus]) -> f64 {
     limbs.iter().filter(|limb| **limb == LimbStatus::Measured).count() as f64 / limbs.len() as f64
 }
 
-/// Lost without a measured root and half of the limbs; degraded when more than a quarter of the limbs are not measured.
+/// Returns the body's status: lost without a measured root and half of the limbs, or with less than a quarter of the limbs
+/// measured; degraded when more than a quarter of the limbs are not measured.
 fn overall(limbs: &[LimbStatus]) -> Status {
     let measured = measured_fraction(limbs);
     if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < 2.0 * SOME) {
@@ -291,7 +293,7 @@ mod tests {
     use crate::observation::frame::Frame;
     use crate::testing::{before_wall, depth, first_arm, moved, put_board, standing, with_context, without_background};
 
-    /// Lets an assessor look at poses in an image, in so many frames.
+    /// Assesses poses in one image, for the given number of frames.
     fn assess_frames(assessor: &mut Assessor, pixels: &[u16], poses: &[Pose], frames: usize) {
         let (model, config) = (standing().0, without_background());
         with_context(pixels, &config, &model, poses, |context| {
@@ -329,7 +331,7 @@ mod tests {
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
         let estimate = reported(&assessor);
         assert_eq!((assessor.status(), estimate.status), (Status::Tracking, Status::Tracking));
-        // Clavicles and a neck show little that the trunk would not explain.
+        // Clavicles and the neck have few visible patches that the trunk would not explain.
         let small = |limb: usize| matches!(model.body.roles().limb(limb), Some(LimbRole::Clavicle(_) | LimbRole::Neck));
         for (limb, (own, status)) in model.body.limbs().iter().zip(&estimate.limb_status).enumerate() {
             if small(limb) {
@@ -344,7 +346,7 @@ mod tests {
         let (model, poses) = standing();
         let nothing = vec![0; before_wall(&model.body, &poses).len()];
         let image = before_wall(&model.body, &poses);
-        // What no longer shows at all is lost at once.
+        // A body whose surface is no longer observed is lost at once.
         for (pixels, off, frames) in [(&image, 0.5, 3), (&nothing, 0.0, 1)] {
             let mut assessor = trusting();
             assess_frames(&mut assessor, &image, &poses, 5);
@@ -398,7 +400,7 @@ mod tests {
         assert_ne!(assessor.status(), Status::Lost, "a blurred frame is flat, too");
         assess_frames(&mut assessor, &pixels, &poses, 10);
         assert_eq!(reported(&assessor).status, Status::Lost);
-        // A body that comes back does so in time.
+        // A body that becomes visible again needs a few frames to be tracked.
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
         assert_eq!(assessor.status(), Status::Lost);
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 4);

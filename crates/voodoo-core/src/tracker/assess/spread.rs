@@ -1,4 +1,4 @@
-//! How far a pose may be off, as it is reported: by what is proven of the limbs, and by what else they may be.
+//! Reported covariances of a pose: from the evidence for each limb, and from alternative poses.
 
 use super::Assessor;
 use crate::body::Body;
@@ -7,8 +7,9 @@ use crate::tracker::estimate::{Estimate, LimbStatus};
 use crate::uncertainty::FittedPose;
 
 impl Assessor {
-    /// Reports how far a frame's pose may be off, after its status. `rivals` are poses of the whole body in the world that explain
-    /// the frame better and wait for the next one to say so as well; `girth` is how far a limb's radius may be off.
+    /// Writes the covariances of a frame's pose; its status must have been reported before. `rivals` are poses of the whole body
+    /// (world frame) that explain this frame better but are adopted only if the next frame confirms them. `girth` returns the
+    /// standard deviation of a limb's radius.
     pub(in crate::tracker) fn report_spread<'a>(
         &mut self,
         found: FittedPose,
@@ -26,7 +27,7 @@ impl Assessor {
         }
     }
 
-    /// Reports that nothing was measured of a pose that was set.
+    /// Resets the covariances for a pose that was set, of which nothing was measured.
     pub(in crate::tracker) fn forget_spread(&mut self, body: &Body, estimate: &mut Estimate) {
         self.uncertainty.forget();
         self.forget_edges();

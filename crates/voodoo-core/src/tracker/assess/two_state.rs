@@ -1,27 +1,29 @@
-//! Whether a limb is where the pose has it, as log odds that frames add to: a filter of two states, right and wrong.
+//! Binary Bayes filter of whether a limb's pose is right or wrong, in log odds.
 //!
-//! From one frame to the next what was right may have gone wrong, the likelier the farther it moved, and what was wrong may have
-//! come right; then the frame's evidence is added. So a frame counts for little where those before it were sure, and for much
-//! after a fast motion.
+//! Between frames, a right limb may become wrong, with a probability that grows with its unexpected motion, and a wrong limb may
+//! become right. Then the evidence of the frame is added. A single frame therefore changes little after a run of confident
+//! frames, and much after a fast motion.
 
-/// What speaks for a limb less what speaks against it, as a share, is weighed by this: here the odds are even, and every time as
-/// much again makes them e times greater.
+/// Scale of the net support, the supporting minus the contradicting fraction, in log odds. At this value the odds are even, and
+/// each further multiple adds 1 to the log odds.
 pub(super) const EVEN: f64 = 0.08;
-/// Probability that a limb that stands still goes wrong, or comes right, from one frame to the next. No frame says more than the
-/// log odds of that, since it may be disturbed: what cannot be still right before it has to be seen twice.
+/// Probability that a limb at rest becomes wrong, or right, from one frame to the next. The evidence of a frame is limited to the
+/// log odds of this, since a single frame may be disturbed: an observation that contradicts a confident state has to be repeated.
 const CHANGES: f64 = 0.05;
-/// An arm or leg of which an end is so far, meters, from where its last motion would have brought it is wrong before it is seen
-/// there, and with the square of a shorter way the likelier: what was predicted is off by a share of it.
+/// An arm or leg whose end is this far from its position extrapolated by the last motion, meters, counts as wrong before the
+/// evidence is added. For smaller distances the probability grows with the square of the distance, because the error of a
+/// prediction is proportional to it.
 const FAR: f64 = 0.15;
 
-/// Log odds that something is right.
+/// Log odds that a limb is right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct TwoState {
     log_odds: f64,
 }
 
 impl TwoState {
-    /// Takes what a frame's images and a detector say, log odds, after a motion that was unexpected by so many meters.
+    /// Updates with the log odds from a frame's images and from a detector, after a motion of which `unexpected` meters were not
+    /// predicted.
     pub(super) fn observe(&mut self, images: f64, detector: f64, unexpected: f64) {
         let before = probability(self.log_odds);
         let goes_wrong = (CHANGES + (unexpected / FAR).powi(2)).min(1.0);
@@ -30,35 +32,36 @@ impl TwoState {
         self.log_odds = (now / (1.0 - now)).ln() + evidence[0] + evidence[1];
     }
 
-    /// It is likelier right than wrong.
+    /// Whether the limb is more likely right than wrong.
     pub(super) fn is_likely(&self) -> bool {
         self.log_odds >= 0.0
     }
 
-    /// It may as well be the other way round: a frame that shows nothing would say more.
+    /// Whether the log odds are smaller than the evidence of a frame without any support.
     pub(super) fn is_uncertain(&self) -> bool {
         self.log_odds.abs() < -support_log_odds(0.0)
     }
 }
 
-/// Log odds that what shows so much, as a share less what contradicts it, is right.
+/// Returns the log odds that a limb is right, from the fraction of its surface that supports it minus the one that contradicts
+/// it.
 pub(super) fn support_log_odds(fraction: f64) -> f64 {
     fraction / EVEN - 1.0
 }
 
-/// Log odds that all of several things are right, given those of each.
+/// Returns the log odds that all of several events are true, given those of each.
 pub(super) fn all_log_odds(log_odds: &[f64]) -> f64 {
-    // log(1 + exp(-z)), of each, without overflow.
+    // log(1 + exp(-z)) for each, without overflow.
     let against: f64 = log_odds.iter().map(|z| (-z.abs()).exp().ln_1p() + (-z).max(0.0)).sum();
     -against.exp_m1().ln()
 }
 
-/// Log odds that one of two things is right at least.
+/// Returns the log odds that at least one of two events is true.
 pub(super) fn any_log_odds(one: f64, other: f64) -> f64 {
     -all_log_odds(&[-one, -other])
 }
 
-/// The log odds that what stood still did not change.
+/// Limit of the evidence: the log odds that a limb at rest did not change.
 fn max_log_odds() -> f64 {
     ((1.0 - CHANGES) / CHANGES).ln()
 }
@@ -89,7 +92,7 @@ mod tests {
     fn what_moved_far_needs_evidence_anew() {
         let weak = |moved| after(&[(max_log_odds(), 0.0), (-1.0, moved)]).is_likely();
         assert!(weak(0.02) && !weak(0.15));
-        // And so it comes back.
+        // A wrong limb becomes right in the same way.
         assert!(after(&[(-max_log_odds(), 0.0), (max_log_odds(), 0.0), (1.0, 0.0)]).is_likely());
     }
 
