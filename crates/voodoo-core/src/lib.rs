@@ -186,7 +186,7 @@ pub mod kinematics {
 
 pub use body::{Body, HumanModel, Joint, JointKind, Limb, Site};
 pub use camera::{Camera, Lens};
-pub use config::{Config, ConfigError, Overlap, RawValue, SolverKind, Value};
+pub use config::{Config, ConfigError, Field, Overlap, RawValue, SolverKind, Value};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 pub use error::{BodyError, CameraError, TrackError};
 pub use observation::frame::{
@@ -197,7 +197,7 @@ pub use observation::sites::{SiteGate, SiteRay};
 pub use people::{People, PeopleOptions};
 pub use regions::RegionLine;
 pub use shape::ray::RayHit;
-pub use shape::{Region, ShapeError, SurfaceBatch, TaperedEllipticCylinder};
+pub use shape::{Region, ShapeError, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};
 pub use tracker::Tracker;
 pub use tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
 pub use tracker::expected::LimbMotion;

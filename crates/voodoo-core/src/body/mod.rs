@@ -106,7 +106,7 @@ impl Body {
 
     /// Whether two limbs are neither joined nor joined to the same parent. Limbs that are joined overlap near their joints in any
     /// pose.
-    pub fn are_apart(&self, first: usize, second: usize) -> bool {
+    pub(crate) fn are_apart(&self, first: usize, second: usize) -> bool {
         let parent = |limb: usize| self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
         first != second && !self.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
     }

@@ -36,7 +36,7 @@ impl Pose {
 
     /// A rotation alone.
     #[inline]
-    pub fn from_rotation(rotation: Quat) -> Self {
+    pub(crate) fn from_rotation(rotation: Quat) -> Self {
         Self::from_parts(Vec3::ZERO, rotation)
     }
 

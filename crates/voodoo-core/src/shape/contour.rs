@@ -99,14 +99,14 @@ mod tests {
         let (da, db) = (shape.a1 - shape.a0, shape.b1 - shape.b0);
         let (a, b) = (shape.a0 + t * da, shape.b0 + t * db);
         let ahead = camera.z / shape.length - t;
-        let (across, unlike) = ((camera.x / a).hypot(camera.y / b), ((da / a - db / b) * ahead).abs());
+        let (across, varied) = ((camera.x / a).hypot(camera.y / b), ((da / a - db / b) * ahead).abs());
         let cosine = ((1.0 + 0.5 * (da / a + db / b) * ahead) / across).abs();
-        let slope = across * (1.0 - cosine * cosine).sqrt() - unlike;
-        let h = 0.5 * unlike / slope;
-        let bent = across * (cosine + h) + 2.0 * unlike;
+        let slope = across * (1.0 - cosine * cosine).sqrt() - varied;
+        let h = 0.5 * varied / slope;
+        let bent = across * (cosine + h) + 2.0 * varied;
         // With equal tapers there is no step.
         let exact = (da * b - db * a).abs() < ALIKE;
-        let left = if exact { 0.5 * unlike } else { 0.5 * bent * h * h + (across + unlike) * h * h * h / 3.0 };
+        let left = if exact { 0.5 * varied } else { 0.5 * bent * h * h + (across + varied) * h * h * h / 3.0 };
         (slope > 0.0).then(|| left * a.max(b) / away + 1e-12)
     }
 

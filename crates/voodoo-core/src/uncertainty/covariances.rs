@@ -22,7 +22,7 @@ pub struct Covariances {
 
 impl Covariances {
     /// Nothing is known of this body.
-    pub fn forget(&mut self, body: &Body) {
+    pub(crate) fn forget(&mut self, body: &Body) {
         self.clear();
         self.sites.resize(body.sites().len(), Mat3::NAN);
         self.limbs.resize(body.limbs().len(), [[f64::NAN; 6]; 6]);
