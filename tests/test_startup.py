@@ -9,7 +9,7 @@ import pytest
 
 import voodoo
 
-HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "rosbags", "pydantic", "tomlkit", "rerun", "rich", "voodoo._core")
+HEAVY = ("numpy", "cv2", "scipy", "matplotlib", "rosbags", "pydantic", "tomlkit", "rerun", "rich")
 EXTRA = ("scipy", "matplotlib", "motmetrics", "pandas", "rerun", "onnxruntime", "pyarrow", "distributed", "torch")
 """What no tracker needs: it comes with an extra."""
 IMPORT_LIMIT_S = 0.15

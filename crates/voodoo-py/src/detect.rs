@@ -179,7 +179,7 @@ impl PyDetection {
         PyArray1::from_vec(py, mask).reshape(self.size)
     }
 
-    /// The floor as the image shows it, or as the frame gave it: unit normal (3,) upwards and height along it [m]; or None.
+    #[doc = stub!("Detection.floor")]
     #[getter]
     fn floor(&self) -> Option<([f64; 3], f64)> {
         self.detection.floor.map(|floor| (floor.normal.to_array(), floor.offset))

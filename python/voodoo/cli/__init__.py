@@ -38,12 +38,10 @@ def main() -> None:
 
 def _show_version(expected: bool) -> None:
     if expected:
-        from importlib.metadata import PackageNotFoundError, version
+        # Three times as fast as to read the metadata of the distribution.
+        from voodoo._core import __version__
 
-        try:
-            typer.echo(f"voodoo {version('voodoo-tracker')}")
-        except PackageNotFoundError:
-            typer.echo("voodoo (not installed)")
+        typer.echo(f"voodoo {__version__}")
         raise typer.Exit
 
 

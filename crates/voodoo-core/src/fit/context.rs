@@ -1,4 +1,4 @@
-//! What everything that looks for a pose in a frame may read.
+//! Read-only inputs of everything that estimates a pose in a frame.
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Model;
@@ -7,7 +7,7 @@ use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::observer::Observation;
 
-/// A frame that comes later than so many after the last one says nothing of how the body moves now.
+/// Greatest time since the last frame, in multiples of 1/30 s, for which the motion prediction is used.
 const LATE: f64 = 2.5;
 
 /// One frame of one body. Cheap to copy.
@@ -15,23 +15,24 @@ const LATE: f64 = 2.5;
 pub(crate) struct Context<'a> {
     /// Parameters.
     pub config: &'a Config,
-    /// What is tracked.
+    /// The tracked model.
     pub model: &'a Model,
-    /// What the frame shows of it.
+    /// Observation of the frame.
     pub observation: Observation<'a>,
-    /// Poses of the frame before, working frame; empty where nothing is known of the motion.
+    /// Poses of the previous frame, working frame; empty where the motion is unknown.
     pub previous: &'a [Pose],
     /// Seconds since the last frame, as multiples of 1/30 s.
     pub time_scale: f64,
 }
 
 impl Context<'_> {
-    /// The same with fewer points, where there are many.
+    /// Returns the context with fewer points, where there are many.
     pub(crate) fn subsampled(self) -> Self {
         Self { observation: self.observation.with(self.observation.candidates.subsampled()), ..self }
     }
 
-    /// Whether edges of colors tell more of a limb than what else there is: depth blurs arms, and knows legs better.
+    /// Whether color edges are used for a limb: for all limbs without depth, and for arms with depth, which is blurred there but
+    /// reliable for legs.
     pub(crate) fn uses_edges(&self, limb: usize) -> bool {
         self.pictures_alone() || {
             let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
@@ -39,19 +40,19 @@ impl Context<'_> {
         }
     }
 
-    /// Whether the body may have moved as nobody expects: two frames show how it moves, and a long time may change that.
+    /// Whether the time since the last frame is too long to predict the motion.
     pub(crate) fn moves_unknown(&self) -> bool {
         self.time_scale > LATE
     }
 
-    /// Whether colors are all that shows the body.
+    /// Whether color images are the only observation of the body.
     pub(crate) fn pictures_alone(&self) -> bool {
         let frame = self.observation.frame();
         self.config.regions && !frame.colors.is_empty() && frame.images.is_empty() && frame.clouds.is_empty()
     }
 }
 
-/// A frame before it is said what is tracked: for those who change the model meanwhile.
+/// A context without its model, for code that changes the model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Setting<'a> {
     /// As in [`Context`].
@@ -65,7 +66,7 @@ pub(crate) struct Setting<'a> {
 }
 
 impl<'a> Setting<'a> {
-    /// The frame of this model.
+    /// Returns the context with this model.
     pub(crate) fn with_model<'b>(self, model: &'b Model) -> Context<'b>
     where
         'a: 'b,

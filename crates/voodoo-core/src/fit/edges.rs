@@ -1,28 +1,28 @@
-//! Color regions in the loop of a frame: edges along contours, what is learned, and what only one limb explains.
+//! Color regions in the loop of a frame: edges along color contours, learning of colors, and what only one limb explains.
 
 use super::{Context, Fit};
 use crate::math::Pose;
 use crate::regions::{ColorRegions, Posed, steps};
 
 impl Fit {
-    /// Colors of limbs and surroundings.
+    /// Returns the colors of limbs and surroundings.
     pub(crate) fn regions(&self) -> &ColorRegions {
         &self.regions
     }
 
-    /// The same, to change.
+    /// Returns the colors of limbs and surroundings for modification.
     pub(crate) fn regions_mut(&mut self) -> &mut ColorRegions {
         &mut self.regions
     }
 
-    /// Learns the colors of new cameras where the body is expected.
+    /// Learns the colors in new cameras at the predicted pose.
     pub(crate) fn begin_regions(&mut self, context: Context, poses: &[Pose]) {
         if context.config.regions {
             self.regions.begin(context.observation.frame(), posed(context, poses));
         }
     }
 
-    /// Looks for every edge of colors by itself, both sides of a limb apart: pairs that tell how wide it is.
+    /// Searches for every color edge separately on both sides of a limb: the pairs determine its width.
     pub(crate) fn match_single_edges(&mut self, context: Context, poses: &[Pose]) {
         let Self { regions, correspondences, .. } = self;
         correspondences.regions.clear();
@@ -32,7 +32,7 @@ impl Fit {
         }
     }
 
-    /// Learns colors where the body was found.
+    /// Learns colors at the fitted pose.
     pub(crate) fn learn_regions(&mut self, context: Context) {
         if context.config.regions {
             self.regions.learn(context.observation.frame());
@@ -50,7 +50,7 @@ impl Fit {
         }
     }
 
-    /// What every limb of the arms and legs explains of pictures that are all there is.
+    /// Measures what every limb of the arms and legs explains where only color images are available.
     pub(super) fn measure_pixel_gains(&mut self, context: Context, poses: &[Pose]) {
         if context.pictures_alone() {
             let Self { regions, correspondences, .. } = self;

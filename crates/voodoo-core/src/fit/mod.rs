@@ -22,10 +22,11 @@ use crate::math::Pose;
 use crate::regions;
 use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
 
-/// Step of a frame from which the contour speaks: earlier, it would push thin limbs off their points (method section 8).
+/// First step of a frame that uses the depth contour: in earlier steps, it would push thin limbs off their points (method section
+/// 8).
 pub(crate) const CONTOUR_FROM: usize = 2;
 
-/// Finds the pose that fits a frame, from one that is near. Keeps what was matched last.
+/// Fits the pose to a frame, starting from a nearby pose. Keeps the last correspondences.
 #[derive(Debug)]
 pub(crate) struct Fit {
     solver: Box<dyn Solver>,
@@ -34,14 +35,14 @@ pub(crate) struct Fit {
     correspondences: Correspondences,
     contours: Contours,
     regions: regions::ColorRegions,
-    /// Edges of colors are looked for far away.
+    /// Whether color edges are searched for over a larger distance.
     far: bool,
     band_weights: Vec<f64>,
     threads: Option<ThreadPool>,
 }
 
 impl Fit {
-    /// The solver and the threads of a configuration.
+    /// Creates the solver and the threads of a configuration.
     pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
         let threads = match config.threads {
             1 => None,
@@ -62,27 +63,27 @@ impl Fit {
         })
     }
 
-    /// What the solver wants of the loop.
+    /// Returns the solver's schedule for the loop.
     pub(crate) fn schedule(&self, config: &Config) -> Schedule {
         self.solver.schedule(config)
     }
 
-    /// What was matched last.
+    /// Returns the last correspondences.
     pub(crate) fn correspondences(&self) -> &Correspondences {
         &self.correspondences
     }
 
-    /// What was matched last, and where.
+    /// Returns the last correspondences together with `poses`, at which they were found.
     pub(crate) fn matched<'a>(&'a self, poses: &'a [Pose]) -> Matched<'a> {
         Matched { correspondences: &self.correspondences, poses }
     }
 
-    /// Exchanges what was matched last: another pose can be tried in between.
+    /// Exchanges the last correspondences, so that another pose can be tried in between.
     pub(crate) fn swap_matches(&mut self, matched: &mut Correspondences) {
         std::mem::swap(&mut self.correspondences, matched);
     }
 
-    /// Forgets what was matched.
+    /// Clears the correspondences.
     pub(crate) fn clear(&mut self) {
         self.correspondences.limbs.clear();
         self.correspondences.sites.clear();
@@ -92,13 +93,13 @@ impl Fit {
         self.regions.clear();
     }
 
-    /// Warm start, then steps 2 to 7 until they settle; the matches at the end are those of the found poses. Returns the
-    /// number of steps.
+    /// Runs a warm start, then steps 2 to 7 until they converge; the correspondences at the end are those at the fitted poses.
+    /// Returns the number of steps.
     pub(crate) fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.warm_start(context, poses);
         let schedule = self.schedule(context.config);
         let edges = regions::steps(self.far);
-        // What is looked for far away is a hypothesis, and takes the steps of its searches.
+        // A search over a larger distance tests a hypothesis and takes the number of steps of its search schedule.
         let most = if self.far { edges } else { context.config.max_steps };
         let mut steps = 0;
         let mut before = f64::INFINITY;
@@ -117,12 +118,12 @@ impl Fit {
             }
             before = distance;
         }
-        // The last steps hardly moved anything: points keep their limbs, if they have any.
+        // The last steps hardly moved anything, so points stay assigned to their limbs where they are assigned.
         self.match_end(context, poses, steps == 0 || schedule.reassociation == Reassociation::EveryStep);
         steps
     }
 
-    /// The same where nobody knows how the body moves: edges of colors are looked for farther away at first.
+    /// Like `run`, but for unknown motion: the first steps search for color edges over a larger distance.
     pub(crate) fn run_far(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.far = true;
         let steps = self.run(context, predicted, poses);
@@ -130,13 +131,13 @@ impl Fit {
         steps
     }
 
-    /// One ICP step (2 to 7) with all associations made anew.
+    /// Runs one ICP step (2 to 7) with new associations.
     pub(crate) fn step(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
         self.match_all(context, poses, step);
         self.solve(context, predicted, poses, step);
     }
 
-    /// Steps 2 to 5 at `poses`: everything measured becomes a correspondence.
+    /// Steps 2 to 5 at `poses`: turns all measurements into correspondences.
     pub(crate) fn match_all(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = self.schedule(context.config).gate(step);
         // 2 Assign points to limbs.
@@ -150,12 +151,12 @@ impl Fit {
         self.find_regions(context, poses, step);
     }
 
-    /// The same after the last step, but for the contour: it moves nothing any more.
+    /// Like `match_all`, after the last step, without the contour, which has no effect any more.
     pub(crate) fn match_last(&mut self, context: Context, poses: &[Pose]) {
         self.match_end(context, poses, true);
     }
 
-    /// The same; `anew` says whether points are assigned to limbs anew.
+    /// Like `match_last`; `anew` states whether points are assigned to limbs anew.
     fn match_end(&mut self, context: Context, poses: &[Pose], anew: bool) {
         let gate = self.schedule(context.config).gate(context.config.max_steps);
         if anew {
@@ -167,24 +168,25 @@ impl Fit {
         self.measure_pixel_gains(context, poses);
     }
 
-    /// Points alone, within `gate`, wherever on a limb they are closest: for poses that somebody set.
+    /// Matches only points, within `gate`, to the closest surface of any limb: for poses that the user set.
     pub(crate) fn match_points(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         self.assign(context, poses, gate);
         self.match_surface(context, poses, gate, true, false);
     }
 
-    /// Looks for the edges of limbs in depth images, as pairs at `poses`.
+    /// Searches for the depth-contour edges of limbs and converts them to pairs at `poses`.
     pub(crate) fn match_contour(&mut self, context: Context, poses: &[Pose]) {
         self.find_contour(context, poses);
         self.contours.pairs(poses, &mut self.correspondences.contour);
     }
 
-    /// The edges that were looked for last.
+    /// Returns the depth-contour edges that were found last.
     pub(crate) fn contours(&self) -> &Contours {
         &self.contours
     }
 
-    /// Relative changes of length, one a pair of limbs, that the matches ask for; see [`Solver::lengths`].
+    /// Computes the relative changes of length, one for each pair of limbs, that best fit the correspondences; see
+    /// [`Solver::lengths`].
     pub(crate) fn lengths(
         &mut self,
         context: Context,
@@ -199,7 +201,7 @@ impl Fit {
         solver.lengths(&problem, poses, pairs, pull, change)
     }
 
-    /// Lets the solver follow the named sites before the frame's steps.
+    /// Passes the measured positions of named sites to the solver before the frame's steps.
     fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
         let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
@@ -219,7 +221,7 @@ impl Fit {
         }
     }
 
-    /// Steps 3 to 5: points stay with their limbs, contours with their edges.
+    /// Steps 3 to 5 with unchanged assignments of points to limbs and of contours to edges.
     pub(crate) fn match_again(&mut self, context: Context, poses: &[Pose], step: usize) {
         let gate = self.schedule(context.config).gate(step);
         self.match_assigned(context, poses, &gate, false);
@@ -241,7 +243,7 @@ impl Fit {
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, observation, .. } = context;
-        // The published solver takes points wherever its limbs are.
+        // The published solver uses points anywhere on its limbs.
         let buried = if self.schedule(config).whole_body { self.buried.find(&model.body, poses) } else { &[] };
         self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin, buried);
     }
@@ -252,7 +254,8 @@ impl Fit {
         }
     }
 
-    /// Closest points of the limbs' candidates; `anew` says whether those are others than the last time.
+    /// Computes the closest points of the limbs' candidates; `anew` states whether the candidates have changed since the last
+    /// call.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
         let Context { config, model, observation, .. } = context;
         let Self { assignment, correspondences, threads, .. } = self;
@@ -268,13 +271,13 @@ impl Fit {
             }
         };
         match threads {
-            // Every limb is worked on by one thread in a fixed order: the result does not depend on their number.
+            // Each limb is processed by one thread in a fixed order, so the result does not depend on the number of threads.
             Some(pool) => pool.install(|| correspondences.limbs.par_iter_mut().enumerate().for_each(work)),
             None => correspondences.limbs.iter_mut().enumerate().for_each(work),
         }
     }
 
-    /// Steps 6 and 7: moves the body to what was matched.
+    /// Steps 6 and 7: fits the body to the correspondences.
     pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
         let bands = self.schedule(context.config).bands;
         let Self { solver, correspondences, band_weights, .. } = self;
@@ -306,13 +309,13 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, moved, standing, turned, with_context};
 
-    /// The solvers, and how near they come in the steps of one frame, meters: the published one leaves limbs aslant.
+    /// The solvers, and their error after the steps of one frame, meters: the published one leaves limbs tilted.
     const SOLVERS: [(SolverKind, f64); 3] =
         [(SolverKind::Chain, 0.007), (SolverKind::Tree, 0.007), (SolverKind::Limbwise, 0.025)];
     const GATE: Gate = Gate { box_margin: 0.1, distance: 0.1 };
 
-    /// Runs the loop on an image of the standing body from a start that is off by 6 cm; the poses found, how far
-    /// they are off, and the steps.
+    /// Runs the loop on an image of the standing body from a start with an error of 6 cm. Returns the fitted poses, their error,
+    /// and the number of steps.
     fn found(config: &Config) -> (Vec<Pose>, f64, usize) {
         let (model, poses) = standing();
         let start = turned(&moved(&poses, Vec3::new(0.03, 0.0, 0.03)), poses[0].translation, Vec3::Y, 0.09);

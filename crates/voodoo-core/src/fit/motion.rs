@@ -1,29 +1,29 @@
-//! Where the body is, was and is expected: constant-velocity prediction (R07 eq. 16, 17), damped, in a working frame that
-//! follows the body.
+//! Current, previous and predicted poses of the body: constant-velocity prediction (R07 eq. 16, 17), damped, in a working frame
+//! that follows the body.
 
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
 use crate::body::shoulders::raise_shoulders;
 use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
 
-/// A motion is taken to go on for at most this many of its own intervals.
+/// Longest extrapolation of a motion, in multiples of the interval over which it was measured.
 const LONGEST_PREDICTION: f64 = 2.0;
-/// In the second frame after a reset, and where a body is tried elsewhere, its motion is not known yet: this many times as much of it
-/// is unexpected.
+/// Factor on the time scale of the motion prior in the second frame after a reset and where other poses of the body are tried,
+/// since the motion is not known yet.
 pub(crate) const UNKNOWN_MOTION: f64 = 4.0;
-/// Motion priors are standard deviations for one frame of this rate, 1/s.
+/// Frame rate for which the standard deviations of motion priors are given, 1/s.
 pub(crate) const REFERENCE_RATE: f64 = 30.0;
-/// Shortest and longest interval that they are scaled to, in frames of that rate.
+/// Shortest and longest interval to which the priors are scaled, in frames of that rate.
 const TIME_SCALES: [f64; 2] = [0.1, 10.0];
 
-/// The poses of the body over time. All in the working frame: world axes, origin near the body.
+/// Poses of the body over time, all in the working frame: world axes, origin near the body.
 #[derive(Debug, Default)]
 pub(crate) struct Motion {
-    /// Current poses, one a limb; none before the first reset.
+    /// Current poses, one per limb; empty before the first reset.
     pub poses: Vec<Pose>,
-    /// Poses of the frame before; none after a reset.
+    /// Poses of the previous frame; empty after a reset.
     pub previous: Vec<Pose>,
-    /// Poses expected before the frame was seen.
+    /// Poses predicted before the frame was observed.
     pub predicted: Vec<Pose>,
     /// The working frame's origin in the world.
     pub origin: Vec3,
@@ -34,7 +34,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Starts anew at these world poses.
+    /// Resets the motion to these world poses.
     pub(crate) fn restart(&mut self, world_from_limb: Vec<Pose>) {
         self.poses = world_from_limb;
         self.origin = Vec3::ZERO;
@@ -42,7 +42,7 @@ impl Motion {
         self.forget();
     }
 
-    /// Forgets how the body moves, not where it is.
+    /// Resets the velocity and keeps the poses.
     pub(crate) fn forget(&mut self) {
         self.previous.clear();
         self.interval = None;
@@ -57,9 +57,9 @@ impl Motion {
         }
     }
 
-    /// Goes on to the time of a new frame: the current poses become the previous ones, and with `start` the predicted ones the
-    /// current ones; `damping` is the share of the last motion that is expected to go on. Returns the time since the last
-    /// frame in units of 1/30 s, held to what a motion prior can say.
+    /// Advances to the time of a new frame: the current poses become the previous ones, and with `start` the predicted ones
+    /// become the current ones. `damping` is the fraction of the last motion that is expected to continue. Returns the time since
+    /// the last frame in units of 1/30 s, limited to the range of the motion prior.
     pub(crate) fn advance(&mut self, body: &Body, stamp: f64, damping: f64, start: bool) -> f64 {
         self.follow();
         let step = self.stamp.map(|last| stamp - last);
@@ -75,7 +75,7 @@ impl Motion {
         if start {
             self.poses.clone_from(&self.predicted);
         }
-        // Unexpected motion of short intervals adds up like noise; over long ones nothing is known of the speed.
+        // Over short intervals, unexpected motion adds up like noise; over long ones, the speed is unknown.
         let [least, most] = TIME_SCALES;
         let scale = step.map_or(1.0, |step| (step * REFERENCE_RATE).clamp(least, most));
         let scale = scale.max(scale.sqrt());
@@ -85,7 +85,7 @@ impl Motion {
         }
     }
 
-    /// Poses expected at a time to come, world frame, into `expected`; nothing changes.
+    /// Writes the poses predicted for a future time to `expected`, world frame, without changing the state.
     pub(crate) fn expect(&self, body: &Body, stamp: f64, damping: f64, expected: &mut Vec<Pose>) {
         let ratio = match (self.stamp, self.interval) {
             (Some(last), Some(interval)) if self.previous.len() == self.poses.len() => {
@@ -98,19 +98,19 @@ impl Motion {
         expected.iter_mut().for_each(|pose| *pose = shifted(pose, -self.origin));
     }
 
-    /// The frame is done.
+    /// Completes the frame.
     pub(crate) fn commit(&mut self, stamp: f64) {
         self.interval = self.stamp.map(|last| stamp - last);
         self.stamp = Some(stamp);
     }
 
-    /// Current poses in the world.
+    /// Returns the current poses in the world frame.
     pub(crate) fn world_from_limb(&self) -> impl Iterator<Item = Pose> + '_ {
         self.poses.iter().map(|pose| shifted(pose, -self.origin))
     }
 }
 
-/// Poses expected after `current` when `previous` came before it, into `predicted`; `factor` scales the motion.
+/// Writes the poses predicted after `previous` and `current` to `predicted`; `factor` scales the motion.
 fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predicted: &mut Vec<Pose>) {
     predicted.clear();
     for (index, limb) in body.limbs().iter().enumerate() {

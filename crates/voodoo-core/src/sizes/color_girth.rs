@@ -1,4 +1,4 @@
-//! Girths by the edges of color regions, where no depth tells them.
+//! Girths from the edges of color regions, where no depth is available.
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
@@ -11,19 +11,19 @@ use crate::fit::{Fit, Setting};
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Edges of neighboring lines err alike: so many tell as much as one.
+/// Number of neighboring lines that have the information of one, because their edge errors are correlated.
 const LINES_ALIKE: f64 = 3.0;
-/// Girths follow in every so many frames.
+/// Number of frames from one girth update to the next.
 const GIRTHS_EVERY: u32 = 4;
-/// How far the axis of a tracked limb is off across itself, meters.
+/// Lateral standard deviation of a tracked limb's axis, meters.
 const AXIS_SIGMA: f64 = 0.02;
 
-/// What anthropometry leaves open of the length of hands, feet and heads, meters.
+/// Prior standard deviation of the length of hands, feet and heads, meters.
 const TIP_SIGMA: f64 = 0.03;
-/// What it leaves open of a limb's length where those of the others are known, as a share.
+/// Prior relative standard deviation of a limb's length where the lengths of the others are known.
 const PROPORTION_SIGMA: f64 = 0.05;
 
-/// What is known of the surface of one limb.
+/// Estimate of the surface of one limb: shift and girth.
 #[derive(Clone, Copy, Debug)]
 struct ColorGirth {
     information: SMatrix<f64, 5, 5>,
@@ -40,12 +40,12 @@ impl Default for ColorGirth {
     }
 }
 
-/// What an edge counts for.
+/// Returns the weight of an edge.
 fn weight(pair: &RegionPair) -> f64 {
     kernel(pair.distance) * pair.information / LINES_ALIKE
 }
 
-/// Normal equations of a limb's edges: for shift and girth.
+/// Normal equations for shift and girth of a limb, from its edges.
 struct GirthSystem {
     h: SMatrix<f64, 5, 5>,
     g: SVector<f64, 5>,
@@ -70,8 +70,8 @@ fn girth_system<'a>(
 }
 
 impl ColorGirth {
-    /// The surface of a limb whose pose is known, from its edges in the first frame: a Gauss-Newton step, the changes made so
-    /// far drawn to none.
+    /// Fits the surface of a limb whose pose is known to its edges in the first frame: one Gauss-Newton step, with a prior that
+    /// pulls the changes made so far towards zero.
     fn start<'a>(
         &mut self,
         shape: &TaperedEllipticCylinder,
@@ -87,7 +87,7 @@ impl ColorGirth {
         self.take((h + self.information).cholesky()?.solve(&(g - self.information * so_far)))
     }
 
-    /// How much longer a limb with a free distal end is, as a factor, by the edges along the end's rim.
+    /// Returns the factor by which a limb with a free distal end is longer, from the edges along the rim of that end.
     fn tip<'a>(
         &self,
         shape: &TaperedEllipticCylinder,
@@ -108,8 +108,8 @@ impl ColorGirth {
         1.0 + g / (h * shape.length())
     }
 
-    /// The girth of a tracked limb: how far its axis is off in this frame is eliminated, and where it lies about the joints
-    /// stays.
+    /// Updates the girth of a tracked limb. The lateral offset of its axis in this frame is eliminated, and the shift of the
+    /// surface relative to the joints is kept.
     fn follow<'a>(
         &mut self,
         shape: &TaperedEllipticCylinder,
@@ -145,11 +145,11 @@ impl ColorGirth {
     }
 }
 
-/// What is known of the surfaces of all limbs; nothing where depth tells it.
+/// Estimates of the surfaces of all limbs; empty where depth determines them.
 #[derive(Debug, Default)]
 pub(super) struct ColorGirths {
     limbs: Vec<ColorGirth>,
-    /// Frames since girths followed.
+    /// Frames since the last girth update.
     frames: u32,
 }
 
@@ -159,7 +159,7 @@ impl ColorGirths {
         self.limbs.clear();
     }
 
-    /// Fits the limbs' surfaces to the edges of their colors, where nothing else shows them.
+    /// Fits the limbs' surfaces to color edges where the frame has colors but no depth points.
     pub(super) fn start(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         if !setting.observation.candidates.is_empty() || setting.observation.frame().colors.is_empty() {
             return;
@@ -186,7 +186,7 @@ impl ColorGirths {
         }
     }
 
-    /// Draws the girths to the edges of colors.
+    /// Updates the girths with color edges.
     pub(super) fn follow(&mut self, setting: Setting, model: &mut Model, poses: &[Pose], fit: &mut Fit) {
         self.frames = (self.frames + 1) % GIRTHS_EVERY;
         if self.limbs.is_empty() || self.frames != 0 {
@@ -202,8 +202,9 @@ impl ColorGirths {
     }
 }
 
-/// Gives both limbs of a pair one length: in contours alone, a wrong start shows for long. That is the mean of theirs, and the
-/// less they are alike, the more what they would be by the others: how unlike pairs are tells how far off the start is.
+/// Gives both limbs of each pair a common length, because color contours alone correct a wrong start only slowly. The length is a
+/// weighted mean of the average of both limbs and the length expected from the proportions of the other limbs. The weight of the
+/// proportions grows with the differences within the pairs, which indicate how inaccurate the start is.
 fn equalize_pairs(model: &mut Model, poses: &mut [Pose]) {
     let length = |body: &Body, limb: usize| body.limbs()[limb].shape.length();
     let pairs: Vec<_> = model.body.pairs().into_iter().filter(|pair| pair.len() == 2).collect();
@@ -214,7 +215,7 @@ fn equalize_pairs(model: &mut Model, poses: &mut [Pose]) {
         sum += 0.5 * (one + other);
         usual += length(&model.reference_body, pair[0]);
     }
-    // The variance of the difference of two is four times that of their mean.
+    // The variance of the difference of two lengths is four times that of their mean.
     let off = 0.25 * off;
     for pair in &pairs {
         let [one, other] = [0, 1].map(|side| length(&model.body, pair[side]));
@@ -234,7 +235,8 @@ mod tests {
     use super::*;
     use crate::testing::standing;
 
-    /// Mean error of lengths, as a share, of a start whose arms and legs have lengths off by `offsets`, left and right.
+    /// Mean relative error of the equalized lengths, for a start whose arms and legs have relative length errors `offsets`, left
+    /// and right.
     fn off(offsets: [[f64; 2]; 4]) -> f64 {
         let (mut model, mut poses) = standing();
         let true_body = model.body.clone();

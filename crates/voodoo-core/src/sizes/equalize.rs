@@ -1,4 +1,4 @@
-//! Arms and legs of unlike lengths in the start: a person has two alike.
+//! Equalizes arms and legs of unequal lengths in the first frame: left and right limbs of a person are equally long.
 
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
@@ -7,13 +7,14 @@ use crate::hypotheses::{GAIN, overall_cost};
 use crate::math::Pose;
 use crate::solver::Gate;
 
-/// Points farther than this from the set pose say nothing about sizes, meters.
+/// Points farther than this from the given pose are not used for the sizes, meters.
 pub(super) const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
-/// Nobody's arm is shorter than this share of the other one, nor a leg: one of them was set wrong.
+/// Least plausible ratio of the lengths of a person's two arms or two legs; below it, one of them was set wrong.
 const UNEQUAL_REACH: f64 = 0.88;
 
-/// Where one arm or leg of the start is much longer than the other, gives one the lengths of the other if that explains the first
-/// frame clearly better: a skeleton whose foot is under the floor, or ends at the shin.
+/// Where one arm or leg of the start is much longer than the other, gives one of them the lengths of the other if that explains
+/// the first frame clearly better. Such a start comes, for example, from a skeleton whose foot is below the floor, or whose leg
+/// ends at the shin.
 pub(super) fn equalize_limb_lengths(setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
     for pair in model.body.pairs() {
         let chain = |limb: &usize| model.extremities.iter().find(|chain| chain.upper == *limb).cloned();
@@ -33,14 +34,14 @@ pub(super) fn equalize_limb_lengths(setting: Setting, model: &mut Model, poses: 
     }
 }
 
-/// A body and its pose, and what the first frame has against them, in unexplained patches.
+/// A body, its pose, and its cost in the first frame in unexplained patches.
 struct Changed {
     cost: f64,
     body: Body,
     poses: Vec<Pose>,
 }
 
-/// Gives an arm or leg the lengths of the other one, and turns it to where it then fits: it was set by its wrong end.
+/// Gives an arm or leg the lengths of the other one and fits its rotations again, since they were set with a wrong end position.
 fn with_lengths_of(
     like: &TwoBone,
     setting: Setting,

@@ -1,6 +1,7 @@
-//! Girths. In the first frame the named joints fix pose and lengths, the points around them how thick each limb is and where
-//! its surface lies about the line of its joints. Later frames show sides that were hidden then (a trunk behind hanging
-//! arms): two edges across a limb tell how wide it is, wherever it is, and one as far as its axis is known.
+//! Girths of limbs. In the first frame the named joints fix the pose and the lengths, and the points around them determine each
+//! limb's thickness and the offset of its surface from the line between its joints. Later frames show sides that were hidden
+//! before, such as a trunk behind hanging arms. Two edges on opposite sides of a limb determine its width wherever the limb is; a
+//! single edge does so only as precisely as the limb's axis is known.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
@@ -9,35 +10,36 @@ use crate::association::correspondence::LimbMatches;
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Gauss-Newton steps of the girth fit: points find their limbs anew in each.
+/// Gauss-Newton steps of the girth fit; points are matched to limbs anew in each.
 pub(super) const GIRTH_STEPS: usize = 6;
-/// A limb's tip in the first frame makes it shorter or longer by these factors at most.
+/// Limits of the factor by which the first frame changes the length of a limb with a free tip.
 pub(super) const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
-/// Standard deviation of the shift of a limb's surface against its joints (meters) and of its relative girth: what
-/// anthropometry leaves open between persons, clothes and definitions of joint centers.
+/// Standard deviation of the shift of a limb's surface relative to its joints (meters), and of its relative girth: the variation
+/// between persons, clothes and definitions of joint centers that anthropometry leaves.
 pub(super) const SHIFT_SIGMA: f64 = 0.03;
 pub(super) const GIRTH_SIGMA: f64 = 0.15;
-/// Scatter of a surface point about the model, and how many independent ones a limb shows at most: neighbors err alike.
+/// Standard deviation of a surface point about the model, meters, and the maximum number of independent points on a limb: errors
+/// of neighbors are correlated.
 const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
-/// Scatter of an edge of the outline: about a pixel.
+/// Standard deviation of a depth-contour edge, meters: approximately a pixel.
 const EDGE_SIGMA: f64 = 0.01;
-/// How far the axis of a tracked limb is off across the line of sight, meters.
+/// Lateral standard deviation of a tracked limb's axis, across the line of sight, meters.
 const ASIDE_SIGMA: f64 = 0.01;
-/// Edges of following frames err alike: this many frames tell as much as one.
+/// Number of successive frames that have the information of one, because their edge errors are correlated.
 pub(crate) const ALIKE: f64 = 10.0;
-/// So many frames are remembered: clothes move.
+/// Time constant of the girth estimate in frames: older information fades because clothes move.
 pub(super) const REMEMBERED: f64 = 100.0;
-/// Fewer matched points than this tell nothing.
+/// Minimum number of matched points for a girth step.
 const ENOUGH: usize = 15;
 
 /// Change of a limb's surface in its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GirthFit {
-    /// Shift across the axis, meters; z is 0.
+    /// Shift perpendicular to the axis, meters; z is 0.
     pub shift: Vec3,
-    /// Factors of the semi-axes along x, of those along y, and of both at the distal end. Three, not four: both axes taper
-    /// alike, so that the side of the limb stays nearly developable and its closest points cheap.
+    /// Factors of the semi-axes along x, of those along y, and of both at the distal end. There are three, not four: both axes
+    /// taper alike, so that the side of the limb stays nearly developable and its closest points are fast to compute.
     pub factors: [f64; 3],
 }
 
@@ -49,8 +51,9 @@ impl Default for GirthFit {
 
 /// One Gauss-Newton step for shift and semi-axes from the matches of one limb.
 ///
-/// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb
-/// frame), asks for `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, `e` the relative changes. Robust (Cauchy); `total`, the change made so far, is drawn to none.
+/// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb frame),
+/// contributes the equation `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, with the relative
+/// changes `e`. Weights are robust (Cauchy). A prior pulls `total`, the change made so far, towards zero.
 pub(crate) fn girth_step(
     shape: &TaperedEllipticCylinder,
     matches: &LimbMatches,
@@ -99,7 +102,8 @@ pub(crate) fn girth_step(
     step.iter().all(|value| value.is_finite()).then(|| GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors })
 }
 
-/// How far the surface at `foot` moves along `n` (limb frame) with the three relative changes of girth.
+/// Returns the derivatives of the surface displacement at `foot` along `n` (limb frame) with respect to the three relative girth
+/// changes.
 pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
     let t = (foot.z / shape.length()).clamp(0.0, 1.0);
     let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
@@ -107,12 +111,12 @@ pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) ->
     Vector3::new(a, b, a * distal(shape.a0(), shape.a1()) + b * distal(shape.b0(), shape.b1()))
 }
 
-/// Cauchy's weight of a distance, meters.
+/// Cauchy weight of a distance, meters.
 pub(super) fn kernel(distance: f64) -> f64 {
     1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
 }
 
-/// What is known about the girth of one limb since it was fitted.
+/// Estimate of the girth of one limb since it was fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Girth {
     information: Matrix3<f64>,
@@ -126,9 +130,9 @@ impl Default for Girth {
 }
 
 impl Girth {
-    /// Factors of the semi-axes after one more frame: a Kalman filter of the three relative changes. `edges` lie on the sides
-    /// of the limb; how far its axis is off across them in this frame is eliminated, so that edges on both sides tell the
-    /// most. The thickness along the line of sight stays: the surface there is where it was seen.
+    /// Returns the factors of the semi-axes after one more frame, by a Kalman filter of the three relative changes. `edges` lie
+    /// on the sides of the limb. The lateral offset of its axis in this frame is eliminated, so edges on both sides give the most
+    /// information. The thickness along the line of sight is kept: the surface there was already measured.
     pub(crate) fn follow(
         &mut self,
         shape: &TaperedEllipticCylinder,
@@ -191,7 +195,8 @@ impl GirthFit {
         [a, b, a * distal, b * distal]
     }
 
-    /// This change followed by another, held to what a person may differ by; and the part of the other that is left.
+    /// Returns this change followed by another, limited to plausible variation between persons, and the part of the other change
+    /// that was applied.
     pub(crate) fn followed_by(&self, step: &Self) -> (Self, Self) {
         let mut total = Self { shift: self.shift + step.shift, factors: self.factors };
         let mut done = *step;
@@ -207,7 +212,7 @@ impl GirthFit {
 mod tests {
     use super::*;
 
-    /// Edges of a limb seen along x whose rims lie `wider` beyond the shape's and whose axis is off by `aside`.
+    /// Edges of a limb viewed along x, whose rims lie `wider` outside the shape's and whose axis has a lateral offset of `aside`.
     fn sides(shape: &TaperedEllipticCylinder, wider: f64, aside: f64) -> Vec<[DepthEdge; 2]> {
         let edge = |t: f64, sign: f64| {
             let rim = shape.b0() + t * (shape.b1() - shape.b0());

@@ -1,4 +1,4 @@
-//! Sizes of the body: what the first frame corrects and fits, and what those that follow refine.
+//! Sizes of the body: fitted to the first frame after a reset and refined by later frames.
 
 mod color_girth;
 mod equalize;
@@ -17,45 +17,46 @@ use equalize::{START_GATE, equalize_limb_lengths};
 use girth::{GIRTH_STEPS, Girth, GirthFit, TIP_FACTORS, girth_step};
 use reported::ReportedLengths;
 
-/// A limb becomes longer or shorter by at most this share in one frame.
+/// Greatest relative change of a limb's length in one frame.
 const LENGTH_STEP: f64 = 0.02;
-/// All frames together make a limb shorter or longer by these factors at most.
+/// Limits of the factor by which all frames together change a limb's length.
 const LENGTH_FACTORS: [f64; 2] = [0.5, 2.0];
 
 /// How a pose was set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Start {
-    /// Exactly, and the sizes are known.
+    /// The pose is exact and the sizes are known.
     SizesKnown,
-    /// Exactly: the first frame fits the sizes by it.
+    /// The pose is exact; the first frame fits the sizes at this pose.
     Positions,
-    /// As a detector saw it: the first frame fits the pose before the sizes.
+    /// The pose comes from a detector; it is fitted before the sizes are.
     Detected,
 }
 
-/// What is known of the sizes, and whether the next frame shall fit them.
+/// Estimates of the sizes, and whether the next frame fits them.
 #[derive(Debug, Default)]
 pub(crate) struct Sizes {
     open: bool,
-    /// The pose was not set exactly: it is fitted before the girths are.
+    /// The pose was not set exactly, so it is fitted before the girths are.
     rough: bool,
     /// The body as it was set, unless its sizes are known.
     set: Option<Body>,
-    /// What is known about the girths since the first frame fitted them; empty when they were given.
+    /// Girth estimates since the first frame fitted them; empty when the girths were given.
     girths: Vec<Girth>,
-    /// The same by colors.
+    /// Girth estimates from color edges.
     color_girths: ColorGirths,
-    /// Limbs of one length, how much longer they have become since they were set, and room for the next change.
+    /// Groups of limbs with a common length, the factor by which each was lengthened since the sizes were set, and buffers for
+    /// the next change and its prior.
     pairs: Vec<Pair>,
     stretched: Vec<f64>,
     change: Vec<f64>,
     pull: Vec<f64>,
-    /// What detections reported of the lengths of a body that was found.
+    /// Lengths reported by detections of an auto-initialized body.
     reported: ReportedLengths,
 }
 
 impl Sizes {
-    /// The pose was set: unless the sizes are known, the next frame fits them, and those that follow refine the lengths.
+    /// Restarts after a pose was set. Unless the sizes are known, the next frame fits them and later frames refine the lengths.
     pub(crate) fn restart(&mut self, model: &Model, start: Start, config: &Config) {
         let fit = start != Start::SizesKnown;
         (self.open, self.rough) = (fit, start == Start::Detected);
@@ -69,29 +70,30 @@ impl Sizes {
         }
     }
 
-    /// Takes in what a detector reports of the sizes of a body that it found: the lengths are drawn to the mean of all reports.
+    /// Updates the reported lengths with a detection if the body was auto-initialized: lengths are pulled towards the mean of all
+    /// reports.
     pub(crate) fn update(&mut self, detected: Detected) {
         if self.found_with_pose() {
             self.reported.update(detected);
         }
     }
 
-    /// Whether what a detector reported of a body that it found does not fix its sizes yet.
+    /// Whether the detector reported sizes of an auto-initialized body that are still uncertain.
     pub(crate) fn is_uncertain(&self) -> bool {
         self.reported.is_uncertain()
     }
 
-    /// The sizes are to be fitted, but the pose has to be first.
+    /// Whether the sizes have yet to be fitted and the pose has to be fitted first.
     pub(crate) fn wait_for_pose(&self) -> bool {
         self.open && self.rough
     }
 
-    /// The sizes were found with the pose: nobody told how large the body is.
+    /// Whether the sizes were found together with the pose because the user gave none.
     pub(crate) fn found_with_pose(&self) -> bool {
         self.rough
     }
 
-    /// Limbs of one length whose lengths are refined; none where they are known.
+    /// Groups of limbs with a common length that is refined; empty where the lengths are known.
     pub(crate) fn refined_pairs(&self) -> &[Pair] {
         &self.pairs
     }
@@ -101,7 +103,7 @@ impl Sizes {
         self.girths.get(limb).map_or(f64::NAN, |girth| girth.sigma(&body.limbs()[limb].shape))
     }
 
-    /// The sizes are known: no frame changes them.
+    /// Whether the sizes are known, so that no frame changes them.
     pub(crate) fn known(&self) -> bool {
         self.set.is_none()
     }
@@ -111,7 +113,7 @@ impl Sizes {
         self.set.as_ref()
     }
 
-    /// Limbs were changed: girths are taken as given, lengths are followed on from those they have.
+    /// Takes over limbs that the user changed: their girths count as given, and the lengths are refined from the new ones.
     pub(crate) fn edited(&mut self, model: &Model, map: &JointMap) {
         self.reported.bind(map);
         self.girths.clear();
@@ -148,14 +150,14 @@ impl Sizes {
         let mut totals = vec![GirthFit::default(); poses.len()];
         let mut edges_found = Vec::new();
         for _ in 0..GIRTH_STEPS {
-            // The pose is known: what is closest is what was seen.
+            // The pose is known, so the closest limb is the one that was observed.
             fit.match_points(setting.with_model(model), poses, &START_GATE);
             for (limb, total) in totals.iter_mut().enumerate() {
                 let shape = model.body.limbs()[limb].shape;
                 edges_found.clear();
                 for view in setting.observation.views.iter() {
                     edges(&view, &model.body.limbs()[limb], &poses[limb], |edge| {
-                        // Beyond the rim, the edge may be another limb's.
+                        // Outside the rim, the edge may belong to another limb.
                         if edge.reach <= edge.rim || model.body.closest_limb(poses, edge.place) == limb {
                             edges_found.push(edge);
                         }
@@ -177,8 +179,8 @@ impl Sizes {
         }
     }
 
-    /// Draws the sizes to what a frame shows of the body at `poses`: lengths unless it is `lost`, and with `girths` those of the
-    /// limbs that are `relied_on`. Changed lengths leave the joints closed.
+    /// Updates the sizes with a frame in which the body was fitted at `poses`: lengths unless the body is `lost`, and girths, if
+    /// requested, of limbs that the predicate `limb` accepts. The joints stay closed after a change of lengths.
     pub(crate) fn refine(
         &mut self,
         setting: Setting,
@@ -189,7 +191,7 @@ impl Sizes {
         reliance: Reliance<impl Fn(usize) -> bool>,
     ) {
         if !(self.pairs.is_empty() && self.girths.is_empty()) && setting.config.max_steps >= CONTOUR_FROM {
-            // Sizes follow the contour.
+            // Sizes are estimated from the depth contour.
             fit.match_contour(setting.with_model(model), poses);
         }
         if !self.pairs.is_empty() && !reliance.lost {
@@ -203,7 +205,7 @@ impl Sizes {
         }
     }
 
-    /// The lengths of a seated start are rough.
+    /// Refines the lengths, with a prior from the reported lengths: those of a seated start are rough.
     fn refine_lengths(
         &mut self,
         setting: Setting,
@@ -235,7 +237,7 @@ impl Sizes {
         model.body.close_joints(poses);
     }
 
-    /// Draws the girths to what the contour shows of the sides of each limb.
+    /// Updates the girths with the depth-contour edges on the sides of each limb.
     fn refine_girths(&mut self, model: &mut Model, fit: &Fit, relied_on: impl Fn(usize) -> bool) {
         for (limb, girth) in self.girths.iter_mut().enumerate() {
             if !relied_on(limb) {
@@ -249,12 +251,12 @@ impl Sizes {
     }
 }
 
-/// What may be learned from a frame.
+/// Which sizes a frame may update.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reliance<F> {
     /// The body was lost.
     pub lost: bool,
-    /// Girths are followed.
+    /// Whether girths are updated.
     pub girths: bool,
     /// Whether the pose of a limb was known in the frame before.
     pub limb: F,
@@ -278,12 +280,12 @@ mod tests {
         })
     }
 
-    /// The body after the first frame, which shows `person`; it was set as `set`, the feet where the person's are.
+    /// Returns the body after a first frame that shows `person`. It was set as `set`, with the feet at the person's feet.
     fn first_frame(person: &Body, set: &Body, config: &Config) -> Body {
         first_frame_from(person, set, stand(set), config)
     }
 
-    /// The same from another pose.
+    /// Like `first_frame`, but from given poses.
     fn first_frame_from(person: &Body, set: &Body, mut poses: Vec<Pose>, config: &Config) -> Body {
         let pixels = before_wall(person, &stand(person));
         let mut model = Model::new(set.clone());
@@ -318,7 +320,7 @@ mod tests {
         for limb in body.limbs() {
             let ratio = girth(&found, &limb.name) / girth(&body, &limb.name);
             let thicker = ["l_thigh", "r_thigh", "l_calf", "r_calf"].contains(&limb.name.as_str());
-            // What anthropometry knows holds it back: it takes half of the difference at least.
+            // The anthropometric prior limits the change: at least half of the difference must be found.
             assert!(
                 if thicker { (1.08..1.22).contains(&ratio) } else { (0.95..1.08).contains(&ratio) },
                 "{}: {ratio}",
@@ -342,10 +344,10 @@ mod tests {
         let (wrong, real) =
             (ratios(&first_frame(&body, &short, &config)), ratios(&first_frame(&short, &short, &config)));
         let girth_system = ratios(&first_frame(&body, &short, &Config { fit_lengths: false, ..config.clone() }));
-        // What differs by less may be a person's.
+        // A smaller difference may be real.
         let little = ratios(&first_frame(&body, &changed(&body, &left, 0.9, 1.0), &config));
         assert!(near(wrong, 1.0) && near(real, 0.85) && near(girth_system, 0.85) && near(little, 0.9));
-        // Joints that were set wrong turn it as well.
+        // The length is also corrected when the joint angles were set wrong.
         for turns in [[0.0, 0.5], [0.3, -0.3], [-0.2, 0.4]] {
             let mut poses = stand(&short);
             for (name, turn) in left.iter().zip(turns) {
@@ -357,7 +359,7 @@ mod tests {
         }
     }
 
-    /// The body after some frames of a person, from the sizes and the place it was set in.
+    /// Returns the body after some frames of a person, starting from the sizes and the pose of `set`.
     fn followed(person: &Body, set: &Body, config: &Config, lost: bool, frames: usize) -> Body {
         let pixels = before_wall(person, &stand(person));
         let mut model = Model::new(set.clone());
@@ -398,7 +400,7 @@ mod tests {
         let pixels = before_wall(&person, &stand(&person));
         let (mut model, mut poses) = (Model::new(body.clone()), stand(&body));
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(&config).unwrap());
-        // As if a first frame had fitted girths to what it showed.
+        // Start as if a first frame had fitted the girths.
         sizes.restart(&model, Start::Positions, &config);
         (sizes.open, sizes.girths) = (false, vec![Girth::default(); poses.len()]);
         let left = |limb: usize| body.limbs()[limb].name.starts_with("l_");

@@ -1,26 +1,28 @@
-//! Lengths that a detector reports of a body it found, look by look: of a sitter it knows less than of who stands.
+//! Lengths of limbs and stature that a detector reports, averaged over detections. They are less precise for a sitting person
+//! than for a standing one.
 
 use super::girth::ALIKE;
 use crate::detect::{Detected, JointMap};
 
-/// The sizes are known when the stature is, to this share of it: of sitters and who bend it is known to 4 to 6 %, of others to 2.
+/// Relative standard deviation of the stature below which the sizes count as known. The detector reports 4 to 6 % for persons who
+/// sit or bend, 2 % for others.
 const KNOWN: f64 = 0.03;
 
-/// Logarithms of lengths, numbered as the detector does.
+/// Running estimates of the logarithms of lengths, in the detector's order.
 #[derive(Debug, Default)]
 pub(super) struct ReportedLengths {
     lengths: Vec<LengthEstimate>,
-    /// The length of every limb, and which one is the stature.
+    /// Index into `lengths` of every limb, and of the stature.
     of_limb: Vec<Option<usize>>,
     stature: Option<usize>,
 }
 
-/// One of them.
+/// Estimate of the logarithm of one length.
 #[derive(Clone, Copy, Debug, Default)]
 struct LengthEstimate {
-    /// Of the look that set the sizes.
+    /// Value of the first detection, from which the sizes were set.
     set: f64,
-    /// Of all looks, and the information of the surest of them.
+    /// Mean over all detections, and the information of the most precise one.
     mean: f64,
     information: f64,
 }
@@ -31,8 +33,8 @@ impl ReportedLengths {
         *self = Self::default();
     }
 
-    /// Takes a detection in: lengths, and their relative standard deviations. Looks at one person err alike, so that all before count
-    /// as much as the surest of them.
+    /// Updates the estimates with the lengths of a detection and their relative standard deviations. Errors of detections of one
+    /// person are correlated, so all earlier detections together have only the information of the most precise one.
     pub(super) fn update(&mut self, detected: Detected) {
         let reported = &detected.detection.lengths;
         self.lengths.resize(self.lengths.len().max(reported.len()), LengthEstimate::default());
@@ -47,21 +49,22 @@ impl ReportedLengths {
         self.bind(detected.map);
     }
 
-    /// The body's limbs are numbered anew.
+    /// Renews the indices after the body's limbs were renumbered.
     pub(super) fn bind(&mut self, map: &JointMap) {
         self.of_limb.clear();
         self.of_limb.extend_from_slice(map.length_of_limb());
         self.stature = map.stature();
     }
 
-    /// Whether the stature was reported, but not so that it can be relied on.
+    /// Whether the stature was reported, but with a standard deviation above `KNOWN`.
     pub(super) fn is_uncertain(&self) -> bool {
         let stature = self.stature.and_then(|stature| self.lengths.get(stature));
         stature.is_some_and(|stature| stature.information > 0.0 && stature.information < 1.0 / (KNOWN * KNOWN))
     }
 
-    /// By how much longer a limb is than the sizes were set, as all looks report, and the information of that against a frame's, whose
-    /// points err alike; none of what was not reported.
+    /// Returns the ratio of a limb's mean reported length to the length from which the sizes were set, and the information of
+    /// that ratio, multiplied by `ALIKE` for comparison with that of one frame, whose points have correlated errors. `None` if
+    /// the length was not reported.
     pub(super) fn factor(&self, limb: usize) -> Option<(f64, f64)> {
         let known = self.lengths.get(self.of_limb.get(limb).copied().flatten()?)?;
         (known.information > 0.0).then(|| ((known.mean - known.set).exp(), ALIKE * known.information))
@@ -74,7 +77,7 @@ mod tests {
     use crate::body::{Body, HumanModel};
     use crate::detect::Detection;
 
-    /// What is reported of the thigh after looks at somebody: factor and information, and whether the sizes are uncertain.
+    /// Factor and information of the thigh after detections of one person, and whether the sizes are uncertain.
     fn reported(detections: &[[f64; 2]]) -> (f64, f64, bool) {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let names = ["stature", "thigh", "trunk"].map(String::from);

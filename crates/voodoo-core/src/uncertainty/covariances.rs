@@ -1,4 +1,4 @@
-//! What is said of a frame: covariances of sites, limbs and joints.
+//! Covariances of sites, limbs and joints of a frame.
 
 use nalgebra::Matrix6;
 
@@ -8,11 +8,11 @@ use crate::math::{Mat3, Vec3};
 /// Covariances of a frame's pose. World frame, meters, radians; NaN before the first frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Covariances {
-    /// Of the position of every site.
+    /// Covariance of the position of every site.
     pub sites: Vec<Mat3>,
-    /// Of the pose of every limb's frame: its position, then its turn about world axes through there.
+    /// Covariance of the pose of every limb frame: its position, then its rotation about world axes through its origin.
     pub limbs: Vec<[[f64; 6]; 6]>,
-    /// Of the turn of the joint to the parent, about world axes, a limb each; of the root: of its own.
+    /// Covariance of the rotation of every limb's joint to its parent, about world axes; for the root, of its own rotation.
     pub turns: Vec<Mat3>,
     /// Standard deviation of every limb's length and of its mean radius, meters; NaN where they are not refined.
     pub lengths: Vec<f64>,
@@ -21,7 +21,7 @@ pub struct Covariances {
 }
 
 impl Covariances {
-    /// Nothing is known of this body.
+    /// Sets all covariances of this body to NaN.
     pub(crate) fn forget(&mut self, body: &Body) {
         self.clear();
         self.sites.resize(body.sites().len(), Mat3::NAN);
@@ -39,8 +39,8 @@ impl Covariances {
         self.girths.clear();
     }
 
-    /// Adds a limb: the covariance of its turn and shift, how far joints may lie from their places in it, and the covariance of
-    /// its joint's turns about `axes`.
+    /// Adds a limb: the covariance of its rotation and translation, the deviation of joints from their positions in it, and the
+    /// covariance of its joint's rotations about `axes`.
     pub(super) fn push_limb(&mut self, limb: &Matrix6<f64>, site_sigma: f64, joint: &Matrix6<f64>, axes: [Vec3; 3]) {
         let place = |index: usize| (index + 3) % 6;
         let mut own = [[0.0; 6]; 6];
@@ -64,14 +64,14 @@ impl Covariances {
         let block = |row: usize, column: usize| {
             Mat3::from_cols_array_2d(&[0, 1, 2].map(|j| [0, 1, 2].map(|i| own[row + i][column + j])))
         };
-        // A turn moves the site by `turn x lever`.
+        // A rotation moves the site by `turn x lever`.
         let turned = Mat3::from_cols(Vec3::X.cross(lever), Vec3::Y.cross(lever), Vec3::Z.cross(lever));
         let mixed = turned * block(3, 0);
         let covariance = block(0, 0) + mixed + mixed.transpose() + turned * block(3, 3) * turned.transpose();
         self.sites.push(symmetric(covariance));
     }
 
-    /// The site may as well be elsewhere: the covariance of both places together, each as likely as the other.
+    /// Merges the site's position with an alternative one: the covariance of both positions, each equally likely.
     pub(crate) fn widen(&mut self, site: usize, aside: Vec3) {
         let half = 0.5 * aside;
         self.sites[site] += Mat3::from_cols(half * half.x, half * half.y, half * half.z);
@@ -95,7 +95,7 @@ mod tests {
         let mut covariances = Covariances::default();
         covariances.push_limb(&limb, 0.02, &Matrix6::zeros(), [Vec3::X, Vec3::Y, Vec3::Z]);
         covariances.push_site(0, lever);
-        // Differences of where the site goes when the limb turns or shifts a little.
+        // Finite differences of the site's position for small rotations and translations of the limb.
         let h = 1e-6;
         let column = |index: usize| match index {
             0..3 => (Quat::from_axis_angle(Vec3::AXES[index], h) * lever - lever) / h,
@@ -122,7 +122,7 @@ mod tests {
             Covariances { sites: vec![Mat3::from_diagonal(Vec3::splat(1e-4))], ..Covariances::default() };
         let aside = Vec3::new(0.2, 0.0, -0.4);
         covariances.widen(0, aside);
-        // Of two points a mean of squares about their middle.
+        // For two points, the covariance is the mean of squares about their midpoint.
         let points = [Vec3::ZERO, aside];
         let middle = 0.5 * aside;
         for i in 0..3 {

@@ -1,8 +1,8 @@
-//! How far limbs may be off where pictures are all that shows them: what their edges have told, from frame to frame.
+//! Position uncertainty of limbs where only images without depth show the body: accumulates the information of edges over frames.
 //!
-//! An edge tells of one direction only. How far away a limb is, no camera sees; where a second one does not see it either, or
-//! from the same side, nothing does. What was known of every unknown of the chain is kept with all that ties it to others,
-//! fades as the body moves, and grows by what this frame's edges tell.
+//! An edge gives information in one direction only. The distance of a limb from a camera is not observed unless a second camera
+//! sees the limb from another side. The filter keeps the joint information matrix of all unknowns of the chain. The information
+//! fades as the body moves, and grows by that of each frame's edges.
 
 use super::{MAX_SIGMA, USUAL_MOTION};
 use crate::association::correspondence::Correspondences;
@@ -15,14 +15,14 @@ use crate::solver::{ChainSolver, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Regions, Sites, Term};
 
-/// Standard deviation of every unknown of a pose that was set, radians and meters.
+/// Standard deviation of every unknown of a pose that the user set, radians and meters.
 const AS_SET: f64 = 0.03;
-/// Share of what edges tell of a limb that is no part of an arm or leg: clothes hang on the trunk, hair on the head.
+/// Fraction of the edge information that counts for limbs outside arms and legs: clothes hang on the trunk, hair on the head.
 const LOOSE: f64 = 0.1;
-/// What is told of a limb of which no line speaks: so little.
+/// Smallest fraction of the edge information that counts for a limb, for limbs without supporting lines.
 const MIN_WEIGHT: f64 = 1e-3;
 
-/// What is known of a pose, from frame to frame.
+/// Estimate of the uncertainty of a pose, updated from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct EdgeFilter {
     normal: NormalEquations,
@@ -30,27 +30,27 @@ pub(crate) struct EdgeFilter {
     spread: Spread,
     /// Information of all unknowns after the last frame, lower triangle.
     known: Vec<f64>,
-    /// How much says of each that it has not moved, and working memory.
+    /// Inverse variance of each unknown's motion since the last frame, and working memory.
     still: Vec<f64>,
     factored: Vec<f64>,
     solved: Vec<f64>,
-    /// Of every limb's far end, meters; empty before the first frame.
+    /// Standard deviation of the distal end of every limb, meters; empty before the first frame.
     sigma: Vec<f64>,
 }
 
 impl EdgeFilter {
-    /// Nothing is known of the pose that comes next but that it was set.
+    /// Resets the filter for a newly set pose.
     pub(crate) fn forget(&mut self) {
         self.known.clear();
         self.sigma.clear();
     }
 
-    /// Standard deviation of where a limb ends, meters, after the last frame; infinite where that is not known.
+    /// Standard deviation of the position of a limb's distal end after the last frame, meters; infinite where it is not known.
     pub(crate) fn end_sigma(&self, limb: usize) -> f64 {
         self.sigma.get(limb).copied().unwrap_or(f64::INFINITY)
     }
 
-    /// Takes what was matched at `poses`, so many times 1/30 s after the last frame.
+    /// Updates the filter with the matches at `poses`; the time since the last frame is given in multiples of 1/30 s.
     pub(crate) fn observe(
         &mut self,
         model: &Model,
@@ -75,7 +75,7 @@ impl EdgeFilter {
         }
     }
 
-    /// What was known fades: every joint may have moved, the root as far as anything can.
+    /// Reduces the information by the possible motion: every joint may have moved, and the root as far as the limits allow.
     fn expect(&mut self, body: &Body, time_scale: f64) {
         let Self { known, still, factored, solved, .. } = self;
         still.clear();
@@ -115,7 +115,7 @@ impl EdgeFilter {
         }
     }
 
-    /// What the frame tells of every limb, by how much of what it shows speaks for it.
+    /// Adds the frame's information on every limb, weighted by how strongly the limb is supported.
     fn sum_terms(
         &mut self,
         body: &Body,
@@ -139,7 +139,7 @@ impl EdgeFilter {
     }
 }
 
-/// Every one of `n` unknowns is known by itself.
+/// Diagonal information: each of `n` unknowns is known independently.
 fn know_alone(known: &mut Vec<f64>, n: usize, sigma: f64) {
     known.clear();
     known.resize(n * n, 0.0);
@@ -155,7 +155,8 @@ mod tests {
     use crate::association::correspondence::{RegionPair, RegionSupport};
     use crate::testing::standing;
 
-    /// Edges of all limbs that cameras see which look at right angles to `normals`; all of them speak for their limb, or none.
+    /// Edges of all limbs, seen by cameras that look at right angles to `normals`; either all edges support their limb, or none
+    /// does.
     fn edges(model: &Model, poses: &[Pose], normals: &[Vec3], own: f64) -> Correspondences {
         let mut found = Correspondences::default();
         for (limb, part) in model.body.limbs().iter().enumerate() {
@@ -168,7 +169,7 @@ mod tests {
         found
     }
 
-    /// Standard deviations of a forearm's end in frames of such edges.
+    /// Standard deviations of a forearm's distal end in frames with such edges.
     fn sigmas(frames: &[(&[Vec3], f64)]) -> Vec<f64> {
         let (model, poses) = standing();
         let lower = model.extremities[crate::testing::first_arm(&model)].lower;

@@ -1,10 +1,10 @@
-//! How far a pose may be off: covariances of limbs, joints and sites.
+//! Covariances of limb poses, joint angles and site positions.
 //!
-//! What is measured of a limb holds it as in the solver, but thousands of pixels are not thousands of measurements: they err
-//! alike, by how the limb differs from its model. So a limb's points count as so many independent ones at most, and the places
-//! of joints and sites in their limbs are known to a centimeter only. What a frame does not prove of a limb hardly counts.
-//! Every unknown of the chain also remembers how well it was known, and by how much it may have moved since: what nothing
-//! measures grows more uncertain with every frame.
+//! Measurements of a limb constrain it as in the solver, but thousands of pixels are not thousands of independent measurements:
+//! their errors are correlated through the difference between the limb and its model. So the number of independent points of a
+//! limb is limited, and the positions of joints and sites in their limbs are known only to one centimeter. Measurements of a limb
+//! that the frame does not confirm have little weight. Every unknown of the chain also keeps its earlier uncertainty, increased
+//! by its possible motion since: an unknown that nothing measures grows more uncertain with every frame.
 
 mod covariances;
 mod edge_filter;
@@ -22,46 +22,46 @@ use crate::solver::{ChainSolver, LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Contour, Regions, Sites, Surface, Term};
 
-/// So many surface points a meter of limb err independently at most.
+/// Maximum number of surface points per meter of limb with independent errors.
 const PATCHES_PER_METER: f64 = 50.0;
-/// Share of what is measured of a limb that counts where the frame does not prove the limb right.
+/// Weight of a limb's measurements where the frame does not confirm the limb.
 const UNPROVEN: f64 = 0.012;
-/// Unexpected motion of a joint in 1/30 s, as a share of what its `motion` allows.
+/// Unexpected motion of a joint in 1/30 s, as a fraction of what its `motion` allows.
 const USUAL_MOTION: f64 = 0.35;
-/// Standard deviation of an unknown at most: radians of a turn, meters of the root's place.
+/// Greatest standard deviation of an unknown: radians for rotations, meters for the root's position.
 const MAX_SIGMA: f64 = 0.5;
 
-/// How far a joint or site lies from its place in the limb, meters: models and persons differ by that. Of a body that was set,
-/// and of one that was found, whose sizes nobody told.
+/// Standard deviation of a joint's or site's position in its limb, meters: models and persons differ by this much. First for a
+/// body that the user set, then for an auto-initialized body of unknown size.
 const SITE_SIGMA: [f64; 2] = [0.01, 0.015];
 
-/// What is known of a pose, from frame to frame.
+/// Estimate of the uncertainty of a pose, updated from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Uncertainty {
     normal: NormalEquations,
     system: ChainSolver,
     spread: Spread,
-    /// Of every unknown, after the last frame.
+    /// Variance of every unknown after the last frame.
     variance: Vec<f64>,
     information: Vec<f64>,
-    /// Information of the relative length of every pair of limbs since the pose was set, and of this frame.
+    /// Information of the relative length of every pair of limbs: accumulated since the pose was set, and of this frame.
     known: Vec<f64>,
     length_information: Vec<f64>,
     work: Lengths,
 }
 
-/// A frame's pose and what speaks for it.
+/// A frame's pose and the measurements that support it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FittedPose<'a> {
-    /// What is tracked.
+    /// The tracked model.
     pub body: &'a Body,
-    /// Where it is, working frame.
+    /// Its poses, working frame.
     pub poses: &'a [Pose],
-    /// What was matched there.
+    /// Correspondences at these poses.
     pub correspondences: &'a Correspondences,
-    /// Limbs of one length that are refined.
+    /// Groups of limbs with a common length that is refined.
     pub pairs: &'a [Pair],
-    /// The sizes were found as well as the pose.
+    /// Whether the sizes were estimated along with the pose.
     pub sizes_found: bool,
     /// Seconds since the last frame, as multiples of 1/30 s.
     pub time_scale: f64,
@@ -70,13 +70,13 @@ pub(crate) struct FittedPose<'a> {
 }
 
 impl Uncertainty {
-    /// Nothing is known of the pose that comes next but that it was set.
+    /// Resets the estimate for a newly set pose.
     pub(crate) fn forget(&mut self) {
         self.variance.clear();
         self.known.clear();
     }
 
-    /// Covariances of a frame's pose; `proven` says of which limbs it shows that they are where they are thought to be.
+    /// Returns the covariances of a frame's pose; `proven` states which limbs the frame confirms at their estimated poses.
     pub(crate) fn estimate(
         &mut self,
         found: FittedPose,
@@ -115,7 +115,7 @@ impl Uncertainty {
         }
     }
 
-    /// Adds what the frame says of the limbs' lengths: frames err alike.
+    /// Adds the frame's information on the limbs' lengths; errors of successive frames are correlated.
     fn learn_lengths(&mut self, found: FittedPose) {
         let Self { system, known, length_information, work, .. } = self;
         work.information(system, found.body, found.poses, found.pairs, length_information);
@@ -125,7 +125,7 @@ impl Uncertainty {
         }
     }
 
-    /// Information of every unknown before the frame: as well as it was known, and moved since.
+    /// Returns the information of every unknown before the frame: that after the last frame, reduced by the motion since.
     fn expect(&mut self, found: FittedPose) {
         let Self { variance, information, .. } = self;
         let FittedPose { body, time_scale, config, .. } = found;
@@ -150,7 +150,7 @@ impl Uncertainty {
         }
     }
 
-    /// What the frame says of every limb, as far as its parts err independently.
+    /// Returns the frame's information on every limb, limited to the number of independent measurements.
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { body, poses, correspondences, config, .. } = found;
         let (information, scale) = (1.0 / (config.point_sigma * config.point_sigma), config.kernel_end);
@@ -179,7 +179,8 @@ mod tests {
     use crate::fit::Fit;
     use crate::testing::{before_wall, first_arm, standing, with_context, without_background};
 
-    /// What is told of the standing body in frames of which so many prove each limb; the sums of variances of every site.
+    /// Covariances of the standing body after each of `frames` frames, in which `proven` states whether a frame confirms a limb;
+    /// and the sums of variances of every site.
     fn estimated(
         frames: usize,
         sizes_found: bool,

@@ -1,7 +1,7 @@
-//! How well a pose explains a frame: one score for comparing hypotheses. In units of surface patches (weight one).
+//! Scores how well a pose explains a frame, to compare hypotheses. The unit is one surface patch (weight one).
 //!
-//! Points that no limb explains cost, and so does visible surface of the model where the camera sees past it. Either alone
-//! would be fooled: a limb hidden inside the torso contradicts nothing, a limb in empty space leaves few points unexplained.
+//! Points that no limb explains have a cost, and so does visible model surface that violates free space. Either term alone is
+//! insufficient: a limb hidden inside the torso violates nothing, and a limb in empty space leaves few points unexplained.
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Limb;
@@ -11,20 +11,20 @@ use crate::observation::depth_view::DepthViews;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
-/// A point this far from the model's surface is not explained by it, meters; and a camera sees past the surface where the background
-/// lies so much behind it, or twice as much behind it what may be the body.
+/// Distance from the model's surface at which a point counts as unexplained, meters. The surface violates free space where the
+/// background is this far behind it, or a possible body point twice as far.
 pub(crate) const EXPLAINED: f64 = 0.04;
-/// Cost of a patch that hides behind what is seen, in patches: less than one, since to be hidden is possible.
+/// Cost of an occluded patch, in patches: less than one, since occlusion is possible.
 const OCCLUDED_COST: f64 = 0.3;
 
 /// Patches of a limb that face a camera inside its image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Patches {
-    /// Those that a camera sees past.
+    /// Weight of patches that violate free space.
     pub free_space: f64,
-    /// Those behind what the camera sees.
+    /// Weight of patches behind the observed surface.
     pub occluded: f64,
-    /// All.
+    /// Weight of all patches.
     pub front_facing: f64,
 }
 
@@ -36,12 +36,13 @@ impl std::ops::AddAssign for Patches {
     }
 }
 
-/// What the cameras see of a limb.
+/// Visibility of a limb, summed over cameras.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Visibility {
-    /// By the area in the image.
+    /// Patches weighted by their area in the image.
     pub image: Patches,
-    /// As if the limb were seen from its side: to point along the ray hides nothing.
+    /// Patches weighted as if the limb were viewed from its side, so that pointing along the ray does not reduce the cost of
+    /// occlusion.
     pub side: Patches,
 }
 
@@ -53,13 +54,14 @@ impl std::ops::AddAssign for Visibility {
 }
 
 impl Visibility {
-    /// Cost in unexplained patches: to be seen past is as bad as to leave a patch unexplained, to hide is suspicious.
+    /// Returns the cost in unexplained patches: a free-space violation costs as much as an unexplained patch, an occluded patch
+    /// less.
     pub(crate) fn cost(&self) -> f64 {
         self.image.free_space + OCCLUDED_COST * self.side.occluded
     }
 }
 
-/// How much of a limb's surface is seen by the cameras and how much contradicted.
+/// Returns the patches of a limb's surface that are visible to the cameras, occluded, and in free space.
 pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Visibility {
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
     let mut found = Visibility::default();
@@ -68,7 +70,7 @@ pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb:
         for row in surface_rows(shape, &camera_from_limb) {
             let section = row.facing.section;
             let (a, b) = (section.a, section.b);
-            // A limb seen aslant covers so much less of the image, as the points seen on it do.
+            // A limb viewed obliquely covers less of the image, and yields fewer points by the same factor.
             let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
             let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
                 / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
@@ -162,7 +164,7 @@ mod tests {
             right.image.front_facing > 500.0 && right.image.free_space < 0.05 * right.image.front_facing,
             "{right:?}"
         );
-        // The farther aside, the more of it stands where the camera sees the wall.
+        // The farther the lateral offset, the more of the body is where the camera observes the wall.
         let mut last = right.cost();
         for shift in [0.1, 0.2, 0.4] {
             let aside: Vec<Pose> =

@@ -1,9 +1,9 @@
-//! What of an arm or leg the cameras see, and only it explains.
+//! Measures which parts of an arm or leg the cameras observe and only that limb explains.
 //!
-//! An arm put on the trunk fits the trunk's points, and every camera sees something where it is: neither proves it right. A
-//! place on its surface does when nothing of the posed body stands before it, the camera sees something there, and without
-//! this arm the body would leave that unexplained. The limbs of one arm or leg are no rivals of each other: they overlap at
-//! their joint.
+//! An arm placed on the trunk fits the trunk's points, and every camera observes some surface there, so neither confirms its
+//! pose. A point on its surface does if no other part of the posed body occludes it, the camera observes a surface there, and the
+//! body would leave that surface unexplained without this arm. Limbs of the same arm or leg do not compete with each other: they
+//! overlap at their joint.
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
@@ -15,30 +15,30 @@ use crate::visibility::render::LimbRaycaster;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 
-/// What the cameras say of a limb: shares of the places on its surface that face a camera. Of several cameras, the largest share
-/// of each.
+/// Evidence of the cameras on a limb: fractions of the points on its surface that face a camera. Of several cameras, the largest
+/// fraction counts for each.
 ///
-/// First of the whole limb, each place weighted with its distance from the proximal joint: that is the lever with which it
-/// holds the distal joint, and a place at the proximal joint says nothing of where the limb points. Then of the places in the
-/// outer two fifths alone: what hides in the trunk from the middle on may end anywhere in it.
+/// The first value is for the whole limb, with each point weighted by its distance from the proximal joint: this is its lever on
+/// the distal joint, and a point at the proximal joint does not constrain the limb's direction. The second is for the points in
+/// the outer two fifths alone: a limb that is hidden in the trunk from its middle on may end anywhere in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LimbSupport {
-    /// Seen where they are, and explained by no limb of another arm, leg or the trunk.
+    /// Fraction observed at the predicted depth and explained by no limb of the trunk or of another arm or leg.
     pub own: [f64; 2],
-    /// A camera sees past them: the space where they would be is free.
+    /// Fraction that violates free space.
     pub free_space: [f64; 2],
-    /// Some image says something about the limb.
+    /// Whether any image gives evidence for or against the limb.
     pub known: bool,
 }
 
 impl LimbSupport {
-    /// What speaks for the limb less what speaks against it.
+    /// Returns the evidence for the limb minus the evidence against it.
     pub(crate) fn net_support(&self) -> [f64; 2] {
         [self.own[0] - self.free_space[0], self.own[1] - self.free_space[1]]
     }
 }
 
-/// Looks at the upper and lower limbs of all `chains`; `supports` gets one entry a limb, `raycasters` is working memory.
+/// Evaluates the upper and lower limbs of all `chains`; `supports` gets one entry per limb, `raycasters` is working memory.
 pub(crate) fn measure_support(
     views: DepthViews,
     body: &Body,
@@ -68,7 +68,7 @@ pub(crate) fn measure_support(
     }
 }
 
-/// What one camera says of a limb of a chain.
+/// Returns the evidence of one camera on a limb of a chain.
 fn support_in_view(
     view: &DepthView,
     shape: &TaperedEllipticCylinder,
@@ -82,7 +82,7 @@ fn support_in_view(
     let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
     for row in surface_rows(shape, &camera_from_limb) {
         let t = row.t;
-        // The weights of all places add up to one, in the whole and in the outer part.
+        // The weights of all points sum to one, in the whole limb and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);
         let outer = if t > 0.5 { 1.0 / (outer_sections * ACROSS_LIMB.len()) as f64 } else { 0.0 };
         let count = |fractions: &mut [f64; 2]| *fractions = [fractions[0] + lever, fractions[1] + outer];

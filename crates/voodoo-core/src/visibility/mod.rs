@@ -1,7 +1,8 @@
-//! What cameras should see of a posed body, and what they do see of it.
+//! Predicts what cameras observe of a posed body and compares it with the images.
 //!
-//! `render` predicts a depth image, `evidence` says how well a pose explains the frame, `limb_support` what only one arm or leg
-//! explains, and `roundness` whether what is seen is round as limbs are; all of them look at the places of `surface`.
+//! `render` predicts a depth image, `evidence` scores how well a pose explains the frame, `limb_support` measures what only one
+//! arm or leg explains, and `roundness` checks whether the observed surface is round as limbs are. `evidence`, `limb_support` and
+//! `roundness` sample the points of `surface`.
 
 pub(crate) mod evidence;
 pub(crate) mod limb_support;
@@ -9,24 +10,25 @@ pub(crate) mod render;
 pub(crate) mod roundness;
 pub(crate) mod surface;
 
-/// At so many places along and across a limb its surface is compared with images.
+/// Number of sections along and of points across a limb at which its surface is compared with images.
 const SECTIONS: usize = 5;
-/// The outermost of those across, in shares of the radius from the middle: nearer to the rim, a pixel shows what lies beside it.
+/// Offset of the outermost points across a limb, as a fraction of its radius; nearer to the rim, a pixel may show the background.
 pub(crate) const LIMB_RIM: f64 = 0.6;
-/// Where they are along a limb, in shares of its length: evenly, and not at the ends, which belong to the neighbors as well.
+/// Sections along a limb, as fractions of its length: evenly spaced, without the ends, where limbs overlap with their neighbors.
 pub(crate) const ALONG_LIMB: [f64; SECTIONS] = middles();
-/// Where they are across a limb, in shares of its radius from the middle: evenly.
+/// Points across a limb, as fractions of its radius from the middle: evenly spaced.
 pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly();
-/// A smaller share of anything is little: of what a limb should show, of what it may be seen past, of a body that is hidden, of how
-/// round it is.
+/// Fractions below this count as small: of the expected visible surface, of free-space violations, of the hidden part of a body,
+/// and of roundness.
 pub(crate) const LITTLE: f64 = 0.3;
-/// Fewer patches flicker: shares are of so many at least. As many points make a limb measured where there is no depth image.
+/// Minimum number of patches that a fraction refers to, because fractions of fewer patches fluctuate. Without a depth image, a
+/// limb with as many points counts as measured.
 pub(crate) const FEW: f64 = 5.0;
-/// Surfaces of limbs lie in each other by so much at their joints, and touch elsewhere, meters: no less stands before another one,
-/// or where there is no room for it.
+/// Tolerance for the overlap of limb surfaces, meters: they overlap by this much at joints and where they touch. Only greater
+/// depths count as occlusion or as intersection.
 pub(crate) const OVERLAP: f64 = 0.01;
 
-/// The middles of as many equal parts of a length of one.
+/// Returns the midpoints of `SECTIONS` equal parts of the unit interval.
 const fn middles() -> [f64; SECTIONS] {
     let mut places = [0.0; SECTIONS];
     let mut index = 0;
@@ -37,7 +39,7 @@ const fn middles() -> [f64; SECTIONS] {
     places
 }
 
-/// As many places, evenly from one rim to the other.
+/// Returns `SECTIONS` evenly spaced values from one rim to the other.
 const fn evenly() -> [f64; SECTIONS] {
     let mut places = [0.0; SECTIONS];
     let (step, middle) = (2.0 * LIMB_RIM / (SECTIONS - 1) as f64, (SECTIONS - 1) as f64 / 2.0);

@@ -1,10 +1,10 @@
-//! The depth image that a camera should see of a posed body, and which limb each pixel shows: geometry, no drawing.
+//! Renders the depth image that a camera should observe of a posed body, and the limb that each pixel shows, by ray casting.
 //!
-//! Every pixel's ray meets the limbs whose silhouette can cover it. Along a ray `o + u (x, y, 1)`, `u` the depth, the side is
-//! `(X / a)² + (Y / b)² = 1` with X, Y, a and b linear in u. With the aspect `a / b` held fixed that is a quadratic; two
-//! rounds of it, the aspect taken where the last one ended, and two Newton steps on the true equation give the root to a
-//! micrometer. Rays near a silhouette's border, along the axis of a limb, and limbs whose aspect changes much go through
-//! [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
+//! The ray of every pixel is intersected with the limbs whose silhouette can cover the pixel. Along a ray `o + u (x, y, 1)`, with
+//! depth `u`, the lateral surface is `(X / a)² + (Y / b)² = 1` with X, Y, a and b linear in u. With a fixed aspect `a / b`, this
+//! is a quadratic. Two such solutions, each with the aspect at the end of the previous one, and two Newton steps on the exact
+//! equation give the root to a micrometer. Rays near a silhouette's border or along the axis of a limb, and limbs whose aspect
+//! changes much, use [`TaperedEllipticCylinder::cast_ray`], which is exact and fifty times slower.
 
 use rayon::prelude::*;
 
@@ -14,23 +14,24 @@ use crate::error::TrackError;
 use crate::math::{LANES, Pose, Vec3, is_rigid, widest};
 use crate::shape::TaperedEllipticCylinder;
 
-/// Mark of a pixel that shows no limb.
+/// Value of a pixel that shows no limb.
 pub const NO_LIMB: u16 = u16::MAX;
-/// Rows that one thread works on at a time: fixed, so that the work is cut the same way for any number of threads.
+/// Rows in one thread's unit of work: fixed, so that the work is split in the same way for any number of threads.
 const ROWS_TOGETHER: usize = LANES;
-/// The precision of predicted depths, of one meter. Bounds in the image are widened by as much, in units of `x / z`, against rounding,
-/// and a limb that comes nearer to the camera plane has none: every ray is tried.
+/// Precision of predicted depths, for a depth of one meter. Bounds in the image are widened by the same amount, in units of `x /
+/// z`, to allow for rounding. A limb that comes nearer to the camera plane than this has no bounds: every ray is tested.
 const PRECISION: f64 = f32::EPSILON as f64;
 /// Greatest `|ln(a0 b1 / (a1 b0))|` for which the aspect may be held fixed (method section 2).
 const PLAIN_ASPECT: f64 = 0.3;
-/// A ray whose least squared distance from the axis is within this share of the squared radius grazes the limb, and one whose squared
-/// way across the axis is a smaller share of that of the radius along it looks along the limb.
+/// Relative limit for rays that need the exact intersection. A ray grazes the limb if its least squared distance from the axis
+/// differs from the squared radius by less than this fraction. A ray runs along the limb if its squared slope across the axis is
+/// below this fraction of the squared ratio of radius to length.
 const GRAZING: f64 = 0.02;
 
-/// Where a depth camera stands and how its pixels look out.
+/// Pose and calibration of a depth camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewpoint<'a> {
-    /// Its calibration; a pixel to which the lens puts nothing sees nothing.
+    /// Calibration; pixels without a ray under the lens model stay empty.
     pub camera: &'a Camera,
     /// Pose of the camera's optical frame (x right, y down, z forward).
     pub world_from_sensor: Pose,
@@ -57,7 +58,7 @@ impl Viewpoint<'_> {
     }
 }
 
-/// What a camera should see; keeps its memory from image to image.
+/// A predicted depth image; its buffers are reused from image to image.
 #[derive(Clone, Debug, Default)]
 pub struct Rendering {
     width: usize,
@@ -67,12 +68,12 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    /// Depth along the optical axis, meters, row by row; 0 where no limb is seen.
+    /// Depth along the optical axis, meters, row by row; 0 where no limb is visible.
     pub fn depth(&self) -> &[f32] {
         &self.depth
     }
 
-    /// Index of the limb that each pixel shows, row by row; [`NO_LIMB`] where none is seen.
+    /// Index of the limb that each pixel shows, row by row; [`NO_LIMB`] where none is visible.
     pub fn limb(&self) -> &[u16] {
         &self.limb
     }
@@ -82,10 +83,10 @@ impl Rendering {
         self.width
     }
 
-    /// Predicts what `view` sees of `body` in the poses `world_from_limb`, one a limb.
+    /// Predicts the image that `view` observes of `body` in the poses `world_from_limb`, one per limb.
     ///
-    /// On the threads of `pool`, or on this one; the result is the same, bit by bit. A limb that the camera is inside of is
-    /// not seen from within. A second image of the same size allocates nothing on one thread.
+    /// Runs on the threads of `pool`, or on the calling thread; the result is bit-identical. A limb that contains the camera is
+    /// not visible from inside. A second image of the same size allocates nothing on one thread.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the poses or the camera cannot be used; the last image is kept then.
@@ -137,7 +138,7 @@ impl Rendering {
     }
 }
 
-/// A limb as one camera sees it.
+/// A limb as observed by one camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimbRaycaster {
     shape: TaperedEllipticCylinder,
@@ -149,12 +150,12 @@ pub(crate) struct LimbRaycaster {
     /// Least and greatest of the corners' coordinates.
     low: [f64; 2],
     high: [f64; 2],
-    /// The aspect changes little, and the camera is outside.
+    /// Whether the aspect changes little and the camera is outside.
     plain: bool,
 }
 
 impl LimbRaycaster {
-    /// The rays of one camera against a limb of this shape for a camera in this place.
+    /// Prepares the intersection of a camera's rays with a limb of this shape.
     pub(crate) fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();
         let mut corners = Some([[0.0; 2]; 8]);
@@ -191,10 +192,10 @@ impl LimbRaycaster {
         }
     }
 
-    /// Depth at which the ray through `(x / z, y / z)` meets the limb, meters; NaN where it does not.
+    /// Returns the depth at which the ray through `(x / z, y / z)` meets the limb, meters; NaN if it misses.
     #[inline(always)]
     pub(crate) fn depth_at(&self, x: f64, y: f64) -> f64 {
-        // Most rays pass far from most limbs.
+        // Most rays do not come near most limbs.
         let near = (x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]);
         if near { self.depth_within(x, y) } else { f64::NAN }
     }
@@ -211,7 +212,7 @@ impl LimbRaycaster {
         hit.map_or(f64::NAN, |hit| hit.distance / direction.length())
     }
 
-    /// Columns of a row that the limb can cover; all where straight lines may be seen bent.
+    /// Returns the columns of a row that the limb can cover; all of them where the lens may bend straight lines.
     fn span(&self, camera: &Camera, row: usize) -> (usize, usize) {
         let Some(corners) = self.corners.as_ref().filter(|_| !camera.distorts()) else { return (0, camera.width()) };
         let [_, y] = camera.pixel_ray(0, row);
@@ -244,7 +245,7 @@ impl LimbRaycaster {
         (start, end.max(start))
     }
 
-    /// Draws nearer what the limb hides in a band of rows that starts at row `top`.
+    /// Renders the limb where it is nearest, in a band of rows that starts at row `top`.
     #[inline(always)]
     fn fill(&self, view: &Viewpoint, top: usize, index: u16, depth: &mut [f32], limb: &mut [u16]) {
         let width = view.camera.width();
@@ -267,7 +268,7 @@ impl LimbRaycaster {
                 let count = LANES.min(end - start);
                 let pixels_here = depth[start..start + count].iter_mut().zip(&mut limb[start..start + count]);
                 for ((depth, limb), found) in pixels_here.zip(found) {
-                    // NaN: not met.
+                    // NaN: no intersection.
                     if found > 0.0 && (*limb == NO_LIMB || (found as f32) < *depth) {
                         (*depth, *limb) = (found as f32, index);
                     }
@@ -276,7 +277,7 @@ impl LimbRaycaster {
         }
     }
 
-    /// Depths at which rays meet the limb, NaN where they do not.
+    /// Returns the depths at which rays meet the limb; NaN for rays that miss.
     #[inline(always)]
     fn intersect(&self, x: &[f64; LANES], y: &[f64; LANES]) -> [f64; LANES] {
         let exact = |lane: usize| self.intersect_exactly(x[lane], y[lane]);
@@ -295,8 +296,8 @@ impl LimbRaycaster {
         found
     }
 
-    /// Depth at which a ray meets a limb of nearly fixed aspect from outside, NaN where it does not; and whether that is
-    /// unsure. No branches: it runs on several rays at once.
+    /// Returns the depth at which a ray meets a limb of nearly fixed aspect from outside, NaN if it misses, and whether that
+    /// result is uncertain. The code has no branches, so that it is vectorized over several rays.
     #[inline(always)]
     fn intersect_plain(&self, x: f64, y: f64) -> (f64, bool) {
         let select = |condition: bool, yes: f64, no: f64| if condition { yes } else { no };
@@ -306,7 +307,7 @@ impl LimbRaycaster {
         let (a0, b0) = (self.shape.a0(), self.shape.b0());
         let (da, db) = ((self.shape.a1() - a0) / length, (self.shape.b1() - b0) / length);
         let inside = |z: f64| select(z < 0.0, 0.0, select(z > length, length, z));
-        // Through the planes of the caps.
+        // Intersections with the planes of the caps.
         let (one, other) = (-o.z / d.z, (length - o.z) / d.z);
         let (enter, leave) = (select(one < other, one, other), select(one < other, other, one));
         let z = inside(o.z + enter * d.z);
@@ -326,9 +327,10 @@ impl LimbRaycaster {
             let discriminant = q * q - p * r;
             let radius = a0 + da * z;
             grazing = discriminant.abs() < GRAZING * p * radius * radius;
-            // Looking along the axis, a cone is no ellipse any more, and a ray hardly crosses a cylinder within its length.
+            // For rays along the axis, the section of a cone is no ellipse, and a ray hardly crosses a cylinder within its
+            // length.
             grazing |= p < GRAZING * (slope * slope + (radius / length) * (radius / length));
-            // A ray that misses comes nearest where the root's real part is.
+            // A ray that misses the limb comes nearest to it at the real part of the root.
             root = (-q - select(discriminant > 0.0, discriminant, 0.0).sqrt()) / p;
             root = select(discriminant >= 0.0, root, f64::NAN);
             let nearest = -q / p;

@@ -1,7 +1,7 @@
-//! Whether what a body was put on is round where its limbs are: a cupboard of a person's size is not.
+//! Checks whether the surface that a body was fitted to is round where its limbs are; a cupboard of a person's size is not.
 //!
-//! Points explained to a few centimeters and limbs seen where they are say little against a flat thing as large as a person. But
-//! from the middle of a limb towards its rims the surface of a body falls away from the camera, that of a door does not.
+//! Points explained to a few centimeters and limbs observed at their depths hardly rule out a flat object as large as a person.
+//! But the surface of a body recedes from the camera between the middle of a limb and its rims; that of a door does not.
 
 use crate::body::Body;
 use crate::math::Pose;
@@ -10,11 +10,11 @@ use crate::visibility::ACROSS_LIMB;
 use crate::visibility::evidence::EXPLAINED;
 use crate::visibility::surface::surface_rows;
 
-/// By how much the seen surface falls away from the cameras between the middle of limbs and their rims, in units of what the
-/// model's does: about one on a body, zero on a plane; `None` when the images show too little of it.
+/// Returns how far the observed surface recedes between the middle of limbs and their rims, relative to the model: approximately
+/// one on a body, zero on a plane; `None` when the images show too little of it.
 ///
-/// The least-squares factor between both over all places where middle and rims are seen near the model. Half the sum of the
-/// two rims is taken, so that a limb that points towards the camera, or is seen aslant, falls away no more than another.
+/// The result is the least-squares factor between both over all sections where the middle and the rims are observed near the
+/// model. The two rims are averaged, so that the direction of a limb relative to the camera has no effect.
 pub(crate) fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> {
     let (mut product, mut square) = (0.0, 0.0);
     for view in views.iter() {

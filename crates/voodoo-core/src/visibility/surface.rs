@@ -1,4 +1,4 @@
-//! Places on the surface of a limb that face a camera, and what the camera shows there: the one walk over a limb's surface.
+//! Samples points on the surface of a limb that face a camera, and classifies what the camera observes there.
 
 use crate::math::{Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
@@ -6,30 +6,30 @@ use crate::shape::{FacingSection, TaperedEllipticCylinder};
 use crate::visibility::ALONG_LIMB;
 use crate::visibility::evidence::EXPLAINED;
 
-/// What a camera says about a place on the model's surface.
+/// What a camera observes at a point on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PatchVisibility {
-    /// Outside the image, or no return.
+    /// The point is outside the image, or the pixel has no return.
     Unknown,
-    /// Behind what is seen.
+    /// The point is behind the observed surface.
     Occluded,
-    /// Seen where it is.
+    /// The point is observed at its depth.
     Consistent,
-    /// The camera sees past it.
+    /// The point violates free space: the camera observes a surface behind it.
     FreeSpace,
 }
 
-/// A place on a limb's surface.
+/// A point on a limb's surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePlace {
-    /// Camera frame, meters.
+    /// Position, camera frame, meters.
     pub point: Vec3,
-    /// What is seen in its pixel.
+    /// Observation in its pixel.
     pub pixel: Pixel,
 }
 
 impl SurfacePlace {
-    /// What the camera says about it.
+    /// Classifies the point by what the camera observes.
     #[inline]
     pub(crate) fn sight(&self) -> PatchVisibility {
         let surface = self.point.z;
@@ -47,7 +47,7 @@ impl SurfacePlace {
         }
     }
 
-    /// Depth of what may be the body, if it is seen less than `tolerance` before or behind the place, meters.
+    /// Returns the depth of a possible body point observed within `tolerance` of the point's depth, meters.
     #[inline]
     pub(crate) fn depth_within(&self, tolerance: f64) -> Option<f64> {
         match self.pixel {
@@ -57,31 +57,32 @@ impl SurfacePlace {
     }
 }
 
-/// What of a limb faces a camera, at one place along it.
+/// Part of a limb that faces a camera, in one section along it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceRow<'a> {
-    /// Share of the limb's length, from its proximal end.
+    /// Position along the limb as a fraction of its length, from the proximal end.
     pub t: f64,
-    /// The section there.
+    /// Cross-section there.
     pub facing: FacingSection,
     camera_from_limb: &'a Pose,
 }
 
 impl SurfaceRow<'_> {
-    /// Places across it, camera frame, meters; in shares of the radius from the middle, see [`FacingSection::point`].
+    /// Returns points across it, camera frame, meters, for offsets as fractions of the radius from the middle; see
+    /// [`FacingSection::point`].
     #[inline]
     pub(crate) fn points<const N: usize>(&self, across: [f64; N]) -> [Vec3; N] {
         across.map(|s| *self.camera_from_limb * self.facing.point(s))
     }
 
-    /// The same with what a camera shows there.
+    /// Like `points`, with what a camera observes there.
     #[inline]
     pub(crate) fn places<const N: usize>(&self, view: &DepthView, across: [f64; N]) -> [SurfacePlace; N] {
         self.points(across).map(|point| SurfacePlace { point, pixel: view.at(point) })
     }
 }
 
-/// The rows at [`ALONG_LIMB`] of a limb; those along whose axis the camera looks are left out.
+/// Returns the sections at [`ALONG_LIMB`] of a limb, without those where the camera looks along the axis.
 #[inline]
 pub(crate) fn surface_rows<'a>(
     shape: &'a TaperedEllipticCylinder,
