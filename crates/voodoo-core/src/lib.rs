@@ -184,7 +184,7 @@ pub mod kinematics {
     pub use crate::body::kinematics::{exp, hinge_axis, joint_turn, place};
 }
 
-pub use body::{Body, HumanModel, Joint, JointKind, Limb, Site};
+pub use body::{Body, HumanModel, Joint, JointKind, Limb, LimbRole, Roles, Side, Site};
 pub use camera::{Camera, Lens};
 pub use config::{Config, ConfigError, Field, Overlap, RawValue, SolverKind, Value};
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};

@@ -17,7 +17,8 @@ pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub(crate) use model::Model;
 pub(crate) use pose_prior::squared_mahalanobis;
-pub(crate) use roles::{JointRole, LimbRole, Roles, Side};
+pub(crate) use roles::JointRole;
+pub use roles::{LimbRole, Roles, Side};
 
 use crate::error::BodyError;
 use crate::math::{Pose, Vec3, is_place, is_rigid};
@@ -83,7 +84,7 @@ impl Body {
     }
 
     /// The roles of its limbs, joints and sites on a human.
-    pub(crate) fn roles(&self) -> &Roles {
+    pub fn roles(&self) -> &Roles {
         &self.roles
     }
 

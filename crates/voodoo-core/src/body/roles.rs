@@ -8,22 +8,26 @@ use crate::error::BodyError;
 
 /// Side of the body, as the person's own left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
+pub enum Side {
     /// Names that begin with `l_`.
     Left,
     /// Names that begin with `r_`.
     Right,
 }
 
-#[cfg(test)]
 impl Side {
     /// Left, right.
     pub(crate) const BOTH: [Self; 2] = [Self::Left, Self::Right];
+
+    /// The side of a limb, joint or site with this name.
+    pub fn of(name: &str) -> Option<Self> {
+        split(name).0
+    }
 }
 
 /// A limb of the human.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum LimbRole {
+pub enum LimbRole {
     /// `pelvis`
     Pelvis,
     /// `thorax`; or `torso`, the whole trunk.
@@ -48,15 +52,19 @@ pub(crate) enum LimbRole {
     Foot(Side),
 }
 
-/// A joint of the human, or the site at its center (H-Anim names).
+/// A joint of the human, or a site: that at a joint's center, or one of those that detectors report beside them (H-Anim names).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum JointRole {
+    /// `humanoid_root`
+    Root,
     /// `vl3`
     Waist,
     /// `vc7`
     NeckBase,
     /// `skullbase`
     SkullBase,
+    /// `head_center`
+    HeadCenter,
     /// `l_sternoclavicular`
     Sternoclavicular(Side),
     /// `l_shoulder`
@@ -65,6 +73,8 @@ pub(crate) enum JointRole {
     Elbow(Side),
     /// `l_wrist`
     Wrist(Side),
+    /// `l_hand`
+    Hand(Side),
     /// `l_hip`
     Hip(Side),
     /// `l_knee`
@@ -93,7 +103,7 @@ impl LimbRole {
     }
 
     /// The side of a limb that exists on both sides.
-    pub(crate) fn side(self) -> Option<Side> {
+    pub fn side(self) -> Option<Side> {
         match self {
             Self::Pelvis | Self::Thorax | Self::Neck | Self::Head => None,
             Self::Clavicle(side)
@@ -108,16 +118,19 @@ impl LimbRole {
 }
 
 impl JointRole {
-    fn from_name(name: &str) -> Option<Self> {
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
         let (side, stem) = split(name);
         Some(match (stem, side) {
+            ("humanoid_root", None) => Self::Root,
             ("vl3", None) => Self::Waist,
             ("vc7", None) => Self::NeckBase,
             ("skullbase", None) => Self::SkullBase,
+            ("head_center", None) => Self::HeadCenter,
             ("sternoclavicular", Some(side)) => Self::Sternoclavicular(side),
             ("shoulder", Some(side)) => Self::Shoulder(side),
             ("elbow", Some(side)) => Self::Elbow(side),
             ("wrist", Some(side)) => Self::Wrist(side),
+            ("hand", Some(side)) => Self::Hand(side),
             ("hip", Some(side)) => Self::Hip(side),
             ("knee", Some(side)) => Self::Knee(side),
             ("ankle", Some(side)) => Self::Ankle(side),
@@ -128,11 +141,12 @@ impl JointRole {
     /// The side of a joint that exists on both sides.
     pub(crate) fn side(self) -> Option<Side> {
         match self {
-            Self::Waist | Self::NeckBase | Self::SkullBase => None,
+            Self::Root | Self::Waist | Self::NeckBase | Self::SkullBase | Self::HeadCenter => None,
             Self::Sternoclavicular(side)
             | Self::Shoulder(side)
             | Self::Elbow(side)
             | Self::Wrist(side)
+            | Self::Hand(side)
             | Self::Hip(side)
             | Self::Knee(side)
             | Self::Ankle(side) => Some(side),
@@ -156,7 +170,7 @@ impl JointRole {
 
 /// The roles of the limbs, joints and sites of a body on a human. They follow from names and do not depend on sizes.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Roles {
+pub struct Roles {
     human: bool,
     /// For each limb: its role, the role of the joint to its parent, and the site named like that joint.
     limbs: Vec<Option<LimbRole>>,
@@ -238,7 +252,7 @@ impl Roles {
     }
 
     /// The role of a limb.
-    pub(crate) fn limb(&self, limb: usize) -> Option<LimbRole> {
+    pub fn limb(&self, limb: usize) -> Option<LimbRole> {
         self.limbs.get(limb).copied().flatten()
     }
 

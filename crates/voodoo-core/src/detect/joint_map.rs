@@ -2,25 +2,15 @@
 
 use super::skeleton::Skeleton;
 use super::{DetectedJoint, Detection};
-use crate::body::Body;
+use crate::body::{Body, JointRole, Side};
 
-/// The site that gives a body's position (H-Anim).
-const ROOT: &str = "humanoid_root";
-/// Joints that give the trunk's position and orientation, without their side.
-const TRUNK: [&str; 2] = ["shoulder", "hip"];
-const LEGS: [&str; 2] = ["knee", "ankle"];
-const ARMS: [&str; 2] = ["elbow", "wrist"];
-const ANKLES: [&str; 1] = ["ankle"];
-/// The length of a limb, by the joint to its parent. Limbs on other joints belong to the trunk.
-const LENGTH_OF_LIMB: [(&str, &str); 6] = [
-    ("sternoclavicular", "shoulder_width"),
-    ("shoulder", "upper_arm"),
-    ("elbow", "forearm"),
-    ("hip", "thigh"),
-    ("knee", "shank"),
-    ("vc7", "neck"),
-];
-const TRUNK_LENGTH: &str = "trunk";
+/// A joint that exists on both sides.
+type SideJoint = fn(Side) -> JointRole;
+/// Joints that give the trunk's position and orientation.
+const TRUNK: [SideJoint; 2] = [JointRole::Shoulder, JointRole::Hip];
+const LEGS: [SideJoint; 2] = [JointRole::Knee, JointRole::Ankle];
+const ARMS: [SideJoint; 2] = [JointRole::Elbow, JointRole::Wrist];
+const ANKLES: [SideJoint; 1] = [JointRole::Ankle];
 const STATURE: &str = "stature";
 
 /// Mapping of a detector's joints and lengths to a body. Joints and lengths are numbered in the detector's order.
@@ -48,40 +38,37 @@ impl JointMap {
     /// Resolves joints and lengths with these names on a body.
     pub(crate) fn new(body: &Body, joints: &[String], lengths: &[String]) -> Self {
         let sites: Vec<Option<usize>> = joints.iter().map(|name| body.site_index(name).ok()).collect();
-        let number = |name: &str| joints.iter().position(|joint| joint == name);
-        let joint = |name: &str| number(name).filter(|index| sites[*index].is_some());
+        let named: Vec<Option<JointRole>> = joints.iter().map(|name| JointRole::from_name(name)).collect();
+        let joint =
+            |role: JointRole| (0..sites.len()).find(|index| named[*index] == Some(role) && sites[*index].is_some());
+        let joint_of_site = |site: usize| sites.iter().position(|own| *own == Some(site));
         let length = |name: &str| lengths.iter().position(|length| length == name);
         // Left before right, because sums depend on the order.
-        let of_sides = |stems: &[&str]| -> Vec<usize> {
-            stems.iter().flat_map(|stem| ["l", "r"].map(|side| joint(&format!("{side}_{stem}")))).flatten().collect()
+        let of_sides = |of: &[SideJoint]| -> Vec<usize> {
+            of.iter().flat_map(|of| Side::BOTH.map(|side| joint(of(side)))).flatten().collect()
         };
         let mut trunk = of_sides(&TRUNK);
         if trunk.is_empty() {
             trunk = (0..joints.len()).filter(|index| sites[*index].is_some()).collect();
         }
-        let hangs_by = |limb: usize| body.limbs()[limb].parent.as_ref().map(|(_, joint)| joint.name.as_str());
+        let roles = body.roles();
         let limbs = 0..body.limbs().len();
         let on_limb = |limb: usize| {
-            let own =
-                body.sites().iter().filter(|site| site.limb == limb && hangs_by(limb) != Some(site.name.as_str()));
-            own.filter_map(|site| number(&site.name)).collect()
-        };
-        let length_of_limb = |limb: usize| {
-            let joint = hangs_by(limb).unwrap_or_default();
-            let stem = joint.trim_start_matches("l_").trim_start_matches("r_");
-            let name = LENGTH_OF_LIMB.iter().find(|(by, _)| *by == stem).map_or(TRUNK_LENGTH, |(_, name)| name);
-            length(name)
+            let own = body.sites().iter().enumerate().filter(|(_, site)| site.limb == limb);
+            own.filter(|(site, _)| roles.joint_site(limb) != Some(*site))
+                .filter_map(|(site, _)| joint_of_site(site))
+                .collect()
         };
         Self {
             skeleton: Skeleton::new(joint, length),
-            root: joint(ROOT),
+            root: joint(JointRole::Root),
             trunk,
             legs: of_sides(&LEGS),
             arms: of_sides(&ARMS),
             ankles: of_sides(&ANKLES),
-            hangs_by: limbs.clone().map(|limb| hangs_by(limb).and_then(number)).collect(),
+            hangs_by: limbs.clone().map(|limb| roles.joint_site(limb).and_then(joint_of_site)).collect(),
             on_limb: limbs.clone().map(on_limb).collect(),
-            length_of_limb: limbs.map(length_of_limb).collect(),
+            length_of_limb: limbs.map(|limb| length(length_of(roles.joint(limb)))).collect(),
             stature: length(STATURE),
             lengths: lengths.len(),
             sites,
@@ -121,6 +108,19 @@ impl JointMap {
     /// The joint that is the body's root, if the detector reports it.
     pub(super) fn root(&self) -> Option<usize> {
         self.root
+    }
+}
+
+/// The name of a limb's length, by the joint to its parent. Limbs on other joints belong to the trunk.
+fn length_of(joint: Option<JointRole>) -> &'static str {
+    match joint {
+        Some(JointRole::Sternoclavicular(_)) => "shoulder_width",
+        Some(JointRole::Shoulder(_)) => "upper_arm",
+        Some(JointRole::Elbow(_)) => "forearm",
+        Some(JointRole::Hip(_)) => "thigh",
+        Some(JointRole::Knee(_)) => "shank",
+        Some(JointRole::NeckBase) => "neck",
+        _ => "trunk",
     }
 }
 

@@ -1,6 +1,7 @@
 //! Moves a person's joints to the distances that their sizes require. A detector that regresses each joint independently reports
 //! the mean of its possible positions, which makes limbs too short.
 
+use crate::body::{JointRole, Side};
 use crate::math::Vec3;
 
 /// Names of the lengths that constrain joints, in this order. [`Skeleton::new`] maps them to pairs of joints.
@@ -25,15 +26,15 @@ pub(super) struct Skeleton {
 }
 
 impl Skeleton {
-    /// Resolves the indices from H-Anim joint names and from names of lengths.
-    pub(super) fn new(joint: impl Fn(&str) -> Option<usize>, length: impl Fn(&str) -> Option<usize>) -> Self {
-        let of_side = |side: &str, stem: &str| joint(&format!("{side}_{stem}"));
+    /// Resolves the indices from the joints' roles and from names of lengths.
+    pub(super) fn new(joint: impl Fn(JointRole) -> Option<usize>, length: impl Fn(&str) -> Option<usize>) -> Self {
+        use JointRole::{Ankle, Elbow, Hand, HeadCenter, Hip, Knee, NeckBase, Root, Shoulder, Wrist};
         Self {
-            root: joint("humanoid_root"),
-            top: joint("vc7"),
-            head: joint("head_center"),
-            arms: ["l", "r"].map(|side| ["shoulder", "elbow", "wrist", "hand"].map(|stem| of_side(side, stem))),
-            legs: ["l", "r"].map(|side| ["hip", "knee", "ankle"].map(|stem| of_side(side, stem))),
+            root: joint(Root),
+            top: joint(NeckBase),
+            head: joint(HeadCenter),
+            arms: Side::BOTH.map(|side| [Shoulder, Elbow, Wrist, Hand].map(|of| joint(of(side)))),
+            legs: Side::BOTH.map(|side| [Hip, Knee, Ankle].map(|of| joint(of(side)))),
             lengths: LENGTHS.map(length),
         }
     }
@@ -145,7 +146,8 @@ mod tests {
     ];
 
     fn skeleton(names: &[&str]) -> Skeleton {
-        Skeleton::new(|name| names.iter().position(|joint| *joint == name), |_| None)
+        let joint = |role| names.iter().position(|name| JointRole::from_name(name) == Some(role));
+        Skeleton::new(joint, |_| None)
     }
 
     fn joints() -> Vec<Option<Vec3>> {

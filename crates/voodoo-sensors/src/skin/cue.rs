@@ -15,6 +15,7 @@ use crate::skin::picture::Picture;
 use crate::skin::rules::{Expected, LimbDistances, SightContext, of_pieces};
 use crate::skin::teacher::Teacher;
 use voodoo_core::PointSlice;
+use voodoo_core::Side;
 use voodoo_core::TrackError;
 use voodoo_core::Tracker;
 use voodoo_core::math::Vec3;
@@ -36,7 +37,7 @@ const NEAREST_SITE: f64 = 0.1;
 /// Parameters that turn skin regions into rays.
 #[derive(Clone, Debug)]
 pub struct SkinSettings {
-    /// Names of the sites; those of hands start with the letter of their side, as do the names of their limbs.
+    /// Names of the sites; those of hands start with `l_` or `r_`.
     pub sites: Vec<String>,
     /// Gate of a new region around the predicted site, meters.
     pub gate: f64,
@@ -58,10 +59,9 @@ impl SkinSettings {
         self.sites.get(site).is_some_and(|name| name.starts_with("head"))
     }
 
-    /// Prefix of the limb names of the site's side.
-    fn side(&self, site: usize) -> &str {
-        let name = self.sites.get(site).map_or("", String::as_str);
-        name.split_at_checked(1).map_or(name, |(side, _)| side)
+    /// The side of a hand.
+    fn side(&self, site: usize) -> Option<Side> {
+        self.sites.get(site).and_then(|name| Side::of(name))
     }
 }
 
@@ -113,8 +113,9 @@ impl SkinInput<'_> {
     /// Distances of positions from the surfaces of the body's limbs.
     fn limb_distances(&self, places: &[[f64; 3]]) -> Result<LimbDistances, TrackError> {
         let Some(tracker) = self.tracker else { return Ok(LimbDistances::default()) };
-        let names = tracker.body().limbs().iter().map(|limb| limb.name.clone()).collect();
-        Ok(LimbDistances { names, away: tracker.limb_distances(PointSlice::F64(places))?.concat() })
+        let body = tracker.body();
+        let roles = (0..body.limbs().len()).map(|limb| body.roles().limb(limb)).collect();
+        Ok(LimbDistances { roles, away: tracker.limb_distances(PointSlice::F64(places))?.concat() })
     }
 
     /// Distances of positions from the nearest other person; `None` without other persons.
@@ -224,7 +225,7 @@ impl SkinCue {
             unexplained: self.settings.unexplained as f32,
         };
         let theirs = |index: usize| {
-            let known = others.as_ref().filter(|_| !limbs.names.is_empty());
+            let known = others.as_ref().filter(|_| !limbs.roles.is_empty());
             known.is_some_and(|others| sights[index].deep && others[index] < limbs.nearest(index))
         };
         let theirs: Vec<bool> = (0..count).map(theirs).collect();

@@ -2,11 +2,8 @@
 
 use crate::skin::blobs::{Blob, Sight};
 use voodoo_core::math::Vec3;
+use voodoo_core::{LimbRole, Side};
 
-/// Name endings of the limbs with bare skin.
-const BARE_LIMBS: [&str; 5] = ["head", "neck", "upperarm", "forearm", "hand"];
-/// Name endings of the limbs that carry a hand.
-const OWN_LIMBS: [&str; 2] = ["forearm", "hand"];
 /// A region within this distance of the bare limbs may belong to them, meters.
 const BARE: f32 = 0.08;
 /// A hand before the trunk or the legs is at least this far in front of them, meters; a stripe of a shirt is not.
@@ -72,31 +69,38 @@ impl Expected {
     }
 }
 
-/// Distances of all candidates from the surfaces of limbs, by limb name, meters.
+/// Distances of all candidates from the surfaces of limbs, meters.
 #[derive(Clone, Debug, Default)]
 pub struct LimbDistances {
-    /// Limb names, such as `l_forearm`.
-    pub names: Vec<String>,
+    /// Roles of the limbs on a human.
+    pub roles: Vec<Option<LimbRole>>,
     /// For each limb one distance per candidate.
     pub away: Vec<f32>,
 }
 
 impl LimbDistances {
     /// Distance of a candidate from the nearest of the chosen limbs; infinite if none is chosen.
-    pub(super) fn least(&self, sight: usize, chosen: impl Fn(&str) -> bool) -> f32 {
-        let count = self.away.len() / self.names.len().max(1);
-        let limbs = self.names.iter().enumerate().filter(|(_, name)| chosen(name));
+    pub(super) fn least(&self, sight: usize, chosen: impl Fn(Option<LimbRole>) -> bool) -> f32 {
+        let count = self.away.len() / self.roles.len().max(1);
+        let limbs = self.roles.iter().enumerate().filter(|(_, role)| chosen(**role));
         limbs.fold(f32::INFINITY, |least, (limb, _)| least.min(self.away[limb * count + sight]))
     }
 
     /// Distance of a candidate from the nearest of all limbs; zero if no distances are known.
     pub(super) fn nearest(&self, sight: usize) -> f32 {
-        if self.names.is_empty() { 0.0 } else { self.least(sight, |_| true) }
+        if self.roles.is_empty() { 0.0 } else { self.least(sight, |_| true) }
     }
 }
 
-fn is_bare(limb: &str) -> bool {
-    BARE_LIMBS.iter().any(|ending| limb.ends_with(ending))
+/// Whether the skin of a limb may be bare.
+fn is_bare(limb: Option<LimbRole>) -> bool {
+    use LimbRole::{Forearm, Hand, Head, Neck, UpperArm};
+    matches!(limb, Some(Head | Neck | UpperArm(_) | Forearm(_) | Hand(_)))
+}
+
+/// Whether a limb carries the hand of this side.
+fn carries_hand(limb: Option<LimbRole>, side: Side) -> bool {
+    matches!(limb, Some(LimbRole::Forearm(own) | LimbRole::Hand(own)) if own == side)
 }
 
 /// The candidates of a frame and what is known of them.
@@ -121,7 +125,7 @@ impl SightContext<'_> {
     /// legs, because they show no skin.
     pub(super) fn allowed(&self, site: &Expected, inside: &[Vec3]) -> Vec<u8> {
         let owned = |region| self.blobs.iter().any(|blob| blob.label.is_some() && blob.sight.region == region);
-        let has_bare = self.limbs.names.iter().any(|name| is_bare(name));
+        let has_bare = self.limbs.roles.iter().any(|role| is_bare(*role));
         let mut allowed: Vec<u8> = Vec::with_capacity(self.sights.len());
         for (index, sight) in self.sights.iter().enumerate() {
             let away = self.limbs.nearest(index);
@@ -165,13 +169,13 @@ impl SightContext<'_> {
     }
 
     /// For each candidate, whether it is the surface of a limb other than the hand's own forearm, or of a bare one if the arm is
-    /// lost. `side` is the prefix of the limb names of the hand's side.
-    pub(super) fn elsewhere(&self, site: &Expected, side: &str) -> Vec<bool> {
-        let own = |name: &str| name.starts_with(side) && OWN_LIMBS.iter().any(|ending| name.ends_with(ending));
-        if site.head || !self.limbs.names.iter().any(|name| own(name)) {
+    /// lost. `side` is the hand's side.
+    pub(super) fn elsewhere(&self, site: &Expected, side: Option<Side>) -> Vec<bool> {
+        let own = |limb| side.is_some_and(|side| carries_hand(limb, side));
+        if site.head || !self.limbs.roles.iter().any(|role| own(*role)) {
             return vec![false; self.sights.len()];
         }
-        let other = |name: &str| !own(name) && (!site.arm_lost || is_bare(name));
+        let other = |limb| !own(limb) && (!site.arm_lost || is_bare(limb));
         let judge = |(index, sight): (usize, &Sight)| {
             let others = self.limbs.least(index, other);
             sight.deep && others < ON_LIMB && self.limbs.least(index, own) > others + OFF_LIMB
@@ -247,8 +251,8 @@ mod tests {
     #[test]
     fn what_lies_on_another_limb_is_no_hand() {
         let sight = Sight { direction: Vec3::X, place: Vec3::X, deep: true, hand: true, region: 1, still: false };
-        let names = ["thorax", "l_forearm", "head"].map(String::from).to_vec();
-        let limbs = LimbDistances { names, away: vec![0.0, 0.5, 0.2, 0.01, 0.4, 0.0] };
+        let roles = [LimbRole::Thorax, LimbRole::Forearm(Side::Left), LimbRole::Head].map(Some).to_vec();
+        let limbs = LimbDistances { roles, away: vec![0.0, 0.5, 0.2, 0.01, 0.4, 0.0] };
         let sight_context =
             SightContext { sights: &[sight; 2], blobs: &[], specks: &[false; 2], limbs: &limbs, unexplained: 0.06 };
         let site = Expected {
@@ -259,10 +263,10 @@ mod tests {
             arm_lost: false,
             upper_arm_visible: false,
         };
-        assert_eq!(sight_context.elsewhere(&site, "l"), [true, false]);
-        assert_eq!(sight_context.elsewhere(&site, "r"), [false, false], "it has no forearm");
+        assert_eq!(sight_context.elsewhere(&site, Some(Side::Left)), [true, false]);
+        assert_eq!(sight_context.elsewhere(&site, Some(Side::Right)), [false, false], "it has no forearm");
         let lost = Expected { arm_lost: true, ..site };
-        assert_eq!(sight_context.elsewhere(&lost, "l"), [false, false], "a thorax shows no skin");
+        assert_eq!(sight_context.elsewhere(&lost, Some(Side::Left)), [false, false], "a thorax shows no skin");
         assert_eq!(sight_context.allowed(&site, &[Vec3::X; 2]), [1, 1]);
         assert_eq!(SightContext { unexplained: -0.1, ..sight_context }.allowed(&site, &[Vec3::X; 2]), [2, 2]);
     }
