@@ -4,6 +4,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 import voodoo
 from lab_scripts import load_experiment
@@ -18,6 +19,7 @@ def load():
     return load_experiment("failures")
 
 
+@pytest.mark.long
 def test_only_what_is_lost_gets_a_picture(monkeypatch):
     failures = load()
     assert failures.worst(voodoo.open_recording(BUNDLED, use=("depth",))) is None

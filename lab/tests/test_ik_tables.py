@@ -34,7 +34,8 @@ def means(found, truth):
     return np.array([np.mean([errors[f"{side}_{joint}"] for side in "lr"]) for joint in ("elbow", "knee")])
 
 
-@pytest.mark.parametrize("name", ["dev_03_punch", pytest.param("dev_05_walk", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["dev_03_punch", "dev_05_walk"])
 def test_images_halve_the_error_of_the_inner_joints(sequence, solved, name):
     plain, one, two = (solved(name, views) for views in (0, 1, 2))
     for found in (one, two):
@@ -55,7 +56,8 @@ def test_images_halve_the_error_of_the_inner_joints(sequence, solved, name):
             assert (sequence.side[frame].distance[v[observed], u[observed]] < -1.0).all(), (frame, joint)
 
 
-@pytest.mark.parametrize("name", [pytest.param("dev_03_punch", marks=pytest.mark.long), "dev_07_sword_cmu"])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["dev_03_punch", "dev_07_sword_cmu"])
 def test_the_mean_posture_helps_where_one_view_does_not_report(solved, name):
     alone = solved(name, 1)
     plain, one, two = (solved(name, views, rest="mean") for views in (0, 1, 2))
@@ -67,11 +69,13 @@ def test_the_mean_posture_helps_where_one_view_does_not_report(solved, name):
         assert one[1] - two[1] < 0.55 * (alone[1] - without[1]) and (one < 0.5 * plain).all()
 
 
+@pytest.mark.long
 def test_depths_report_of_arms_before_the_trunk(solved):
     outline, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
     assert deep[0] < 0.5 * outline[0] and deep[1] < outline[1] + 0.001
 
 
+@pytest.mark.long
 def test_one_view_leaves_open_what_it_cannot_see(sequence, monkeypatch):
     monkeypatch.setattr(ik_open, "EVERY", 8)
 
