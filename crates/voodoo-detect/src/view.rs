@@ -88,13 +88,8 @@ impl ThinnedImage {
 
     /// The pixel in the direction `(x/z, y/z)`.
     pub(crate) fn pixel_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
-        let camera = self.camera.as_ref()?;
-        if camera.distorts() {
-            let [column, row] = camera.pixel([f64::from(x), f64::from(y)])?;
-            return self.index(column as f32, row as f32);
-        }
-        let ([fx, fy], [cx, cy]) = (camera.focal().map(|f| f as f32), camera.center().map(|c| c as f32));
-        self.index(fx * x + cx, fy * y + cy)
+        let [column, row] = self.camera.as_ref()?.pixel([f64::from(x), f64::from(y)])?;
+        self.index(column as f32, row as f32)
     }
 
     fn index(&self, column: f32, row: f32) -> Option<usize> {

@@ -62,19 +62,8 @@ impl Background {
         let turn = glam_columns(&moved);
         let camera = image.camera;
         let width = camera.width();
-        let ([fx, fy], [cx, cy]) = (camera.focal().map(|f| f as f32), camera.center().map(|c| c as f32));
-        let center = |index: usize| match camera.distorts() {
-            true => camera.rays()[index],
-            false => [((index % width) as f32 - cx) / fx, ((index / width) as f32 - cy) / fy],
-        };
-        let view_at = |ray: [f32; 2]| {
-            if camera.distorts() {
-                return camera.index_of(Vec3::new(f64::from(ray[0]), f64::from(ray[1]), 1.0));
-            }
-            let (column, row) = ((fx * ray[0] + cx).round(), (fy * ray[1] + cy).round());
-            let inside = column >= 0.0 && column < width as f32 && row >= 0.0 && row < camera.height() as f32;
-            inside.then(|| row as usize * width + column as usize)
-        };
+        let center = |index: usize| camera.pixel_ray(index % width, index / width).map(|value| value as f32);
+        let view_at = |[x, y]: [f32; 2]| camera.index_of(Vec3::new(f64::from(x), f64::from(y), 1.0));
         let (old, old_rays) = (std::mem::take(&mut self.depth), std::mem::take(&mut self.rays));
         self.depth.resize(old.len(), 0.0);
         self.rays.resize(old.len(), NO_RAY);
