@@ -42,6 +42,13 @@ pub(crate) const MAX_SIZE: f64 = 1e3;
 pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
 
 /// Why a shape was rejected.
+///
+/// ```
+/// use voodoo_core::{ShapeError, TaperedEllipticCylinder};
+///
+/// let refused = TaperedEllipticCylinder::new(-0.25, 0.05, 0.05, 0.03, 0.03);
+/// assert!(matches!(refused, Err(ShapeError::OutOfRange { name: "length", .. })));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ShapeError {
@@ -78,6 +85,8 @@ pub enum ShapeError {
 }
 
 /// The face of the closed surface on which a point lies.
+///
+/// [`SurfaceBatch`] and [`RayHit`](crate::RayHit) have examples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Region {
@@ -103,6 +112,8 @@ impl Region {
 }
 
 /// The point of the surface that is closest to a query, limb frame.
+///
+/// [`TaperedEllipticCylinder`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// The point on the surface, meters.
