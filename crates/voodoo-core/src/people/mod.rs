@@ -51,9 +51,10 @@ const KNOWN_AFTER: f64 = 1.0;
 ///     let sites = 0..body.sites().len();
 ///     people.add(&sites.map(|site| (site, body.site_position(&standing, site))).collect::<Vec<_>>(), true)?;
 /// }
-/// people.step(&Frame::empty(0.0), &[])?;
 /// let numbers: Vec<usize> = people.present().map(|(number, _tracker)| number).collect();
 /// assert_eq!(numbers, [1, 2]);
+/// people.step(&Frame::empty(0.0), &[])?;
+/// assert_eq!(people.present().count(), 0); // nothing in the frame supports them
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

@@ -75,8 +75,9 @@ impl Viewpoint<'_> {
 /// let view = Viewpoint { camera: &camera, world_from_sensor: Pose::from_parts(Vec3::X * 3.0, rotation) };
 /// let mut rendering = Rendering::default();
 /// rendering.render(&body, &body.rest_pose(Pose::IDENTITY), &view, None)?;
-/// let center = 120 * rendering.width() + 160;
-/// assert!((rendering.depth()[center] - 2.9).abs() < 0.1 && rendering.limb()[center] != NO_LIMB);
+/// let chest = 80 * rendering.width() + 160;
+/// assert_eq!(usize::from(rendering.limb()[chest]), body.limb_index("thorax")?);
+/// assert!((rendering.depth()[chest] - 2.9).abs() < 0.1);
 /// assert_eq!((rendering.depth()[0], rendering.limb()[0]), (0.0, NO_LIMB)); // past the person
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
