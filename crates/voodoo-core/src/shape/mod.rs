@@ -219,6 +219,11 @@ impl TaperedEllipticCylinder {
         (q.x * b).powi(2) + (q.y * a).powi(2) - (a * b).powi(2)
     }
 
+    /// The shape with its length and its semi-axes `(a0, b0, a1, b1)` multiplied by factors.
+    pub(crate) fn stretched(&self, length: f64, [a0, b0, a1, b1]: [f64; 4]) -> Result<Self, ShapeError> {
+        Self::new(self.length * length, self.a0 * a0, self.b0 * b0, self.a1 * a1, self.b1 * b1)
+    }
+
     /// Whether `q` is strictly inside the solid.
     pub(crate) fn contains(&self, q: Vec3) -> bool {
         q.z > 0.0 && q.z < self.length && self.ellipse_sign(q) < 0.0
