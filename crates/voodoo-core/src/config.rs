@@ -158,6 +158,8 @@ impl Entry for bool {
 macro_rules! words {
     ($(#[$meta:meta])* $name:ident { $($(#[doc = $doc:literal])* $variant:ident = $word:literal),+ $(,)? }) => {
         $(#[$meta])*
+        ///
+        /// [`Config`] has an example.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[non_exhaustive]
         pub enum $name { $($(#[doc = $doc])* $variant),+ }
@@ -184,8 +186,14 @@ macro_rules! config {
         /// The parameters of the tracker. Defaults are the measured ones.
         ///
         /// ```
-        /// let mut config = voodoo_core::Config::default();
-        /// config.threads = 2;
+        /// use voodoo_core::{Body, Config, HumanModel, Overlap, SolverKind, Tracker};
+        ///
+        /// let mut config = Config::default();
+        /// config.solver = SolverKind::Limbwise; // as published, with the ten limbs of the papers
+        /// config.overlap = Overlap::Shared;
+        /// let tracker = Tracker::new(Body::human(1.75, HumanModel::Papers)?, config)?;
+        /// assert_eq!(tracker.config().solver, SolverKind::Limbwise);
+        /// # Ok::<(), Box<dyn std::error::Error>>(())
         /// ```
         #[derive(Clone, Debug, PartialEq)]
         #[non_exhaustive]
@@ -240,15 +248,6 @@ macro_rules! config {
 
 words! {
     /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
-    ///
-    /// ```
-    /// use voodoo_core::{Config, Overlap, RawValue};
-    ///
-    /// let mut config = Config::default();
-    /// config.set("overlap", &RawValue::Word("shared".into()))?;
-    /// assert_eq!(config.overlap, Overlap::Shared);
-    /// # Ok::<(), voodoo_core::ConfigError>(())
-    /// ```
     Overlap {
         /// It goes to every one of them.
         Shared = "shared",
@@ -260,17 +259,7 @@ words! {
 }
 
 words! {
-    /// How the pose is computed from the correspondences.
-    ///
-    /// ```
-    /// use voodoo_core::{Body, Config, HumanModel, SolverKind, Tracker};
-    ///
-    /// let mut config = Config::default();
-    /// config.solver = SolverKind::Limbwise; // the published solver, with the ten limbs of the papers
-    /// let tracker = Tracker::new(Body::human(1.75, HumanModel::Papers)?, config)?;
-    /// assert_eq!(tracker.config().solver, SolverKind::Limbwise);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
+    /// How the pose follows from the correspondences.
     SolverKind {
         /// Each limb alone, by weighted absolute orientation (K06, K07).
         Limbwise = "limbwise",
@@ -282,9 +271,9 @@ words! {
 }
 
 config! {
-    /// How the pose is computed from the correspondences.
+    /// How the pose is found from the correspondences.
     solver: SolverKind = SolverKind::Chain, "";
-    /// Maximum number of ICP steps in a frame (K07 section 7: 6 are a good compromise for the published solver).
+    /// Greatest number of ICP steps in a frame (K07 section 7: of the published ones 6 are a good compromise).
     max_steps: usize = 5, "", 1 ..= 100;
     /// The steps end when the mean squared distance changes by less than this (K06 III-B step 6).
     min_change: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
@@ -295,9 +284,9 @@ config! {
     limb_box_margin: f64 = 0.10, "m", 0.0 ..= 10.0;
     /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
     overlap: Overlap = Overlap::Exclusive, "";
-    /// At most approximately this many pixels of a depth image are used; a finer image is sampled on a grid.
+    /// At most about this many pixels of a depth image are used; a finer image is sampled on a grid.
     max_points: usize = 3000, "", 100 ..= 10000000;
-    /// Learn the still scene behind the body from depth images, as long as their camera does not move, and exclude it.
+    /// Learn the still scene behind the body from depth images, as long as their camera does not move, and leave it out.
     background: bool = true, "";
     /// Every n-th point of a limb is used (K06 IV-B.3).
     sampling_factor: usize = 1, "", 1 ..= 1000;
@@ -313,55 +302,54 @@ config! {
     band_sigma: f64 = 0.003, "m", 0.00001 ..= 1.0;
     /// Standard deviation of a surface point of weight one, for the whole-body solvers.
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
-    /// Fraction of a surface point's information that also acts along the surface, for the whole-body solvers: 0 is point-to-
-    /// plane, 1 point-to-point. A small value keeps limbs from sliding along their axis.
+    /// Share of a surface point's information that holds it along the surface as well, for the whole-body solvers: 0 is
+    /// point-to-plane, 1 point-to-point; a little stops limbs from sliding along themselves.
     tangential_weight: f64 = 0.07, "", 0.0 ..= 1.0;
-    /// Maximum distance of a matched point in the first step of a frame, for the whole-body solvers; it decreases from step to
-    /// step.
+    /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
     gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
-    /// Maximum distance of a matched point in the last steps of a frame, for the whole-body solvers.
+    /// Greatest distance of a matched point once narrowed, for the whole-body solvers.
     gate_end: f64 = 0.12, "m", 0.001 ..= 10.0;
-    /// Scale of the robust kernel in the first step of a frame; it decreases from step to step.
+    /// Scale of the robust kernel in the first step of a frame; it narrows from step to step.
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
-    /// Least scale of the robust kernel, for the whole-body solvers.
+    /// Scale at which the robust kernel stops narrowing, for the whole-body solvers.
     kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
-    /// Standard deviation of a point of the depth contour, for the whole-body solvers.
+    /// Standard deviation of an edge of the outline, for the whole-body solvers.
     depth_contour_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
-    /// Fraction of the last motion that is expected to continue (0: the body is expected to stand still; whole-body solvers).
+    /// Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body solvers).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
-    /// Standard deviation of the root's unexpected rotation in 1/30 s.
+    /// Standard deviation of the root's unexpected turn in 1/30 s.
     root_turn_sigma: f64 = 0.12, "rad", 0.0001 ..= 10.0;
-    /// Standard deviation of the root's unexpected translation in 1/30 s.
+    /// Standard deviation of the root's unexpected shift in 1/30 s.
     root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
     /// Multiplies the standard deviations of all unexpected motion: the one strength of the jitter penalty (R07 eq. 18, 26).
     /// Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
-    /// A motion that hardly differs from the expected one counts as noise, and its prior gets this factor of additional
-    /// information; 0: none. Greater values reduce jitter at rest and add lag to slow rotations (whole-body solvers).
+    /// A motion that hardly differs from the expected one is held tighter by this factor of information, as noise; 0: as any
+    /// other. Greater is calmer at rest and later in slow turns (whole-body solvers).
     still_prior_gain: f64 = 30.0, "", 0.0 ..= 10000.0;
-    /// Try other configurations of arms and legs where the frame contradicts the current ones (whole-body solvers).
+    /// Try other configurations of arms and legs where the frame speaks against the current ones (whole-body solvers).
     hypotheses: bool = true, "";
-    /// Move a body that is lost, or tracked at a wrong position, to a detected person. A lost body that the detector does not
-    /// find is searched in all segments of its size that are not background (whole-body solvers).
+    /// Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person; for a lost one that no detector
+    /// knows or sees in everything of its size that is no background (whole-body solvers).
     relocalization: bool = true, "";
-    /// Fit the contours of limbs to the depth contour of the body, in the later steps of a frame (whole-body solvers).
+    /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
     depth_contour: bool = true, "";
-    /// Fit the contours of limbs to the edges of their colors in color images (whole-body solvers).
+    /// Draw the limbs' contours to the edges of their colors in color pictures (whole-body solvers).
     regions: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
     facing: bool = true, "";
-    /// Keep joints within their limits, as a soft constraint (whole-body solvers).
+    /// Keep joints within their limits, softly (whole-body solvers).
     limits: bool = true, "";
-    /// Keep axes of limbs outside of limbs that they are not joined to, and their ends above the floor where it is known, as soft
-    /// constraints (whole-body solvers).
+    /// Axes of limbs are pushed out of other limbs that they are not joined to, and their ends up to the floor where it is known
+    /// (whole-body solvers).
     penetration: bool = true, "";
     /// After a reset that fits sizes, the first frame's points also fit the girths.
     fit_girths: bool = true, "";
-    /// After a reset that fits sizes, the first frame resolves unequal lengths of arms or legs, and with the whole-body solvers
-    /// later frames refine the lengths of limbs.
+    /// After a reset that fits sizes, the first frame decides between arms or legs of unlike lengths, and with the
+    /// whole-body solvers the frames that follow refine the limbs' lengths.
     fit_lengths: bool = true, "";
     /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;
-    /// Threads for one step. The result is bit-identical for any number.
+    /// Threads for one step. The result is the same, bit by bit, for any number.
     threads: usize = 1, "", 1 ..= 256;
 }
