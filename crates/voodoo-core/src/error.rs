@@ -52,7 +52,7 @@ pub enum BodyError {
         /// The value found.
         found: String,
     },
-    /// A limb, joint or site whose human name contradicts the others ([`crate::body::Roles`]).
+    /// A limb, joint or site whose human name contradicts the others.
     #[error("{key}: expected {expected}, found {found}")]
     Role {
         /// Key of the entry.

@@ -153,8 +153,8 @@ impl TaperedEllipticCylinder {
     /// A shape from its length and its semi-axes along x and y at `z = 0` (`a0`, `b0`) and `z = length` (`a1`, `b1`), meters.
     ///
     /// # Errors
-    /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above [`MAX_SIZE`], or the length below
-    /// [`MIN_SIZE`]; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below [`MIN_SIZE`].
+    /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above 1000 m, or the length below
+    /// 1e-6 m; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below 1e-6 m.
     pub fn new(length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> Result<Self, ShapeError> {
         for (name, min, value) in
             [("length", MIN_SIZE, length), ("a0", 0.0, a0), ("b0", 0.0, b0), ("a1", 0.0, a1), ("b1", 0.0, b1)]
