@@ -3,6 +3,17 @@
 //! The Python package builds its validated `Config` class and the commented TOML from [`Config::fields`].
 
 /// A configuration entry that is unknown or outside its range.
+///
+/// ```
+/// use voodoo_core::{Config, ConfigError, RawValue};
+///
+/// let mut config = Config::default();
+/// config.set("solver", &RawValue::Word("tree".into()))?;
+/// let refused = config.set("threads", &RawValue::Number(0.0));
+/// assert!(matches!(refused, Err(ConfigError::Value { key: "threads", .. })));
+/// assert_eq!(config.threads, 1);
+/// # Ok::<(), ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
@@ -22,6 +33,8 @@ pub enum ConfigError {
 }
 
 /// A value of a configuration entry.
+///
+/// [`Field`] has an example.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A real number.
@@ -35,6 +48,20 @@ pub enum Value {
 }
 
 /// Description of a configuration entry.
+///
+/// ```
+/// use voodoo_core::{Config, Value};
+///
+/// for field in Config::default().fields() {
+///     let text = match field.default {
+///         Value::Real(number) => format!("{number} {}", field.unit),
+///         Value::Whole(number) => number.to_string(),
+///         Value::Switch(switch) => switch.to_string(),
+///         Value::Word(word) => format!("{word}, of {:?}", field.words),
+///     };
+///     println!("{}: {text}", field.name);
+/// }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
     /// Its key.
@@ -63,6 +90,8 @@ trait Entry: Sized + Clone {
 }
 
 /// A value from outside, not yet validated.
+///
+/// [`ConfigError`] has an example.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RawValue {
     /// A number.
@@ -129,6 +158,8 @@ impl Entry for bool {
 macro_rules! words {
     ($(#[$meta:meta])* $name:ident { $($(#[doc = $doc:literal])* $variant:ident = $word:literal),+ $(,)? }) => {
         $(#[$meta])*
+        ///
+        /// [`Config`] has an example.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[non_exhaustive]
         pub enum $name { $($(#[doc = $doc])* $variant),+ }
@@ -155,8 +186,14 @@ macro_rules! config {
         /// The parameters of the tracker. Defaults are the measured ones.
         ///
         /// ```
-        /// let mut config = voodoo_core::Config::default();
-        /// config.threads = 2;
+        /// use voodoo_core::{Body, Config, HumanModel, Overlap, SolverKind, Tracker};
+        ///
+        /// let mut config = Config::default();
+        /// config.solver = SolverKind::Limbwise; // as published, with the ten limbs of the papers
+        /// config.overlap = Overlap::Shared;
+        /// let tracker = Tracker::new(Body::human(1.75, HumanModel::Papers)?, config)?;
+        /// assert_eq!(tracker.config().solver, SolverKind::Limbwise);
+        /// # Ok::<(), Box<dyn std::error::Error>>(())
         /// ```
         #[derive(Clone, Debug, PartialEq)]
         #[non_exhaustive]

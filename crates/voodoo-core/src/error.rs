@@ -3,6 +3,19 @@
 use crate::shape::ShapeError;
 
 /// A body description that cannot be tracked. `key` is the path of the offending entry.
+///
+/// ```
+/// use voodoo_core::{Body, BodyError, HumanModel};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// match body.site_index("left_wrist") {
+///     Err(BodyError::Unknown { name, known, .. }) => {
+///         assert!(name == "left_wrist" && known.contains(&"l_wrist".to_owned()));
+///     }
+///     other => unreachable!("{other:?}"),
+/// }
+/// # Ok::<(), BodyError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BodyError {
@@ -39,7 +52,7 @@ pub enum BodyError {
         /// The value found.
         found: String,
     },
-    /// A limb, joint or site whose human name contradicts the others ([`crate::body::Roles`]).
+    /// A limb, joint or site whose human name contradicts the others.
     #[error("{key}: expected {expected}, found {found}")]
     Role {
         /// Key of the entry.
@@ -60,6 +73,13 @@ pub enum BodyError {
 }
 
 /// An invalid camera calibration.
+///
+/// ```
+/// use voodoo_core::Camera;
+///
+/// let error = Camera::pinhole(640, 480, [-525.0, 525.0, 319.5, 239.5]).unwrap_err();
+/// assert_eq!(error.to_string(), "camera fx, fy: expected finite focal lengths above zero, found -525, 525");
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[error("camera {what}: expected {expected}, found {found}")]
@@ -79,6 +99,20 @@ impl CameraError {
 }
 
 /// Why the tracker rejected a call. The tracker is unchanged afterwards.
+///
+/// ```
+/// use voodoo_core::math::Pose;
+/// use voodoo_core::{Body, Config, Frame, HumanModel, TrackError, Tracker};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
+/// tracker.reset_pose(&body.rest_pose(Pose::IDENTITY))?;
+/// tracker.step(&Frame::empty(1.0))?;
+/// let refused = tracker.step(&Frame::empty(0.5)).unwrap_err();
+/// assert_eq!(refused, TrackError::TimeBackwards { previous: 1.0, found: 0.5 });
+/// assert_eq!(tracker.estimate().stamp, 1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackError {

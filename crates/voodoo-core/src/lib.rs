@@ -193,7 +193,6 @@ pub use observation::frame::{
     Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };
 pub use observation::picture::{ColorImage, ColorPixels};
-pub use observation::sites::{SiteGate, SiteRay};
 pub use people::{People, PeopleOptions};
 pub use regions::RegionLine;
 pub use shape::ray::RayHit;

@@ -6,11 +6,12 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArra
 use pyo3::prelude::*;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Camera};
-use voodoo_core::{Cloud, DepthImage, DepthPixels, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PositionRelation, RayRelation, Scope};
 use voodoo_core::{ColorImage, ColorPixels};
 
 use crate::arrays::{PointArray, PointView, contiguous};
 use crate::errors::IntoPy;
+use crate::frame::PyFrame;
 
 pub(crate) struct CloudData {
     pub points: PointArray,
@@ -153,6 +154,24 @@ impl Borrowed<'_> {
             .collect()
     }
 
+    /// The frame of these views and of what was borrowed with them from `held`.
+    pub fn frame<'a>(
+        &'a self,
+        held: &'a PyFrame,
+        clouds: &'a [Cloud<'a>],
+        images: &'a [DepthImage<'a>],
+        colors: &'a [ColorImage<'a>],
+    ) -> Frame<'a> {
+        Frame::empty(held.stamp)
+            .with_clouds(clouds)
+            .with_images(images)
+            .with_colors(colors)
+            .with_positions(&self.positions)
+            .with_rays(&self.rays)
+            .with_ground(self.ground)
+            .with_excluded(&held.excluded)
+    }
+
     pub fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
         self.images
             .iter()
@@ -232,5 +251,33 @@ impl Held<'_> {
             }
         }
         Ok(Borrowed { clouds, images, positions, rays, ground: self.ground })
+    }
+}
+
+/// The measurements of a person, together with the common ones.
+pub(crate) struct Parts<'a> {
+    clouds: Vec<Cloud<'a>>,
+    positions: Vec<PositionRelation>,
+    rays: Vec<RayRelation>,
+}
+
+impl<'a> Parts<'a> {
+    /// `first` is the index of the first source of the person's own measurements.
+    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed<'_>, first: u16) -> PyResult<Self> {
+        let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
+        let positions =
+            own.positions.iter().map(|relation| PositionRelation { source: relation.source + first, ..*relation });
+        let rays = own.rays.iter().map(|relation| RayRelation { source: relation.source + first, ..*relation });
+        Ok(Self {
+            clouds: all.clouds.iter().copied().chain(clouds).collect(),
+            positions: all.positions.iter().copied().chain(positions).collect(),
+            rays: all.rays.iter().copied().chain(rays).collect(),
+        })
+    }
+
+    pub(crate) fn frame<'b>(&'b self, all: &Frame<'b>, stamp: f64) -> Frame<'b> {
+        let mut frame = all.with_clouds(&self.clouds).with_positions(&self.positions).with_rays(&self.rays);
+        frame.stamp = stamp;
+        frame
     }
 }

@@ -6,11 +6,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Aabb, Vec3};
-use voodoo_core::{Cloud, PositionRelation, RayRelation};
 use voodoo_core::{Frame, People, Tracker};
 
 use crate::body::PyBody;
-use crate::borrowed::Borrowed;
+use crate::borrowed::Parts;
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception};
@@ -90,14 +89,7 @@ impl PyPeople {
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
         let colors = numbered.map(|(view, camera)| view.image(camera)).collect::<PyResult<Vec<_>>>()?;
-        let input = Frame::empty(frame.stamp)
-            .with_clouds(&clouds)
-            .with_images(&images)
-            .with_colors(&colors)
-            .with_positions(&all.positions)
-            .with_rays(&all.rays)
-            .with_ground(all.ground)
-            .with_excluded(&frame.excluded);
+        let input = all.frame(frame, &clouds, &images, &colors);
         // A person's own measurements follow the common ones; their sources are numbered consecutively.
         let owned = own.iter().map(|(_, frame)| frame.borrow_for(py, body)).collect::<PyResult<Vec<_>>>()?;
         let parts = owned
@@ -149,33 +141,5 @@ impl PyPeople {
     /// The body of a present person, in their sizes.
     fn body(&self, id: usize) -> Option<PyBody> {
         self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| PyBody(tracker.body().clone()))
-    }
-}
-
-/// The measurements of a person, together with the common ones.
-struct Parts<'a> {
-    clouds: Vec<Cloud<'a>>,
-    positions: Vec<PositionRelation>,
-    rays: Vec<RayRelation>,
-}
-
-impl<'a> Parts<'a> {
-    /// `first` is the index of the first source of the person's own measurements.
-    fn new(all: &Frame<'a>, own: &'a Borrowed<'_>, first: u16) -> PyResult<Self> {
-        let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
-        let positions =
-            own.positions.iter().map(|relation| PositionRelation { source: relation.source + first, ..*relation });
-        let rays = own.rays.iter().map(|relation| RayRelation { source: relation.source + first, ..*relation });
-        Ok(Self {
-            clouds: all.clouds.iter().copied().chain(clouds).collect(),
-            positions: all.positions.iter().copied().chain(positions).collect(),
-            rays: all.rays.iter().copied().chain(rays).collect(),
-        })
-    }
-
-    fn frame<'b>(&'b self, all: &Frame<'b>, stamp: f64) -> Frame<'b> {
-        let mut frame = all.with_clouds(&self.clouds).with_positions(&self.positions).with_rays(&self.rays);
-        frame.stamp = stamp;
-        frame
     }
 }

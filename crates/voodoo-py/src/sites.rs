@@ -4,7 +4,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
-use voodoo_core::{SiteGate, SiteRay};
+use voodoo_sensors::sites::{SiteGate, SiteRay};
 
 use crate::arrays::vector;
 use crate::errors::IntoPy;

@@ -154,14 +154,7 @@ impl PyTracker {
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
-        let input = Frame::empty(frame.stamp)
-            .with_clouds(&clouds)
-            .with_images(&images)
-            .with_colors(&colors)
-            .with_positions(&borrowed.positions)
-            .with_rays(&borrowed.rays)
-            .with_ground(borrowed.ground)
-            .with_excluded(&frame.excluded);
+        let input = borrowed.frame(frame, &clouds, &images, &colors);
         let tracker = &mut self.tracker;
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
         self.sources.clone_from(&frame.sources);

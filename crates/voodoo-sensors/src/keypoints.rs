@@ -1,8 +1,8 @@
 //! Converts the 2-D keypoints of a network into measurements of body sites.
 
 use crate::eye::Eye;
+use crate::sites::{SiteGate, SiteRay};
 use voodoo_core::math::Vec3;
-use voodoo_core::{SiteGate, SiteRay};
 
 /// Standard deviation of a 3-D site position along its ray where none is given, meters.
 const ALONG_SIGMA: f64 = 0.04;

@@ -1,5 +1,5 @@
-//! Converts sensor data to measurements for [`voodoo_core`]: keypoints of 2-D networks, depth registered to another camera's
-//! image, skin color, masks.
+//! Converts sensor data to measurements for [`voodoo_core`]: keypoints of 2-D networks and their gates, depth registered to another
+//! camera's image, skin color, masks.
 
 pub mod body_view;
 pub mod carried;
@@ -10,6 +10,7 @@ pub mod keypoints;
 mod mask_regions;
 mod masks;
 pub mod registration;
+pub mod sites;
 pub mod skin;
 mod still;
 mod window;

@@ -80,10 +80,11 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
     if limb.match_caps[1] && across > ASLANT {
         // In an oblique view, the rim of the cap projects beyond its center.
         let ahead = sight.with_z(0.0) / across;
-        let radius = (shape.a1() * ahead.x).hypot(shape.b1() * ahead.y);
+        let [_, end] = shape.ends();
+        let radius = (end.a * ahead.x).hypot(end.b * ahead.y);
         let foot = tip - ahead * (radius * sight.z.signum());
         let rim = shape.length() + radius * sight.z.abs() / across;
-        search(Vec3::ZERO, Vec3::Z, rim, shape.a1().max(shape.b1()), foot, TIP_REACH);
+        search(Vec3::ZERO, Vec3::Z, rim, end.a.max(end.b), foot, TIP_REACH);
     }
 }
 

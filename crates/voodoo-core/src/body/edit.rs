@@ -54,9 +54,7 @@ impl Body {
     /// if the result would not be a valid solid.
     pub(crate) fn change_girth(&mut self, limb: usize, shift: Vec3, axes: [f64; 4]) -> bool {
         let shape = self.limbs[limb].shape;
-        let [fa0, fb0, fa1, fb1] = axes;
-        let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
-        let Ok(shape) = TaperedEllipticCylinder::new(shape.length(), a0, b0, a1, b1) else { return false };
+        let Ok(shape) = shape.stretched(1.0, axes) else { return false };
         self.limbs[limb].shape = shape;
         self.map_landmarks(limb, |position| position - shift);
         true
@@ -65,8 +63,7 @@ impl Body {
     /// Lengthens the surface of a limb by a factor; joints and sites stay. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_tip(&mut self, limb: usize, factor: f64) {
         let shape = self.limbs[limb].shape;
-        let (length, a1, b1) = (shape.length() * factor, shape.a1(), shape.b1());
-        if let Ok(shape) = TaperedEllipticCylinder::new(length, shape.a0(), shape.b0(), a1, b1) {
+        if let Ok(shape) = shape.stretched(factor, [1.0; 4]) {
             self.limbs[limb].shape = shape;
         }
     }
@@ -87,11 +84,7 @@ impl Body {
     /// Lengthens a limb by a factor, with everything fixed to it. Does nothing if the result would not be a valid solid.
     pub(crate) fn change_length(&mut self, limb: usize, factor: f64) -> bool {
         let shape = self.limbs[limb].shape;
-        let Ok(shape) =
-            TaperedEllipticCylinder::new(shape.length() * factor, shape.a0(), shape.b0(), shape.a1(), shape.b1())
-        else {
-            return false;
-        };
+        let Ok(shape) = shape.stretched(factor, [1.0; 4]) else { return false };
         self.limbs[limb].shape = shape;
         self.map_landmarks(limb, |position| position * Vec3::new(1.0, 1.0, factor));
         true

@@ -275,15 +275,8 @@ impl Body {
                 1.0
             }
         };
-        let stretch = Vec3::new(1.0, ratio(1, shape.b0().max(shape.b1())), ratio(2, SPREAD_ALONG * shape.length()));
-        let stretched = crate::shape::TaperedEllipticCylinder::new(
-            shape.length() * stretch.z,
-            shape.a0(),
-            shape.b0() * stretch.y,
-            shape.a1(),
-            shape.b1() * stretch.y,
-        );
-        if let Ok(stretched) = stretched {
+        let stretch = Vec3::new(1.0, ratio(1, shape.local_aabb().maxs.y), ratio(2, SPREAD_ALONG * shape.length()));
+        if let Ok(stretched) = shape.stretched(stretch.z, [1.0, stretch.y, 1.0, stretch.y]) {
             self.limbs[limb].shape = stretched;
         }
         self.map_landmarks(limb, |position| {

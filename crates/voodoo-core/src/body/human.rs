@@ -6,6 +6,14 @@ use crate::math::{Mat3, Pose, Quat, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
 /// The level of detail of the human model.
+///
+/// ```
+/// use voodoo_core::{Body, HumanModel};
+///
+/// assert_eq!(Body::human(1.75, HumanModel::Papers)?.limbs().len(), 10);
+/// assert_eq!(Body::human(1.75, HumanModel::Full)?.limbs().len(), 18);
+/// # Ok::<(), voodoo_core::BodyError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HumanModel {
     /// Ten limbs and nine joints, as in the papers (K06 III-C): torso, head, two limbs for each arm and leg.

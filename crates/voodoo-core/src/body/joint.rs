@@ -7,6 +7,24 @@ use crate::math::{Pose, Vec3};
 /// The ellipse lies in the x-y plane of the joint frame. Both semi-axes zero: universal joint, one band. One positive:
 /// hinge about that axis, two bands at its ends. Both positive: elliptic joint, four bands at the ends of the main axes.
 /// Longer axes make the joint stiffer, a larger weight makes it tighter (K07 4.2).
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Joint, JointKind};
+///
+/// let elbow = Joint {
+///     name: "l_elbow".into(),
+///     parent_from_joint: Pose::from_translation(Vec3::Z * 0.3),
+///     limb_from_joint: Pose::IDENTITY,
+///     semi_axes: [0.05, 0.0],
+///     weight: 1.0,
+///     limits: Some([[0.0, 2.5], [0.0, 0.0], [0.0, 0.0]]),
+///     motion: 0.3,
+/// };
+/// assert_eq!((elbow.kind(), elbow.band_count()), (JointKind::Hinge, 2));
+/// let shoulder = Joint { semi_axes: [0.0, 0.0], limits: None, ..elbow };
+/// assert_eq!((shoulder.kind(), shoulder.band_count()), (JointKind::Universal, 1));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Name, usually that of the site at its center (`l_elbow`).
@@ -26,6 +44,8 @@ pub struct Joint {
 }
 
 /// The cases of K07 figure 3.
+///
+/// The semi-axes of a [`Joint`] select it; an example is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Three free rotations.

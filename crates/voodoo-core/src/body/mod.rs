@@ -26,6 +26,18 @@ use crate::shape::TaperedEllipticCylinder;
 use std::sync::Arc;
 
 /// One rigid part of a body. Its frame has z along the axis of the shape, from the proximal end to the distal one.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Limb, Site, TaperedEllipticCylinder};
+///
+/// let shape = TaperedEllipticCylinder::new(0.5, 0.03, 0.03, 0.02, 0.02)?;
+/// let stick = Limb { name: "stick".into(), shape, parent: None, match_caps: [true; 2] };
+/// let tip = Site { name: "tip".into(), limb: 0, position: Vec3::Z * shape.length() };
+/// let body = Body::new("stick", vec![stick], vec![tip])?;
+/// assert_eq!(body.site_position(&[Pose::IDENTITY], 0), Vec3::new(0.0, 0.0, 0.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limb {
     /// Name, unique in the body (`l_forearm`).
@@ -40,6 +52,8 @@ pub struct Limb {
 }
 
 /// A named feature point fixed to a limb (H-Anim joint and site names).
+///
+/// [`Limb`] has an example.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Site {
     /// Name, unique in the body (`l_wrist`).
@@ -51,6 +65,18 @@ pub struct Site {
 }
 
 /// A tree of limbs; a parent always precedes its children.
+///
+/// ```
+/// use voodoo_core::math::Pose;
+/// use voodoo_core::{Body, HumanModel};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let standing = body.rest_pose(Pose::IDENTITY); // one pose for each limb
+/// let wrist = body.site_position(&standing, body.site_index("l_wrist")?);
+/// let ankle = body.site_position(&standing, body.site_index("l_ankle")?);
+/// assert!(wrist.z > ankle.z);
+/// # Ok::<(), voodoo_core::BodyError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     name: String,

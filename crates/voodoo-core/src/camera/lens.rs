@@ -7,6 +7,15 @@
 use crate::error::CameraError;
 
 /// The distortion model of a lens, with its coefficients.
+///
+/// ```
+/// use voodoo_core::Lens;
+///
+/// let lens = Lens::from_model("plumb_bob", &[-0.25, 0.08, 0.001, -0.002])?; // as in a CameraInfo of ROS
+/// assert_eq!(lens, Lens::PlumbBob([-0.25, 0.08, 0.001, -0.002, 0.0]));
+/// assert_eq!(Lens::from_model("plumb_bob", &[0.0; 5])?, Lens::Pinhole);
+/// # Ok::<(), voodoo_core::CameraError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Lens {
     /// No distortion.

@@ -70,7 +70,7 @@ impl Camera {
     /// A camera of `width` x `height` pixels with the `intrinsics` `(fx, fy, cx, cy)`, pixels.
     ///
     /// # Errors
-    /// [`CameraError`] unless there are 1 to [`MOST_PIXELS`] pixels, the focal lengths are above zero, and all numbers are finite.
+    /// [`CameraError`] unless there are 1 to 33,554,432 pixels, the focal lengths are above zero, and all numbers are finite.
     pub fn new(width: usize, height: usize, intrinsics: [f64; 4], lens: Lens) -> Result<Self, CameraError> {
         if !width.checked_mul(height).is_some_and(|count| (1..=MOST_PIXELS).contains(&count)) {
             return Err(CameraError::new("size", "1 to 33554432 pixels", format!("{width}x{height}")));
@@ -255,7 +255,7 @@ impl Camera {
     }
 
     /// Columns and rows that can show a part of the convex hull of `corners`, camera frame; the whole image when a corner is
-    /// nearer than [`NEAREST_RETURN`].
+    /// nearer than 5 cm.
     pub fn window(&self, corners: impl IntoIterator<Item = Vec3>) -> [Range<usize>; 2] {
         let whole = [0..self.width, 0..self.height];
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);

@@ -19,7 +19,7 @@ use crate::observation::frame::{DepthImage, Ground};
 use crate::observation::ownership::NO_OWNER;
 use std::fmt::Debug;
 
-/// Why a detector could not process an image. The frame is then processed without detections.
+/// Why a detector could not process an image. The frame is then processed without detections. [`Detect`] has an example.
 pub type DetectError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Margin of a box around joints, meters: limbs are thicker than their joints.
@@ -32,7 +32,7 @@ const AROUND_JOINTS: f64 = 0.2;
 /// use voodoo_core::math::Vec3;
 /// use voodoo_core::DepthImage;
 ///
-/// /// Somebody always stands at the same place.
+/// /// One person always stands at the same position.
 /// #[derive(Clone, Debug)]
 /// struct Standing;
 ///
@@ -45,8 +45,11 @@ const AROUND_JOINTS: f64 = 0.2;
 ///         &mut self,
 ///         _image: &DepthImage,
 ///         _around: &Surroundings,
-///         _query: DetectionQuery,
+///         query: DetectionQuery,
 ///     ) -> Result<Vec<Detection>, DetectError> {
+///         if matches!(query, DetectionQuery::Near(position) if position.distance(Vec3::new(2.4, 0.0, 1.0)) > 1.0) {
+///             return Ok(Vec::new());
+///         }
 ///         let places = [[2.4, -0.2, 1.45], [2.4, 0.2, 1.45], [2.4, -0.09, 0.94], [2.4, 0.09, 0.94]];
 ///         let joint = |at| Some(DetectedJoint { position: Vec3::from_array(at), sigma: 0.05, visible: 1.0 });
 ///         Ok(vec![Detection::new(places.map(joint).to_vec(), 5.0)])
@@ -113,7 +116,7 @@ pub trait Detect: Debug + Send + Sync {
     fn reject(&mut self, _index: usize) {}
 }
 
-/// Which persons a detector is asked for.
+/// Which persons a detector is asked for. [`Detect`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DetectionQuery {
     /// All persons in the image.
@@ -127,6 +130,8 @@ pub enum DetectionQuery {
 }
 
 /// A joint of a detected person.
+///
+/// [`Detection`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectedJoint {
     /// Position in the world, meters.
@@ -138,6 +143,16 @@ pub struct DetectedJoint {
 }
 
 /// A person in a depth image.
+///
+/// ```
+/// use voodoo_core::math::Vec3;
+/// use voodoo_core::{DetectedJoint, Detection};
+///
+/// let joint = |x, y, z| Some(DetectedJoint { position: Vec3::new(x, y, z), sigma: 0.05, visible: 0.9 });
+/// let mut person = Detection::new(vec![joint(2.4, -0.2, 1.45), joint(2.4, 0.2, 1.45), None], 5.0);
+/// person.facing = Some(3.0);
+/// assert!((person.high.y - 0.4).abs() < 1e-12); // the box around the joints has a margin of 0.2 m
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Detection {
     /// The joints of [`Detect::joints`], in that order; `None` for one that was not found.
@@ -171,6 +186,21 @@ impl Detection {
 }
 
 /// What is known about the scene besides the image.
+///
+/// ```
+/// use voodoo_core::math::{Aabb, Pose, Vec3};
+/// use voodoo_core::{Camera, DepthImage, DepthPixels, Surroundings};
+///
+/// let camera = Camera::pinhole(2, 1, [1.0, 1.0, 0.0, 0.0])?;
+/// let (pixels, world_from_sensor) = (DepthPixels::F32(&[2.0, 3.0]), Pose::IDENTITY);
+/// let image = DepthImage { pixels, camera: &camera, meters_per_unit: 1.0, world_from_sensor, weight: 1.0, source: 0 };
+/// let coat_stand = Aabb::new(Vec3::new(2.5, -0.5, 2.5), Vec3::new(3.5, 0.5, 3.5));
+/// let around = Surroundings { excluded: &[coat_stand], ..Surroundings::default() };
+/// let mut depth = Vec::new();
+/// around.open_depth(&image, &mut depth);
+/// assert_eq!(depth, [2.0, 0.0]); // without the pixel inside the excluded box
+/// # Ok::<(), voodoo_core::CameraError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Surroundings<'a> {
     /// The ground plane, world frame.

@@ -7,6 +7,8 @@ use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
 /// Three-dimensional points in the caller's memory layout, in meters.
+///
+/// [`Cloud`] has an example.
 #[derive(Clone, Copy, Debug)]
 pub enum PointSlice<'a> {
     /// Single precision.
@@ -39,6 +41,8 @@ impl PointSlice<'_> {
 }
 
 /// What is known in advance about the limb that 3-D points belong to (K06 IV-A, the first three kinds).
+///
+/// [`Cloud`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// Unknown: background, or any limb.
@@ -50,6 +54,24 @@ pub enum Scope {
 }
 
 /// 3-D points of one sensor.
+///
+/// ```
+/// use voodoo_core::math::Pose;
+/// use voodoo_core::{Body, Cloud, Frame, HumanModel, PointSlice, Scope};
+///
+/// // A tactile glove: all of its points lie on the left hand.
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let contacts = [[0.02_f32, 0.0, 0.01], [0.02, 0.01, 0.03]];
+/// let cloud = Cloud {
+///     points: PointSlice::F32(&contacts),
+///     world_from_sensor: Pose::IDENTITY,
+///     weight: 1.0,
+///     scope: Scope::Limb(body.limb_index("l_hand")?),
+///     source: 0,
+/// };
+/// Frame::empty(0.0).with_clouds(&[cloud]).check(&body, None)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Cloud<'a> {
     /// The points in the sensor's frame.
@@ -65,6 +87,8 @@ pub struct Cloud<'a> {
 }
 
 /// The pixels of a depth image, row by row: distance along the optical axis; 0 (or NaN) means no return.
+///
+/// [`DepthImage`] has an example.
 #[derive(Clone, Copy, Debug)]
 pub enum DepthPixels<'a> {
     /// In units of `meters_per_unit`.
@@ -98,6 +122,24 @@ impl DepthPixels<'_> {
 }
 
 /// An organized depth image; its pixels are free points.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Camera, DepthImage, DepthPixels};
+///
+/// let camera = Camera::pinhole(4, 3, [2.0, 2.0, 1.0, 1.0])?;
+/// let millimeters = [2000_u16; 12];
+/// let image = DepthImage {
+///     pixels: DepthPixels::U16(&millimeters),
+///     camera: &camera,
+///     meters_per_unit: 0.001,
+///     world_from_sensor: Pose::IDENTITY,
+///     weight: 1.0,
+///     source: 0,
+/// };
+/// assert_eq!(image.back_project(4 + 1, 2.0), Vec3::new(0.0, 0.0, 2.0)); // row 1, column 1: the principal point
+/// # Ok::<(), voodoo_core::CameraError>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DepthImage<'a> {
     /// All pixels of the camera.
@@ -131,6 +173,8 @@ impl DepthImage<'_> {
 }
 
 /// A measured position of a named site (K06 IV-A: 3-D point-to-point relation).
+///
+/// [`Frame`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionRelation {
     /// Index of the site.
@@ -147,6 +191,21 @@ pub struct PositionRelation {
 }
 
 /// A named site that was observed along a ray (K06 IV-A: 2-D point-to-line relation).
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Camera, Frame, HumanModel, RayRelation};
+///
+/// // A network found the left wrist in a pixel of a camera at the origin.
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let camera = Camera::pinhole(640, 480, [525.0, 525.0, 319.5, 239.5])?;
+/// let [x, y] = camera.ray([412.0, 200.5]).ok_or("a pixel outside the domain of the lens")?;
+/// let (site, world_from_sensor) = (body.site_index("l_wrist")?, Pose::IDENTITY);
+/// let (origin, direction) = (world_from_sensor.translation, world_from_sensor.rotation * Vec3::new(x, y, 1.0));
+/// let ray = RayRelation { site, origin, direction, weight: 8.0, bias: 0.0, source: 0 };
+/// Frame::empty(0.0).with_rays(&[ray]).check(&body, None)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayRelation {
     /// Index of the site.
@@ -165,6 +224,14 @@ pub struct RayRelation {
 }
 
 /// The ground plane: points `p` with `normal . p < offset` lie below it.
+///
+/// ```
+/// use voodoo_core::Ground;
+/// use voodoo_core::math::Vec3;
+///
+/// let floor = Ground { normal: Vec3::Z, offset: -0.9 }; // 0.9 m below the origin
+/// assert!((floor.height(Vec3::new(2.0, 0.0, 0.3)) - 1.2).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
     /// Unit vector pointing up, world frame.
@@ -188,6 +255,21 @@ impl Ground {
 /// All measurements of one instant.
 ///
 /// [`Frame::empty`] makes one without measurements; add them with the `with_` methods, or set the fields.
+///
+/// ```
+/// use voodoo_core::math::Vec3;
+/// use voodoo_core::{Body, Frame, Ground, HumanModel, PositionRelation};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let site = body.site_index("l_wrist")?;
+/// let wrist = PositionRelation { site, position: Vec3::new(0.1, 0.2, 1.5), weight: 20.0, bias: 0.0, source: 0 };
+/// let frame = Frame::empty(0.0)
+///     .with_positions(std::slice::from_ref(&wrist))
+///     .with_ground(Ground { normal: Vec3::Z, offset: 0.0 });
+/// frame.check(&body, None)?;
+/// assert!(frame.check(&body, Some(1.0)).is_err()); // not after the previous frame
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Frame<'a> {

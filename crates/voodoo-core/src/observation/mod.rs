@@ -2,10 +2,7 @@
 //!
 //! `frame` is the input (K06 IV-A). Step 1 of the method, the selection of points that may lie on the body (K06 IV-B.1), is
 //! `candidates`, with `pixels` and `background`; `clusters` sorts them for the next step. `depth_view` queries the images by
-//! position. `segments` finds the foreground segments in which a lost body may be. `window` finds what is near the body, and
-//! `registration` transforms it into the image of another camera, with `far_edges` between surfaces. `chroma` compares colors,
-//! `masks` and `mask_regions` find skin, and `still` finds what is static. `sites` predicts named sites and gates their
-//! measurements.
+//! position. `segments` finds the foreground segments in which a lost body may be.
 
 pub(crate) mod background;
 mod background_moved;
@@ -19,4 +16,3 @@ pub(crate) mod ownership;
 pub(crate) mod picture;
 pub(crate) mod pixels;
 pub(crate) mod segments;
-pub(crate) mod sites;

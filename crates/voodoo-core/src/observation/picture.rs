@@ -8,6 +8,8 @@ use crate::math::{Pose, is_rigid};
 const LONGEST_ASIDE: f64 = 0.25;
 
 /// The pixels of an image, row by row.
+///
+/// [`ColorImage`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorPixels<'a> {
     /// Three channels; any order, as long as it is always the same.
@@ -45,6 +47,24 @@ impl ColorPixels<'_> {
 ///
 /// The contours of limbs are straight lines and ellipses only in the image of a pinhole camera. For fitting color regions,
 /// undistort the image first and pass the resulting pinhole camera. Colors of clothes work with any lens.
+///
+/// ```
+/// use voodoo_core::math::Pose;
+/// use voodoo_core::{Body, Camera, ColorImage, ColorPixels, Frame, HumanModel};
+///
+/// let camera = Camera::pinhole(640, 480, [525.0, 525.0, 319.5, 239.5])?;
+/// let bgr = vec![[90_u8, 90, 90]; camera.pixels()];
+/// let image = ColorImage {
+///     pixels: ColorPixels::Color(&bgr),
+///     camera: &camera,
+///     world_from_sensor: Pose::IDENTITY,
+///     stamp: 0.004, // exposed 4 ms after the frame
+///     number: 0,
+///     source: 0,
+/// };
+/// Frame::empty(0.0).with_colors(&[image]).check(&Body::human(1.75, HumanModel::Full)?, None)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ColorImage<'a> {
     /// All pixels of the camera.

@@ -39,6 +39,24 @@ const ONE_BODY: f64 = 0.3;
 const KNOWN_AFTER: f64 = 1.0;
 
 /// Tracks several persons through a sequence of frames.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, People, PeopleOptions};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let mut people = People::new(body.clone(), Config::default(), PeopleOptions::default())?;
+/// for x in [0.0, 2.0] {
+///     let standing = body.rest_pose(Pose::from_translation(Vec3::X * x));
+///     let sites = 0..body.sites().len();
+///     people.add(&sites.map(|site| (site, body.site_position(&standing, site))).collect::<Vec<_>>(), true)?;
+/// }
+/// let numbers: Vec<usize> = people.present().map(|(number, _tracker)| number).collect();
+/// assert_eq!(numbers, [1, 2]);
+/// people.step(&Frame::empty(0.0), &[])?;
+/// assert_eq!(people.present().count(), 0); // nothing in the frame supports them
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct People {
     prototype: Body,

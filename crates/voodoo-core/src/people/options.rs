@@ -8,6 +8,16 @@ use crate::observation::frame::Frame;
 const CLEARLY_NEARER: f64 = 0.3;
 
 /// Which persons are tracked. [`PeopleOptions::default`] allows any number of persons everywhere.
+///
+/// ```
+/// use voodoo_core::{Body, Config, HumanModel, People, PeopleOptions};
+///
+/// let mut options = PeopleOptions::default();
+/// (options.limit, options.nearest) = (Some(1), true); // only the person nearest to a camera
+/// let people = People::new(Body::human(1.75, HumanModel::Full)?, Config::default(), options)?;
+/// assert_eq!(people.present().count(), 0); // nobody before the first frame
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PeopleOptions {

@@ -60,21 +60,20 @@ impl LimbLabels {
         let cells = |place: [f64; 2]| place.map(|value| (scale * value) as f32);
         let limbs = body.limbs().iter().zip(camera_from_limb).enumerate();
         for (index, (limb, pose)) in limbs.filter(|(index, _)| visible(*index)) {
-            let shape = &limb.shape;
-            let ends = [(shape.a0(), shape.b0(), 0.0), (shape.a1(), shape.b1(), shape.length())];
+            let ends = limb.shape.ends();
             let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| pose.rotation * axis);
-            let centers = ends.map(|(_, _, along)| pose.translation + z * along);
-            if ends.iter().zip(centers).any(|((a, b, _), center)| center.z - a.max(*b) < NEAREST_END) {
+            let centers = ends.map(|end| pose.translation + z * end.z);
+            if ends.iter().zip(centers).any(|(end, center)| center.z - end.a.max(end.b) < NEAREST_END) {
                 continue;
             }
             self.corners.clear();
-            for ((a, b, _), center) in ends.into_iter().zip(centers) {
-                let (x, y) = (x * a, y * b);
+            for (end, center) in ends.into_iter().zip(centers) {
+                let (x, y) = (x * end.a, y * end.b);
                 self.corners
                     .extend(CORNERS.iter().filter_map(|[c, s]| camera.project(center + x * *c + y * *s)).map(cells));
             }
             let [Some(start), Some(end)] = centers.map(|center| camera.project(center).map(cells)) else { continue };
-            let front = |end: usize| (centers[end].z - 0.5 * (ends[end].0 + ends[end].1)) as f32;
+            let front = |end: usize| (centers[end].z - 0.5 * (ends[end].a + ends[end].b)) as f32;
             let along = [end[0] - start[0], end[1] - start[1]];
             let square = (along[0] * along[0] + along[1] * along[1]).max(1.0);
             let axis = DepthAxis { start, along: along.map(|value| value / square), depth: [front(0), front(1)] };

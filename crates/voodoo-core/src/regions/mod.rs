@@ -108,6 +108,33 @@ pub(crate) struct Posed<'a> {
 }
 
 /// A line across the contour of a limb in an image, and the color edge on it; pixels.
+///
+/// ```
+/// use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+/// use voodoo_core::{Body, Camera, ColorImage, ColorPixels, Config, Frame, HumanModel};
+/// use voodoo_core::{NO_LIMB, Rendering, Tracker, Viewpoint};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let standing = body.rest_pose(Pose::IDENTITY);
+/// let camera = Camera::pinhole(320, 240, [290.0, 290.0, 159.5, 119.5])?;
+/// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));
+/// let world_from_sensor = Pose::from_parts(Vec3::X * 3.0, rotation);
+/// let mut rendering = Rendering::default();
+/// rendering.render(&body, &standing, &Viewpoint { camera: &camera, world_from_sensor }, None)?;
+/// let red_on_gray: Vec<[u8; 3]> =
+///     rendering.limb().iter().map(|limb| if *limb == NO_LIMB { [90; 3] } else { [200, 30, 30] }).collect();
+///
+/// let mut tracker = Tracker::new(body, Config::default())?;
+/// tracker.reset_pose(&standing)?;
+/// for stamp in [0.0, 0.03] {
+///     let pixels = ColorPixels::Color(&red_on_gray);
+///     let image = ColorImage { pixels, camera: &camera, world_from_sensor, stamp, number: 0, source: 0 };
+///     tracker.step(&Frame::empty(stamp).with_colors(&[image]))?;
+/// }
+/// let near = tracker.region_lines(0).filter(|line| line.sigma.is_finite() && line.offset.abs() < 3.0); // pixels
+/// assert!(near.count() > 50);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionLine {
     /// The limb.

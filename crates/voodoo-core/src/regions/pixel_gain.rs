@@ -167,7 +167,7 @@ fn places(
     let axis = [end[0] - start[0], end[1] - start[1]];
     let length = (axis[0] * axis[0] + axis[1] * axis[1]).sqrt().max(1e-6);
     let aside = [-axis[1] / length, axis[0] / length];
-    let radii = [0.5 * (shape.a0() + shape.b0()), 0.5 * (shape.a1() + shape.b1())];
+    let radii = shape.ends().map(|end| 0.5 * (end.a + end.b));
     let [fx, fy] = camera.focal();
     let focal = 0.5 * (fx + fy);
     for along in ALONG {

@@ -13,6 +13,21 @@ use std::ops::Range;
 const SETTLED: f64 = 0.2;
 
 /// Closest points of a batch of queries, in the frame of the queries; index i belongs to query i.
+///
+/// ```
+/// use voodoo_core::math::{Points, Pose};
+/// use voodoo_core::{Region, SurfaceBatch, TaperedEllipticCylinder};
+///
+/// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.05, 0.05, 0.05)?;
+/// let mut queries = Points::default();
+/// queries.push([0.15, 0.0, 0.1]);
+/// queries.push([0.0, 0.0, -0.02]);
+/// let mut found = SurfaceBatch::default(); // kept and reused: no allocation per call
+/// forearm.closest_points(&Pose::IDENTITY, &queries, &mut found);
+/// assert!((found.signed_distance[0] - 0.1).abs() < 1e-6);
+/// assert_eq!(Region::from_u8(found.region[1]), Some(Region::ProximalCap));
+/// # Ok::<(), voodoo_core::ShapeError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceBatch {
     /// Points on the surface, meters.

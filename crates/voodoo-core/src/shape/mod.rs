@@ -42,6 +42,13 @@ pub(crate) const MAX_SIZE: f64 = 1e3;
 pub(crate) const RIM_NORMAL_DISTANCE: f64 = 1e-4;
 
 /// Why a shape was rejected.
+///
+/// ```
+/// use voodoo_core::{ShapeError, TaperedEllipticCylinder};
+///
+/// let refused = TaperedEllipticCylinder::new(-0.25, 0.05, 0.05, 0.03, 0.03);
+/// assert!(matches!(refused, Err(ShapeError::OutOfRange { name: "length", .. })));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ShapeError {
@@ -78,6 +85,8 @@ pub enum ShapeError {
 }
 
 /// The face of the closed surface on which a point lies.
+///
+/// [`SurfaceBatch`] and [`RayHit`](crate::RayHit) have examples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Region {
@@ -103,6 +112,8 @@ impl Region {
 }
 
 /// The point of the surface that is closest to a query, limb frame.
+///
+/// [`TaperedEllipticCylinder`] has an example.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// The point on the surface, meters.
@@ -142,8 +153,8 @@ impl TaperedEllipticCylinder {
     /// A shape from its length and its semi-axes along x and y at `z = 0` (`a0`, `b0`) and `z = length` (`a1`, `b1`), meters.
     ///
     /// # Errors
-    /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above [`MAX_SIZE`], or the length below
-    /// [`MIN_SIZE`]; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below [`MIN_SIZE`].
+    /// [`ShapeError::OutOfRange`] when a value is not a number, negative or above 1000 m, or the length below
+    /// 1e-6 m; [`ShapeError::Flat`] when `a0` and `a1`, or `b0` and `b1`, are both below 1e-6 m.
     pub fn new(length: f64, a0: f64, b0: f64, a1: f64, b1: f64) -> Result<Self, ShapeError> {
         for (name, min, value) in
             [("length", MIN_SIZE, length), ("a0", 0.0, a0), ("b0", 0.0, b0), ("a1", 0.0, a1), ("b1", 0.0, b1)]
@@ -206,6 +217,11 @@ impl TaperedEllipticCylinder {
     fn ellipse_sign(&self, q: Vec3) -> f64 {
         let (a, b) = self.semi_axes(q.z);
         (q.x * b).powi(2) + (q.y * a).powi(2) - (a * b).powi(2)
+    }
+
+    /// The shape with its length and its semi-axes `(a0, b0, a1, b1)` multiplied by factors.
+    pub(crate) fn stretched(&self, length: f64, [a0, b0, a1, b1]: [f64; 4]) -> Result<Self, ShapeError> {
+        Self::new(self.length * length, self.a0 * a0, self.b0 * b0, self.a1 * a1, self.b1 * b1)
     }
 
     /// Whether `q` is strictly inside the solid.

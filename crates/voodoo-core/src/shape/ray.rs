@@ -5,6 +5,17 @@ use super::{Region, TaperedEllipticCylinder};
 use crate::math::Vec3;
 
 /// The point at which a ray enters the solid, limb frame.
+///
+/// ```
+/// use voodoo_core::math::Vec3;
+/// use voodoo_core::{Region, TaperedEllipticCylinder};
+///
+/// let forearm = TaperedEllipticCylinder::new(0.25, 0.05, 0.05, 0.05, 0.05)?;
+/// let hit = forearm.cast_ray(Vec3::new(1.0, 0.0, 0.1), -Vec3::X, 2.0).ok_or("no hit")?;
+/// assert!((hit.distance - 0.95).abs() < 1e-9 && hit.region == Region::Side);
+/// assert_eq!(forearm.cast_ray(Vec3::new(1.0, 0.0, 0.3), -Vec3::X, 2.0), None); // beyond the distal cap
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Distance from the origin of the ray, meters.

@@ -36,6 +36,12 @@ impl TaperedEllipticCylinder {
     pub(crate) fn section(&self, t: f64) -> Section {
         Section { a: self.a0 + t * (self.a1 - self.a0), b: self.b0 + t * (self.b1 - self.b0), z: t * self.length }
     }
+
+    /// The sections at the proximal and the distal end, exactly.
+    #[inline]
+    pub(crate) fn ends(&self) -> [Section; 2] {
+        [Section { a: self.a0, b: self.b0, z: 0.0 }, Section { a: self.a1, b: self.b1, z: self.length }]
+    }
 }
 
 impl Section {

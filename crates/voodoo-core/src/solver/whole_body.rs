@@ -10,7 +10,7 @@ use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term};
+use crate::terms::{Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
 
 /// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
 const OVERLAP_SIGMA: f64 = 0.03;
@@ -128,11 +128,7 @@ impl WholeBody {
         let scale = narrowed(config.kernel_start, config.kernel_end, problem.step);
         let root = [config.root_turn_sigma, config.root_shift_sigma]
             .map(|sigma| sigma * problem.time_scale * config.motion_scale);
-        let edge_information = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
-        let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
-        let sites = Sites { correspondences, information, scale: (3.0 * scale).max(SITE_SCALE), biased };
-        let contour = Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale };
-        let regions = Regions { pairs: &correspondences.regions };
+        let measurements = Measurements::new(correspondences, config, scale, (3.0 * scale).max(SITE_SCALE), biased);
         let gain = still_prior_gain(problem, information);
         let free = Prior { predicted, root, joints: &self.joint_sigmas, holds: &[], rests: &self.rests };
         let holds = self.stillness.prior_gains(problem, &free, poses, gain);
@@ -144,11 +140,8 @@ impl WholeBody {
         let posture = Posture { fraction: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The cost function: a new term is a new file and a line here.
-        let terms: [Option<&dyn Term>; 9] = [
-            Some(&surface),
-            Some(&sites),
-            Some(&contour),
-            Some(&regions),
+        let terms: [Option<&dyn Term>; 6] = [
+            Some(&measurements),
             Some(&prior),
             config.limits.then_some(&limits),
             contours_alone(problem).then_some(&posture),

@@ -21,7 +21,9 @@ pub(crate) use regions::Regions;
 pub(crate) use sites::Sites;
 pub(crate) use surface::Surface;
 
+use crate::association::correspondence::Correspondences;
 use crate::body::Body;
+use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
@@ -29,4 +31,43 @@ use crate::terms::normal_equations::NormalEquations;
 pub(crate) trait Term {
     /// Adds cost, gradient and information at `poses` (working frame).
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
+}
+
+/// The terms of all measurements: those that the solver fits and from which covariances follow.
+#[derive(Debug)]
+pub(crate) struct Measurements<'a> {
+    surface: Surface<'a>,
+    sites: Sites<'a>,
+    contour: Contour<'a>,
+    regions: Regions<'a>,
+}
+
+impl<'a> Measurements<'a> {
+    /// The terms of `correspondences`, with kernels of `scale` for points and `site_scale` for sites, meters; `biased` as in
+    /// [`Sites`].
+    pub(crate) fn new(
+        correspondences: &'a Correspondences,
+        config: &Config,
+        scale: f64,
+        site_scale: f64,
+        biased: bool,
+    ) -> Self {
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let edge_information = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
+        Self {
+            surface: Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
+            sites: Sites { correspondences, information, scale: site_scale, biased },
+            contour: Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale },
+            regions: Regions { pairs: &correspondences.regions },
+        }
+    }
+}
+
+impl Term for Measurements<'_> {
+    fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
+        let terms: [&dyn Term; 4] = [&self.surface, &self.sites, &self.contour, &self.regions];
+        for term in terms {
+            term.add(body, poses, normal);
+        }
+    }
 }

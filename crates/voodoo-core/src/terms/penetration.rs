@@ -4,7 +4,6 @@
 use super::Term;
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
-use crate::shape::TaperedEllipticCylinder;
 use crate::terms::normal_equations::NormalEquations;
 
 /// Positions on a limb's axis that are tested for overlap, as fractions of the length: both ends, and two positions between.
@@ -18,7 +17,7 @@ const APPROXIMATE: f64 = 0.01;
 pub(crate) struct Penetration<'a> {
     /// Standard deviation of the overlap, meters.
     pub sigma: f64,
-    /// [`TaperedEllipticCylinder::sphere`] of every limb: excludes most pairs, which are far apart.
+    /// [`crate::TaperedEllipticCylinder::sphere`] of every limb: excludes most pairs, which are far apart.
     pub spheres: &'a [(Vec3, f64)],
 }
 
@@ -46,7 +45,7 @@ impl Penetration<'_> {
         for fraction in FELT {
             let z = fraction * shape.length();
             let local = start + along * z;
-            if is_outside_box(surface, local) || surface.approximate_distance(local) > APPROXIMATE {
+            if !surface.local_aabb().contains(local) || surface.approximate_distance(local) > APPROXIMATE {
                 continue;
             }
             let found = surface.closest_point(local);
@@ -62,14 +61,6 @@ impl Penetration<'_> {
             normal.limbs[other].add_row(weight, &row, overlap);
         }
     }
-}
-
-/// Whether a point in the limb frame lies outside the box around the shape.
-fn is_outside_box(shape: &TaperedEllipticCylinder, q: Vec3) -> bool {
-    q.x.abs() > shape.a0().max(shape.a1())
-        || q.y.abs() > shape.b0().max(shape.b1())
-        || q.z < 0.0
-        || q.z > shape.length()
 }
 
 /// Whether two spheres intersect.

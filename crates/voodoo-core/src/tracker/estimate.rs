@@ -4,6 +4,8 @@ use crate::math::{Pose, Vec3};
 use crate::uncertainty::Covariances;
 
 /// How much a pose can be relied on.
+///
+/// [`Estimate`] has an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Status {
@@ -34,6 +36,8 @@ impl Status {
 }
 
 /// How much the pose of one limb can be relied on.
+///
+/// [`Estimate`] has an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LimbStatus {
@@ -62,6 +66,8 @@ impl LimbStatus {
 }
 
 /// Contribution of one source to a step.
+///
+/// [`Estimate`] has an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct SourceReport {
@@ -76,6 +82,30 @@ pub struct SourceReport {
 }
 
 /// Pose and quality of one frame. World frame, meters, seconds.
+///
+/// ```
+/// use voodoo_core::math::Pose;
+/// use voodoo_core::{Body, Config, Frame, HumanModel, LimbStatus, PositionRelation, Status, Tracker};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let standing = body.rest_pose(Pose::IDENTITY);
+/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
+/// tracker.reset_pose(&standing)?;
+/// let marker = |site| {
+///     let position = body.site_position(&standing, site);
+///     PositionRelation { site, position, weight: 20.0, bias: 0.0, source: 0 }
+/// };
+/// let markers: Vec<_> = (0..body.sites().len()).map(marker).collect();
+/// let estimate = tracker.step(&Frame::empty(0.0).with_positions(&markers))?;
+///
+/// assert_eq!(estimate.status, Status::Tracking);
+/// assert_eq!(estimate.limb_status[body.limb_index("l_forearm")?], LimbStatus::Measured);
+/// assert_eq!(estimate.sources[0].inliers, markers.len());
+/// let wrist = body.site_index("l_wrist")?;
+/// let variance = estimate.covariances.sites[wrist]; // 3 x 3, m^2
+/// println!("{}, standard deviation along x {:.3} m", estimate.sites[wrist], variance.x_axis.x.sqrt());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Estimate {

@@ -26,6 +26,23 @@ impl Before {
 }
 
 /// Poses of all limbs in the last two estimates, world frame.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, Tracker};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
+/// tracker.reset_pose(&body.rest_pose(Pose::IDENTITY))?;
+/// assert!(tracker.limb_motion().is_none()); // before two frames
+/// for stamp in [0.0, 0.1] {
+///     tracker.step(&Frame::empty(stamp))?;
+/// }
+/// let motion = tracker.limb_motion().ok_or("two frames give a motion")?;
+/// let velocity: Vec3 = (motion.now[0].translation - motion.before[0].translation) / motion.interval; // m/s
+/// assert!(velocity.length() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct LimbMotion<'a> {
     /// Poses in the last estimate.

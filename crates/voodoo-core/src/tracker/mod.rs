@@ -26,6 +26,24 @@ use estimate::{Estimate, Status};
 use expected::Before;
 
 /// Tracks one body through a sequence of frames.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, PositionRelation, Tracker};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let standing = body.rest_pose(Pose::IDENTITY);
+/// let site = body.site_index("l_wrist")?;
+/// let marker = body.site_position(&standing, site) + Vec3::X * 0.02;
+/// let mut tracker = Tracker::new(body, Config::default())?;
+/// tracker.reset_pose(&standing)?;
+/// for stamp in [0.00, 0.03, 0.06] {
+///     let wrist = PositionRelation { site, position: marker, weight: 20.0, bias: 0.0, source: 0 };
+///     tracker.step(&Frame::empty(stamp).with_positions(&[wrist]))?;
+/// }
+/// assert!(tracker.estimate().sites[site].distance(marker) < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Tracker {
     config: Config,

@@ -6,6 +6,8 @@ use crate::body::Body;
 use crate::math::{Mat3, Vec3};
 
 /// Covariances of a frame's pose. World frame, meters, radians; NaN before the first frame.
+///
+/// [`Estimate`](crate::Estimate) has an example.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Covariances {
     /// Covariance of the position of every site.

@@ -20,7 +20,7 @@ use crate::math::{Pose, Vec3};
 use crate::sizes::girth::ALIKE;
 use crate::solver::{ChainSolver, LENGTH_INFORMATION, Lengths, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Contour, Regions, Sites, Surface, Term};
+use crate::terms::{Measurements, Term};
 
 /// Maximum number of surface points per meter of limb with independent errors.
 const PATCHES_PER_METER: f64 = 50.0;
@@ -153,16 +153,12 @@ impl Uncertainty {
     /// Returns the frame's information on every limb, limited to the number of independent measurements.
     fn sum_terms(&mut self, found: FittedPose, proven: impl Fn(usize) -> bool) {
         let FittedPose { body, poses, correspondences, config, .. } = found;
-        let (information, scale) = (1.0 / (config.point_sigma * config.point_sigma), config.kernel_end);
-        let edges = 1.0 / (config.depth_contour_sigma * config.depth_contour_sigma);
-        let surface = Surface { correspondences, information, tangential_weight: config.tangential_weight, scale };
-        let sites = Sites { correspondences, information, scale: SITE_SCALE, biased: true };
-        let contour = Contour { pairs: &correspondences.contour, information: edges, scale: 2.0 * scale };
-        let regions = Regions { pairs: &correspondences.regions };
         self.normal.clear(poses.len());
-        for term in [&surface as &dyn Term, &sites, &contour, &regions] {
-            term.add(body, poses, &mut self.normal);
-        }
+        Measurements::new(correspondences, config, config.kernel_end, SITE_SCALE, true).add(
+            body,
+            poses,
+            &mut self.normal,
+        );
         for (limb, block) in self.normal.limbs.iter_mut().enumerate() {
             let most = PATCHES_PER_METER * body.limbs()[limb].shape.length();
             let lines = correspondences.regions.iter().filter(|pair| pair.limb == limb).count();

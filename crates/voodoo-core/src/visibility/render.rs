@@ -15,6 +15,8 @@ use crate::math::{LANES, Pose, Vec3, is_rigid, widest};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
+///
+/// [`Rendering`] has an example.
 pub const NO_LIMB: u16 = u16::MAX;
 /// Rows in one thread's unit of work: fixed, so that the work is split in the same way for any number of threads.
 const ROWS_TOGETHER: usize = LANES;
@@ -29,6 +31,8 @@ const PLAIN_ASPECT: f64 = 0.3;
 const GRAZING: f64 = 0.02;
 
 /// Pose and calibration of a depth camera.
+///
+/// [`Rendering`] has an example.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewpoint<'a> {
     /// Calibration; pixels without a ray under the lens model stay empty.
@@ -59,6 +63,24 @@ impl Viewpoint<'_> {
 }
 
 /// A predicted depth image; its buffers are reused from image to image.
+///
+/// ```
+/// use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+/// use voodoo_core::{Body, Camera, HumanModel, NO_LIMB, Rendering, Viewpoint};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let camera = Camera::pinhole(320, 240, [290.0, 290.0, 159.5, 119.5])?;
+/// // The camera is 3 m in front of the person and looks along -x of the world.
+/// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));
+/// let view = Viewpoint { camera: &camera, world_from_sensor: Pose::from_parts(Vec3::X * 3.0, rotation) };
+/// let mut rendering = Rendering::default();
+/// rendering.render(&body, &body.rest_pose(Pose::IDENTITY), &view, None)?;
+/// let chest = 80 * rendering.width() + 160;
+/// assert_eq!(usize::from(rendering.limb()[chest]), body.limb_index("thorax")?);
+/// assert!((rendering.depth()[chest] - 2.9).abs() < 0.1);
+/// assert_eq!((rendering.depth()[0], rendering.limb()[0]), (0.0, NO_LIMB)); // past the person
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Rendering {
     width: usize,

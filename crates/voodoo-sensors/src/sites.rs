@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::math::Vec3;
+use voodoo_core::math::Vec3;
 
 /// Accepts measurements near predicted sites. The gate widens slowly while no measurement is accepted.
 #[derive(Clone, Debug, PartialEq)]
