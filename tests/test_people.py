@@ -45,7 +45,7 @@ def someone():
     return tracker.body, tracker.reset(joints=STANDING, fit_sizes=False)
 
 
-def test_somebody_comes_and_goes(someone):
+def test_a_person_enters_and_leaves(someone):
     people = voodoo.People()
     assert len(people.estimate) == 0 and np.isnan(people.estimate.stamp)
     for index in range(6):

@@ -68,8 +68,8 @@ def test_the_mean_posture_helps_where_one_view_does_not_report(solved, name):
 
 
 def test_depths_report_of_arms_before_the_trunk(solved):
-    outline, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
-    assert deep[0] < 0.5 * outline[0] and deep[1] < outline[1] + 0.001
+    silhouette, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
+    assert deep[0] < 0.5 * silhouette[0] and deep[1] < silhouette[1] + 0.001
 
 
 def test_one_view_leaves_open_what_it_cannot_see(sequence, monkeypatch):

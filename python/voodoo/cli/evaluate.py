@@ -10,7 +10,6 @@ import typer
 
 from voodoo.cli.common import clear_errors, print_interrupted, progressing, until_interrupted
 from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
-from voodoo.errors import VoodooError
 
 
 def eval_command(
@@ -32,9 +31,6 @@ def eval_command(
     model: ModelOption = None,
     use: UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
-    ablation: Annotated[
-        bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
-    ] = False,
     result: Annotated[
         Path | None,
         typer.Option(
@@ -50,10 +46,6 @@ def eval_command(
     summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be tracked to its
     end. Ctrl-C keeps the recordings that are done and ends with exit code 130.
 
-    With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
-    switch turned over, the other solvers, no prediction, no jitter penalty)
-    and prints a row each; --out gets ablation.md and ablation.csv.
-
     A recording with truth_people.csv beside it is tracked with --people any and judged for MOTA, IDF1, switches of identity,
     false bodies and joints. With --result a .csv that any program wrote is judged: stamp_s, person, status, residual_m, then
     NAME_x, NAME_y, NAME_z. --out gets people.csv and people.md.
@@ -68,13 +60,10 @@ def eval_command(
 
     voodoo eval rendered/ --init auto
 
-    voodoo eval rendered/ --ablate --out report
-
     voodoo eval two_walk/ --result theirs.csv
     """
     from voodoo.cli.people import judged, refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
-    from voodoo.evaluation.ablation import ablate, table, variants, write_tables
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.figure import new_figure
     from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
@@ -93,18 +82,6 @@ def eval_command(
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
-        if ablation:
-            chosen = config_of(config)
-            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
-            ablations, interrupted = until_interrupted(progressing(runs, "ablating", len(variants(chosen))))
-            typer.echo(table(ablations))
-            if out is not None:
-                typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
-            print_interrupted(interrupted, f"{len(ablations)} of {len(variants(chosen))} configurations are done")
-            failed = [score for item in ablations for score in item.failures]
-            if failed:
-                raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
-            return
         several = [path for path in paths if has_people(path)]
         judgments = list(
             progressing(

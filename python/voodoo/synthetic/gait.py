@@ -34,17 +34,16 @@ class Stop:
     facing: float
 
 
-def path(points: Sequence[tuple[float, float, float]], *, standing: float = math.pi) -> tuple[Stop, ...]:
-    """Stops of a person who goes through points and looks ahead.
+def path(points: Sequence[tuple[float, float, float]]) -> tuple[Stop, ...]:
+    """Stops of a person who walks through points, facing ahead, and while standing faces a camera that looks along x.
 
     Args:
         points: time [s], x and y [m], in the order of time, at least two of them.
-        standing: where who stands looks [rad]; pi is back at a camera that looks along x.
     """
     facings = []
     for (_, x, y), (_, next_x, next_y) in pairwise(points):
         away = math.hypot(next_x - x, next_y - y)
-        facings.append(standing if away < _STANDS_M else math.atan2(next_y - y, next_x - x))
+        facings.append(math.pi if away < _STANDS_M else math.atan2(next_y - y, next_x - x))
     facings = [float(value) for value in np.unwrap(facings)]
     stops = [Stop(*points[0], facings[0])]
     for index, point in enumerate(points[1:-1], start=1):

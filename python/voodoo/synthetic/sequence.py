@@ -1,7 +1,7 @@
-"""Depth sequences of our own body model: exact truth, known noise, every freedom moving at a chosen speed.
+"""Depth sequences of a moving body model with exact ground truth and known noise.
 
-What a tracker does on them is its own doing: model, start and calibration are perfect. `disturbed` adds what R07 section 5.2
-did to its images: uncorrelated noise, random rectangles, and frames that are corrupted, blank, repeated or late.
+Model, start and calibration are exact, so errors of a tracker on them are its own.
+All degrees of freedom move, at a chosen speed.
 """
 
 from __future__ import annotations
