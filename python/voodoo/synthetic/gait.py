@@ -1,4 +1,4 @@
-"""How made-up people walk: from stop to stop, legs and arms swinging with the distance covered."""
+"""Gait of synthetic persons: legs and arms swing with the distance walked between stops."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from voodoo.model.body import Body
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _STRIDE_M = 1.4
-"""Two steps."""
+"""Length of two steps."""
 _TURN_S = 0.4
 """Duration of a turn when the walking direction changes."""
 _STANDS_M = 0.05
@@ -26,7 +26,7 @@ _STANDS_M = 0.05
 
 @dataclass(frozen=True)
 class Stop:
-    """Where the person is at a time: seconds, meters on the floor, direction it faces [rad], 0 away from the camera."""
+    """Position of a person at a time: seconds, meters on the floor, facing direction [rad], 0 is away from the camera."""
 
     time: float
     x: float
@@ -57,7 +57,7 @@ def path(points: Sequence[tuple[float, float, float]]) -> tuple[Stop, ...]:
 def pose_at(
     body: Body, stops: Sequence[Stop], time: float
 ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
-    """Poses of the limbs and positions of the sites of a walking body at a time [s]; its joints are those of the human."""
+    """Poses of the limbs and positions of the sites of a walking body at a time [s]; it needs the joints of the human."""
     times = [stop.time for stop in stops]
     place = np.array([[stop.x, stop.y] for stop in stops])
     x, y = (float(np.interp(time, times, place[:, axis])) for axis in (0, 1))
