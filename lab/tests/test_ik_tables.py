@@ -9,6 +9,7 @@ import ik_tables
 import numpy as np
 import pytest
 
+from measurement_data import data_folder
 from voodoo.model.projection import CameraView
 
 
@@ -94,9 +95,7 @@ def test_the_best_guess_among_turns():
 
 @pytest.mark.long
 def test_four_real_cameras(voodoo_data):
-    if not (voodoo_data / "pose2sim" / "videos").is_dir():
-        pytest.skip("the videos of Pose2Sim are not there")
-    trial = ik_pose2sim.four_cameras(voodoo_data / "pose2sim")
+    trial = ik_pose2sim.four_cameras(data_folder(voodoo_data, "pose2sim", "videos").parent)
     assert trial.agreeing == ("cam_01", "cam_02", "cam_04")
     # The worse a calibration, the less exactly its silhouettes are taken.
     borders = {name: trial.border(name) for name in trial.apart}
