@@ -1,5 +1,10 @@
 //! Counts the frames of two standing persons in which `People` allocates.
-#![allow(missing_docs, clippy::unwrap_used, reason = "a test stops at the first surprise")]
+#![allow(
+    dead_code,
+    missing_docs,
+    clippy::unwrap_used,
+    reason = "shared by two tests that stop at the first surprise; one of them does not use all of it"
+)]
 
 use crate::counting::allocations_so_far;
 use crate::scene;
