@@ -157,7 +157,7 @@ def fuzz(cases: int, *, first: int = 0, jobs: int = 1, only: str = "") -> Report
     """Run cases in child processes, and start another where one dies."""
     report, lock = Report(), threading.Lock()
     threads = [
-        threading.Thread(target=_watch, args=(first + job, first + cases, jobs, only, report, lock))
+        threading.Thread(target=_supervise, args=(first + job, first + cases, jobs, only, report, lock))
         for job in range(jobs)
     ]
     for thread in threads:
@@ -167,7 +167,7 @@ def fuzz(cases: int, *, first: int = 0, jobs: int = 1, only: str = "") -> Report
     return report
 
 
-def _watch(case: int, last: int, step: int, only: str, report: Report, lock: threading.Lock) -> None:
+def _supervise(case: int, last: int, step: int, only: str, report: Report, lock: threading.Lock) -> None:
     while case < last:
         with tempfile.TemporaryDirectory(prefix="voodoo-fuzz-") as folder:
             command = [sys.executable, __file__, "--work", str(case), str(last), str(step), folder, only]

@@ -1,14 +1,9 @@
 """What the tests of inverse kinematics share: a camera in front of the person, and small questions about chains."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 
 import voodoo
 
-EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 ARM = ("l_upperarm", "l_forearm")
 BAR = """name = "bar"
 [[limbs]]
@@ -20,14 +15,6 @@ parent = "base"
 shape = { length = 0.4, a0 = 0.08, b0 = 0.08, a1 = 0.08, b1 = 0.08 }
 joint = { name = "joint" }
 """
-
-
-def load_example(name):
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def shoulder(arm):

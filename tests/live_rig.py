@@ -43,7 +43,7 @@ class Rig:
     """Live, a follower and a clock, without threads.
 
     Attributes:
-        told: lines for people.
+        messages: lines for the user.
         steps: of all frames that were tracked.
     """
 

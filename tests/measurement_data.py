@@ -14,3 +14,11 @@ def voodoo_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"measurement data not found at {folder}: set VOODOO_DATA to the folder that holds rendered/ etc.")
     return folder
+
+
+def data_folder(voodoo_data: Path, *parts: str) -> Path:
+    """A folder of the measurement data; tests that need it are skipped without."""
+    folder = voodoo_data.joinpath(*parts)
+    if not folder.is_dir():
+        pytest.skip(f"expected measurement data at {folder}")
+    return folder

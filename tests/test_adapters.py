@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import voodoo
+from commands import load_script
 from core_fakes import CAMERA, FakeRecording
-from ik_cases import load_example
 from voodoo.errors import MeasurementError
 from voodoo.measurements import (
     ColorImage,
@@ -27,13 +27,16 @@ from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.kinds import inputs, inputs_of
 from voodoo.visualization.overlay import Overlay
 
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+
 PACKAGE = Path(voodoo.__file__).parent
 
 
 @pytest.fixture
 def uwb():
     """The example of a new sensor, registered for one test."""
-    module = load_example("uwb_tag")
+    module = load_script(EXAMPLES / "uwb_tag.py")
     yield module
     adapters.unregister("uwb")
 

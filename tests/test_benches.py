@@ -1,8 +1,8 @@
 """The benches in Python still find what they time."""
 
-import importlib.util
 from pathlib import Path
 
+from commands import load_script
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings import open_recording, sample_path
 
@@ -10,9 +10,7 @@ BENCHES = Path(__file__).resolve().parent.parent / "benches"
 
 
 def test_every_part_of_a_fused_frame_is_timed():
-    spec = importlib.util.spec_from_file_location("fusion_frame", BENCHES / "fusion_frame.py")
-    bench = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(bench)
+    bench = load_script(BENCHES / "fusion_frame.py")
     recording = open_recording(sample_path())
     spent = bench.parts(recording, bench.with_keypoints(recording, list(paired(recording))[:6]))
     assert len(spent) == 6 and all(seconds > 0.0 for seconds in spent.values()), spent

@@ -114,7 +114,7 @@ def test_track_passes_frame_and_init(run):
     assert written.joints[0, written.joint_names.index("l_hip"), 2] == pytest.approx(T_POSE["l_hip"][2] + 0.5)
 
 
-def test_track_without_start_looks_for_somebody(run):
+def test_track_without_start_searches_for_a_person(run):
     """One row a frame with its stamp; empty cells until the person is found, and when they are gone."""
     run.recording = FakeRecording(frames=8, start=False)
     run.tracker.found_at, run.tracker.gone_at = 2, 6
@@ -201,7 +201,7 @@ def test_boxes_to_leave_out(run):
     assert run.tracker.last.excluded == [((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), ((2.0, 2.0, 0.0), (3.0, 3.0, 1.0))]
 
 
-def test_eval_can_look_for_the_person_itself(run):
+def test_eval_can_search_for_the_person(run):
     Path("a_depth.mat").touch()
     run.tracker.found_at = 4
     result = run("eval", "a_depth.mat", "--jobs", "1", "--init", "auto")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from measurement_data import data_folder
 from voodoo.evaluation.evaluate import compare, evaluate
 from voodoo.export.track import Track
 from voodoo.pipeline.run import start_tracker, track
@@ -13,16 +14,9 @@ RENDERED = ("mv_d1_walk_turn_cmu", "mv_d2_arms_fast_cmu", "mv_d3_cartwheel_cmu")
 USE = ("color",)
 
 
-def found(voodoo_data, *parts):
-    path = voodoo_data.joinpath(*parts)
-    if not path.is_dir():
-        pytest.skip(f"the recording is not at {path}")
-    return path
-
-
 @pytest.mark.parametrize("name", [RENDERED[2], *(pytest.param(name, marks=pytest.mark.long) for name in RENDERED[:2])])
 def test_four_rendered_cameras_lose_nobody(voodoo_data, name):
-    score, table = evaluate(found(voodoo_data, "multiview", name))
+    score, table = evaluate(data_folder(voodoo_data, "multiview", name))
     assert score.frames == len(table.stamps) > 90 and score.exact
     assert score.error_m < 0.035 and score.lost_joints == () and score.angle_error_deg < 8.0
 
@@ -40,7 +34,7 @@ def errors(path, cameras=None):
 @pytest.mark.long
 def test_four_real_cameras_agree_with_the_triangulation(voodoo_data):
     """From pictures alone; the triangulation is from keypoints of the same pictures, which agree with it to 2.5 cm."""
-    path = found(voodoo_data, "pose2sim")
+    path = data_folder(voodoo_data, "pose2sim")
     assert np.nanmean(errors(path)) < 0.05
     names = [f"cam_0{number}" for number in range(1, 5)]
     for missing in names[:3]:

@@ -8,21 +8,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import color_scene as scene
 from bag_writer import write_bag
-from voodoo.cli import app
+from commands import run
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording
 from voodoo.sensors.settings import FrontEndSettings
 
 FRAMES = 10
-
-
-def run(*words):
-    return CliRunner().invoke(app, [str(word) for word in words], env={"COLUMNS": "200"})
 
 
 def rows_of(path):

@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 import voodoo
-from commands import refused
+from commands import load_script, refused
 from commands import run as command
-from ik_cases import load_example
 from test_people import WORLD_FROM_SENSOR, frame
 from voodoo.detectors import JOINTS, LENGTHS, CallableDetector, DetectedPerson, DetectorImage, OnnxDetector
 from voodoo.errors import ConfigError, MeasurementError
 from voodoo.recordings import sample_path
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
 
 FIVE = ("humanoid_root", "l_shoulder", "r_shoulder", "l_ankle", "r_ankle")
 STANDING = {
@@ -271,5 +273,5 @@ def test_a_trained_onnx_file_sees_what_the_shipped_network_sees(someone):
 
 
 def test_the_example_finds_the_bundled_person():
-    errors = load_example("custom_detector").main()
+    errors = load_script(EXAMPLES / "custom_detector.py").main()
     assert errors < 0.12

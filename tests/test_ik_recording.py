@@ -2,14 +2,16 @@
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+import commands
 import voodoo
-from voodoo import cli, ik
+from commands import refused
+from voodoo import ik
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.ik import KNOWN, Positions, follow
@@ -49,15 +51,7 @@ def some(recording):
     return Some(recording, 12)
 
 
-def run(*arguments):
-    return CliRunner().invoke(cli.app, ["ik", *map(str, arguments)], env={"COLUMNS": "200"})
-
-
-def refused(result, *words):
-    assert result.exit_code == 1, result.output
-    assert result.stderr.count("\n") == 1 and result.stderr.startswith("voodoo: "), result.stderr
-    for word in words:
-        assert word in result.stderr
+run = partial(commands.run, "ik")
 
 
 def test_follow_reaches_what_is_known_and_reports_the_rest(some):

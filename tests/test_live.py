@@ -184,7 +184,7 @@ def test_what_is_older_than_half_a_second_joins_no_frame():
     assert [item.sensor for item in assembler.poll(2.0).measurements] == ["depth"]
 
 
-def test_a_damaged_picture_costs_only_itself():
+def test_a_damaged_picture_is_the_only_loss():
     def broken():
         raise RecordingError("cut off")
 
@@ -242,7 +242,7 @@ def test_a_slow_source_is_not_called_lost_between_its_images():
     assert (rig.live.status, rig.counts) == ("running", {})
 
 
-def test_a_stalled_source_that_repeats_itself_is_lost_too():
+def test_a_stalled_source_that_repeats_its_frame_is_lost_too():
     rig = Rig()
     same = wall(1.0)
     for number in range(40):

@@ -294,7 +294,7 @@ def test_every_bad_image_is_counted_as_received_and_refused():
     assert live.refused == sum(count for kind, count in bus.rig.counts.items() if kind != "stalled")
 
 
-def test_after_a_long_gap_somebody_is_searched_for_anew():
+def test_after_a_long_gap_the_search_starts_anew():
     bus = Bus()
     bus.good(5)
     first = bus.rig.follower._one

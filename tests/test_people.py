@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import voodoo
+from measurement_data import data_folder
 from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.people import PeopleFrontEnd
@@ -45,7 +46,7 @@ def someone():
     return tracker.body, tracker.reset(joints=STANDING, fit_sizes=False)
 
 
-def test_somebody_comes_and_goes(someone):
+def test_a_person_enters_and_leaves(someone):
     people = voodoo.People()
     assert len(people.estimate) == 0 and np.isnan(people.estimate.stamp)
     for index in range(6):
@@ -140,9 +141,7 @@ def test_what_cannot_be_meant_is_refused(someone):
 
 
 def test_two_persons_in_four_pictures_without_names(voodoo_data):
-    folder = voodoo_data / "pose2sim-two"
-    if not folder.is_dir():
-        pytest.skip(f"the recording of two people is not at {folder}")
+    folder = data_folder(voodoo_data, "pose2sim-two")
     recording, people = open_recording(folder), voodoo.People()
     files = [next(folder.glob(f"*_P{number}_0-100.trc")) for number in (1, 2)]
     known = [read_trc(file, world_from_file=Z_UP_FROM_Y_UP).of(SITES) for file in files]
@@ -167,9 +166,7 @@ def test_two_persons_in_four_pictures_without_names(voodoo_data):
 
 
 def test_two_who_cross_keep_their_numbers(voodoo_data):
-    folder = voodoo_data / "people" / "pp_p2_two_cross_twice_cmu"
-    if not folder.is_dir():
-        pytest.skip(f"the recording of people is not at {folder}")
+    folder = data_folder(voodoo_data, "people", "pp_p2_two_cross_twice_cmu")
     with (folder / "truth_people.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if float(row["in_view"]) > 0.3]
     recording, people = open_recording(folder / "bag"), voodoo.People()

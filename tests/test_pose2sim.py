@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from measurement_data import data_folder
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
 from voodoo.recordings.camera_files import read_camera_toml
@@ -51,10 +52,7 @@ def test_rays_that_disagree_lose_their_trust():
 
 @pytest.fixture(scope="module")
 def folder(voodoo_data):
-    path = voodoo_data / "pose2sim"
-    if not path.is_dir():
-        pytest.skip(f"the Pose2Sim recording is not at {path}")
-    return path
+    return data_folder(voodoo_data, "pose2sim")
 
 
 def test_recording(folder):

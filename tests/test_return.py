@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import voodoo
+from room_walk import Walk
 from voodoo.evaluation import metrics
-from voodoo.synthetic.room_walk import Stop, Walk
+from voodoo.synthetic.gait import Stop
 
 LEFT, RIGHT, TO_CAMERA, AWAY = math.pi / 2, -math.pi / 2, math.pi, 0.0
 STANDING = (Stop(0.0, 2.8, 0.0, TO_CAMERA), Stop(0.5, 2.8, 0.0, TO_CAMERA))
@@ -68,7 +69,7 @@ def test_an_empty_furnished_room_is_no_person(body):
     assert (status[stamps > 0.6] == "lost").all()
 
 
-def test_who_turned_about_unseen_is_known_by_walking(body):
+def test_a_hidden_turn_is_recognized_by_the_walking_direction(body):
     walk = Walk(
         body=body,
         stops=(*STANDING, Stop(1.5, 2.8, 0.0, AWAY), Stop(2.5, 2.8, 0.0, AWAY), Stop(3.8, 3.7, 0.0, AWAY)),

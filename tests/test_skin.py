@@ -26,7 +26,7 @@ def test_hands_and_face_are_found_and_named():
         assert pixel_error(skin, site, pixel) < 2.0
 
 
-def test_a_lens_that_distorts_is_looked_through():
+def test_a_distorting_lens_is_undistorted():
     bent = replace(CAMERA, distortion=(0.05, -0.02, 0.001, 0.0))
     head, left, right = (160, 60), (110, 120), (210, 120)
     pose = Pose(head, left, right)

@@ -138,7 +138,7 @@ def test_markers_are_measurements_not_a_start_beside(run, tmp_path):
     assert error_of(result, FRAMES - 1) < 0.03
 
 
-def test_depth_alone_starts_by_itself(run, tmp_path):
+def test_depth_alone_auto_initializes(run, tmp_path):
     """The bundled recording, with and without what lies beside it."""
     whole, bare = tmp_path / "rec", tmp_path / "bare" / "rec"
     shutil.copytree(sample_path(), whole)

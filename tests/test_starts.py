@@ -48,7 +48,7 @@ def person(at=(2.5, 0.0), facing=np.pi):
     return {name: way @ (place - (0.0, 0.0, floor)) + (*at, 0.0) for name, place in sites.items()}
 
 
-def looking(origin, at):
+def facing_pose(origin, at):
     """Pose of a camera that looks from one place to another (3,), upright."""
     z = np.subtract(at, origin) / np.linalg.norm(np.subtract(at, origin))
     x = np.cross(z, (0.0, 0.0, 1.0))
@@ -91,7 +91,7 @@ def worst(found, joints):
     return max(float(np.linalg.norm(place - joints[name])) for name, place in found.joints.items())
 
 
-AROUND = [looking(origin, (2.5, 0.0, 1.0)) for origin in ((0.0, 0.0, 1.4), (2.0, -3.0, 1.2), (2.5, 3.0, 1.8))]
+AROUND = [facing_pose(origin, (2.5, 0.0, 1.0)) for origin in ((0.0, 0.0, 1.4), (2.0, -3.0, 1.2), (2.5, 3.0, 1.8))]
 
 
 def test_rays_meet_where_most_of_them_agree():
@@ -246,7 +246,7 @@ def frames(*measurements, count, rate=30.0):
         yield RecordedFrame(index / rate, moved)
 
 
-def test_a_front_end_starts_by_itself_and_again_after_the_person_was_gone():
+def test_a_front_end_auto_initializes_and_again_after_the_person_has_left():
     joints = person()
     tracker = voodoo.Tracker(BODY)
     front_end = FrontEnd(tracker)

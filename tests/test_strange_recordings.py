@@ -7,12 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import voodoo
 import voodoo.pipeline.start
 from bag_writer import Messages, write_bag
-from voodoo.cli import app
+from commands import run
 from voodoo.errors import CameraError, RecordingError
 from voodoo.export.track import Track
 from voodoo.recordings import ColorImage, DepthImage, open_recording
@@ -23,10 +22,6 @@ from voodoo.recordings.rvl import decode_rvl
 REALSENSE = Path(__file__).parent / "data" / "realsense"
 M = Messages()
 DEPTH = np.array([[0, 1, 2, 3], [400, 500, 600, 0], [800, 9000, 0, 65535]], np.uint16)
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "200"})
 
 
 # RealSense

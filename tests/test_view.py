@@ -183,7 +183,7 @@ def test_wrong_suffix(tmp_path):
         Viewer(save=tmp_path / "x.mp4")
 
 
-def test_limb_mesh_is_closed_and_looks_outwards():
+def test_limb_mesh_is_closed_and_faces_outwards():
     shape = voodoo.TaperedEllipticCylinder(0.4, 0.1, 0.08, 0.05, 0.06)
     vertices, triangles, normals = limb_mesh(shape)
     corners = vertices[triangles].astype(float)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import voodoo
+from disturbance import Disturbance, disturbed
 from voodoo.evaluation import metrics
 from voodoo.ik import Chain
 from voodoo.ik.angles import angles_of
-from voodoo.synthetic.disturbance import Disturbance, disturbed
 from voodoo.synthetic.grown import grown
 from voodoo.synthetic.sequence import VirtualSequence
 

@@ -6,9 +6,8 @@
 Two kinds of sequences with exact truth are tracked by depth alone, through a pinhole and through a plumb-bob, a rational and a
 fisheye lens that show as much of the scene:
 
-- Rendered recordings, whose depth images are seen again through each lens (`voodoo.synthetic.through_lens`). The pinhole is
-  sampled again as well, through a camera of slightly another focal length and center, so that all images have the same noise of
-  sampling.
+- Rendered recordings, whose depth images are resampled through each lens (through_lens.py). The pinhole is resampled as well,
+  through a camera with a slightly different focal length and center, so that all images have the same sampling noise.
 - A person who walks about a room and one who swings every joint (`voodoo.synthetic`), rendered through each lens, pixel by pixel;
   the cameras are 100 degrees wide.
 
@@ -20,12 +19,14 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+from through_lens import ThroughLens
 
 import voodoo
 from voodoo.evaluation.metrics import JOINTS
@@ -35,28 +36,20 @@ from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.gait import path
-from voodoo.synthetic.room_walk import Walk
 from voodoo.synthetic.sequence import VirtualFrame, VirtualSequence
-from voodoo.synthetic.through_lens import ThroughLens
 from voodoo.visualization.body_drawing import draw_body
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from lenses import LENSES
+from room_walk import Walk
+
 RECORDINGS = ("dev_01_bend_scoop_cmu", "dev_02_arms_cmu", "dev_04_kick_ball_cmu", "dev_05_walk")
-AZURE = (
-    0.5479397774,
-    -0.0209713709,
-    2.0557534e-5,
-    -7.2104158e-5,
-    -0.0026522316,
-    0.8896790743,
-    0.0861302093,
-    -0.0139103848,
-)
-"""The depth camera of an Azure Kinect."""
-LENSES: dict[str, tuple[str, tuple[float, ...]]] = {
-    "pinhole": ("plumb_bob", ()),
-    "plumb bob": ("plumb_bob", (-0.24, 0.06, 0.0008, -0.0006, -0.006)),
-    "rational": ("rational_polynomial", AZURE),
-    "fisheye": ("equidistant", (0.02, -0.01, 0.003, -0.001)),
+MODELS = {
+    "pinhole": LENSES["none"],
+    "plumb bob": LENSES["plumb_bob"],
+    "rational": LENSES["azure"],
+    "fisheye": LENSES["fisheye"],
 }
 WIDE = voodoo.Camera(320, 240, 134.0, 134.0, 159.5, 119.5)
 """100 degrees from left to right."""
@@ -64,7 +57,7 @@ WIDE = voodoo.Camera(320, 240, 134.0, 134.0, 159.5, 119.5)
 
 def through(name: str, camera: voodoo.Camera) -> voodoo.Camera:
     """A camera that sees as far to the left and right through a lens."""
-    model, coefficients = LENSES[name]
+    model, coefficients = MODELS[name]
     unit = voodoo.Camera(2, 2, 1.0, 1.0, 0.0, 0.0, coefficients, model)  # type: ignore[arg-type]
     half = (camera.width - 1) / 2.0
     fraction = half / camera.fx / float(unit.project([[half / camera.fx, 0.0, 1.0]])[0, 0])
@@ -182,7 +175,7 @@ def main() -> None:
     print("\n".join(lines), flush=True)
     for name, steps in sequences.items():
         rectified = math.nan
-        for lens in LENSES:
+        for lens in MODELS:
             shot = arguments.out / f"{name}_{lens}.png".replace(" ", "_")
             runs = np.array([measure(steps(lens, seed), shot) for seed in range(1, arguments.seeds + 1)])
             (error, lost, tracked), spread = runs.mean(axis=0), runs[:, 0].std()

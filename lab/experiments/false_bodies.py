@@ -5,7 +5,7 @@
 
 Rooms come from rooms.py: cupboards, coat stands, lamps, pillars, palms and dummies, three in each, one seed a room,
 in turn by three sensors and with the floor known and not. They stand still, and so they do in the synthetic room of
-`voodoo.synthetic` without its person. Of recordings of people the frames without a person in view count, and what is tracked
+tests/room_walk.py without its person. Of recordings of people the frames without a person in view count, and what is tracked
 counts as false while its root is farther than 0.5 m from everybody.
 
 A false body is a run of frames in which one is tracked, whatever its status. One that is left behind by a person who was
@@ -13,6 +13,7 @@ followed is counted by itself, and so is one that begins while people are in vie
 """
 
 import argparse
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,11 @@ from one_of_many import ELSE, follow, stretches
 
 import voodoo
 from voodoo.names import SEARCHING
-from voodoo.synthetic.room_walk import Stop, Walk
+from voodoo.synthetic.gait import Stop
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from room_walk import Walk
 
 
 @dataclass(frozen=True)

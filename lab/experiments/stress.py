@@ -13,6 +13,7 @@ the shift that fits best, to a hundredth of a frame.
 """
 
 import argparse
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,8 +29,11 @@ from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, RecordedFrame
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.disturbance import Disturbance, disturbed, disturbed_image
 from voodoo.synthetic.sequence import VirtualSequence
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from disturbance import Disturbance, disturbed, disturbed_image
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -1,14 +1,10 @@
 """The table of lab/experiments/covered_camera.py."""
 
 import sys
-from pathlib import Path
 
 import pytest
 
-from lab_scripts import load_experiment
-
-ROOT = Path(__file__).resolve().parents[2]
-BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
+from lab_scripts import BUNDLED, load_experiment
 
 
 @pytest.fixture

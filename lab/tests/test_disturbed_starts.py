@@ -1,16 +1,12 @@
 """The table of lab/experiments/disturbed_starts.py."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import voodoo
-from lab_scripts import load_experiment
-
-ROOT = Path(__file__).resolve().parents[2]
-BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
+from lab_scripts import BUNDLED, load_experiment
 
 
 @pytest.fixture

@@ -1,18 +1,13 @@
 """Pictures of lost joints, as lab/experiments/failures.py makes them."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
 
 import voodoo
-from lab_scripts import load_experiment
+from lab_scripts import BUNDLED, load_experiment
 from voodoo.pipeline import run as running
 from voodoo.recordings import DepthImage
-
-ROOT = Path(__file__).resolve().parents[2]
-BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
 
 
 def load():

@@ -1,16 +1,12 @@
 """The table of lab/experiments/first_pose.py."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lab_scripts import load_experiment
+from lab_scripts import BUNDLED, load_experiment
 from voodoo.evaluation.metrics import JOINTS
-
-ROOT = Path(__file__).resolve().parents[2]
-BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
 
 
 @pytest.fixture

@@ -3,15 +3,13 @@
 import fusion_pose2sim
 import pytest
 
+from measurement_data import data_folder
 from voodoo.recordings import open_recording
 
 
 @pytest.fixture(scope="module")
 def folder(voodoo_data):
-    path = voodoo_data / "pose2sim"
-    if not path.is_dir():
-        pytest.skip(f"the Pose2Sim recording is not at {path}")
-    return path
+    return data_folder(voodoo_data, "pose2sim")
 
 
 @pytest.mark.parametrize("solver", ["limbwise", "chain"])

@@ -9,6 +9,7 @@ import ik_tables
 import numpy as np
 import pytest
 
+from measurement_data import data_folder
 from voodoo.model.projection import CameraView
 
 
@@ -71,8 +72,8 @@ def test_the_mean_posture_helps_where_one_view_does_not_report(solved, name):
 
 @pytest.mark.long
 def test_depths_report_of_arms_before_the_trunk(solved):
-    outline, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
-    assert deep[0] < 0.5 * outline[0] and deep[1] < outline[1] + 0.001
+    silhouette, deep = solved("dev_07_sword_cmu", 1), solved("dev_07_sword_cmu", 1, deep=True)
+    assert deep[0] < 0.5 * silhouette[0] and deep[1] < silhouette[1] + 0.001
 
 
 @pytest.mark.long
@@ -98,9 +99,7 @@ def test_the_best_guess_among_turns():
 
 @pytest.mark.long
 def test_four_real_cameras(voodoo_data):
-    if not (voodoo_data / "pose2sim" / "videos").is_dir():
-        pytest.skip("the videos of Pose2Sim are not there")
-    trial = ik_pose2sim.four_cameras(voodoo_data / "pose2sim")
+    trial = ik_pose2sim.four_cameras(data_folder(voodoo_data, "pose2sim", "videos").parent)
     assert trial.agreeing == ("cam_01", "cam_02", "cam_04")
     # The worse a calibration, the less exactly its silhouettes are taken.
     borders = {name: trial.border(name) for name in trial.apart}

@@ -1,17 +1,14 @@
 """The tables of lab/experiments/unseen_people.py."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import voodoo
-from lab_scripts import load_experiment
+from lab_scripts import BUNDLED, load_experiment
 from voodoo.evaluation import metrics
 from voodoo.measurements import DepthImage
-
-BUNDLED = Path(__file__).resolve().parents[2] / "python" / "voodoo" / "data" / "bend_scoop"
 
 
 @pytest.fixture

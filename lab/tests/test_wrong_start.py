@@ -2,20 +2,17 @@
 
 import sys
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import voodoo
-from lab_scripts import load_experiment
+from lab_scripts import BUNDLED, load_experiment
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 
-ROOT = Path(__file__).resolve().parents[2]
-BUNDLED = ROOT / "python" / "voodoo" / "data" / "bend_scoop"
 UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -247,54 +247,53 @@ macro_rules! config {
 }
 
 words! {
-    /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
+    /// Assignment of a free point inside the boxes of several limbs (K06 IV-B.2).
     Overlap {
-        /// It goes to every one of them.
+        /// To all of them.
         Shared = "shared",
-        /// It goes to the closest one (K07 3.2).
+        /// To the closest one (K07 3.2).
         Exclusive = "exclusive",
-        /// It goes to the closest one and to those of the others that are joined to it.
+        /// To the closest one, and to those of the others that are joined to it.
         Adjacent = "adjacent",
     }
 }
 
 words! {
-    /// How the pose follows from the correspondences.
+    /// Solver of the pose for given correspondences.
     SolverKind {
         /// Each limb alone, by weighted absolute orientation (K06, K07).
         Limbwise = "limbwise",
-        /// All limbs at once with exact joints, by damped Gauss-Newton on robust terms (R07, method section 4.3).
+        /// All limbs at once with exact joints, by damped Gauss-Newton with robust terms (R07, method section 4.3).
         Chain = "chain",
-        /// All limbs at once, each with a twist of its own, joined by strong elastic bands (K07 section 4).
+        /// All limbs at once, each with a separate twist, joined by stiff elastic bands (K07 section 4).
         Tree = "tree",
     }
 }
 
 config! {
-    /// How the pose is found from the correspondences.
+    /// Solver of the pose for given correspondences.
     solver: SolverKind = SolverKind::Chain, "";
-    /// Greatest number of ICP steps in a frame (K07 section 7: of the published ones 6 are a good compromise).
+    /// Maximum number of ICP steps per frame (K07 section 7 recommends 6 of the published ones).
     max_steps: usize = 5, "", 1 ..= 100;
-    /// The steps end when the mean squared distance changes by less than this (K06 III-B step 6).
+    /// Convergence threshold: the steps end when the mean squared distance changes by less (K06 III-B step 6).
     min_change: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
     /// Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1).
     body_box_margin: f64 = 0.20, "m", 0.0 ..= 10.0;
-    /// Enlargement of the box of each limb: how far a limb may move between two frames (K06 IV-B.2;
-    /// limbwise solver).
+    /// Enlargement of the box of each limb: the largest motion of a limb between two frames (K06 IV-B.2; limbwise solver).
     limb_box_margin: f64 = 0.10, "m", 0.0 ..= 10.0;
-    /// What happens to a free point inside the boxes of several limbs (K06 IV-B.2).
+    /// Assignment of a free point inside the boxes of several limbs (K06 IV-B.2).
     overlap: Overlap = Overlap::Exclusive, "";
-    /// At most about this many pixels of a depth image are used; a finer image is sampled on a grid.
+    /// Approximate maximum number of pixels of a depth image; larger images are sampled on a grid.
     max_points: usize = 3000, "", 100 ..= 10000000;
-    /// Learn the still scene behind the body from depth images, as long as their camera does not move, and leave it out.
+    /// Learn the static background from the depth images of cameras that do not move, and exclude it.
     background: bool = true, "";
-    /// Every n-th point of a limb is used (K06 IV-B.3).
+    /// Use every n-th point of a limb (K06 IV-B.3).
     sampling_factor: usize = 1, "", 1 ..= 1000;
-    /// A limb keeps at least this many of its points when sampled (K06 IV-B.3).
+    /// Minimum number of points of a limb after sampling (K06 IV-B.3).
     min_limb_points: usize = 50, "", 0 ..= 1000000;
-    /// A limb keeps at most this many points (K06 IV-B.3).
+    /// Maximum number of points of a limb (K06 IV-B.3).
     max_limb_points: usize = 1000, "", 1 ..= 1000000;
-    /// A point farther than this from its limb's surface is not matched (K06 IV-B.4; limbwise solver).
+    /// Maximum distance of a matched point from the surface of its limb (K06 IV-B.4; limbwise solver).
     max_distance: f64 = 0.15, "m", 0.001 ..= 10.0;
     /// Weight of the elastic bands of a limb relative to its measurements (K07 4.3: 0.4 to 0.7; limbwise solver).
     band_ratio: f64 = 0.5, "", 0.0 ..= 100.0;
@@ -302,54 +301,54 @@ config! {
     band_sigma: f64 = 0.003, "m", 0.00001 ..= 1.0;
     /// Standard deviation of a surface point of weight one, for the whole-body solvers.
     point_sigma: f64 = 0.03, "m", 0.0001 ..= 1.0;
-    /// Share of a surface point's information that holds it along the surface as well, for the whole-body solvers: 0 is
-    /// point-to-plane, 1 point-to-point; a little stops limbs from sliding along themselves.
+    /// Fraction of the information of a surface point that is tangential, for the whole-body solvers: 0 is point-to-plane,
+    /// 1 is point-to-point; a small value prevents limbs from sliding along their axes.
     tangential_weight: f64 = 0.07, "", 0.0 ..= 1.0;
-    /// Greatest distance of a matched point in the first step of a frame, for the whole-body solvers; it narrows.
+    /// Maximum distance of a matched point in the first step of a frame, for the whole-body solvers; it decreases.
     gate_start: f64 = 0.30, "m", 0.001 ..= 10.0;
-    /// Greatest distance of a matched point once narrowed, for the whole-body solvers.
+    /// Final maximum distance of a matched point, for the whole-body solvers.
     gate_end: f64 = 0.12, "m", 0.001 ..= 10.0;
-    /// Scale of the robust kernel in the first step of a frame; it narrows from step to step.
+    /// Scale of the robust kernel in the first step of a frame; it decreases with every step.
     kernel_start: f64 = 0.10, "m", 0.001 ..= 10.0;
-    /// Scale at which the robust kernel stops narrowing, for the whole-body solvers.
+    /// Final scale of the robust kernel, for the whole-body solvers.
     kernel_end: f64 = 0.03, "m", 0.001 ..= 10.0;
-    /// Standard deviation of an edge of the outline, for the whole-body solvers.
+    /// Standard deviation of an edge of the depth contour, for the whole-body solvers.
     depth_contour_sigma: f64 = 0.01, "m", 0.0001 ..= 1.0;
-    /// Share of the last motion that is expected to go on (0: the body is expected to stand still; whole-body solvers).
+    /// Fraction of the last motion that is extrapolated (0: the body is expected to stand still; whole-body solvers).
     prediction: f64 = 0.6, "", 0.0 ..= 1.0;
-    /// Standard deviation of the root's unexpected turn in 1/30 s.
+    /// Standard deviation of the root's unexpected rotation in 1/30 s.
     root_turn_sigma: f64 = 0.12, "rad", 0.0001 ..= 10.0;
-    /// Standard deviation of the root's unexpected shift in 1/30 s.
+    /// Standard deviation of the root's unexpected translation in 1/30 s.
     root_shift_sigma: f64 = 0.04, "m", 0.0001 ..= 10.0;
-    /// Multiplies the standard deviations of all unexpected motion: the one strength of the jitter penalty (R07 eq. 18, 26).
-    /// Smaller is smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
+    /// Factor of the standard deviations of all unexpected motion, the strength of the jitter penalty (R07 eq. 18, 26).
+    /// Smaller values are smoother; measured lag on steady motion: none at 0.25, 0.02 frames at 0.125.
     motion_scale: f64 = 0.25, "", 0.01 ..= 100.0;
-    /// A motion that hardly differs from the expected one is held tighter by this factor of information, as noise; 0: as any
-    /// other. Greater is calmer at rest and later in slow turns (whole-body solvers).
+    /// Gain of the information of the motion prior for small deviations from the expected motion, which are mostly noise; 0
+    /// disables it. Larger values reduce jitter at rest and add lag in slow rotations (whole-body solvers).
     still_prior_gain: f64 = 30.0, "", 0.0 ..= 10000.0;
-    /// Try other configurations of arms and legs where the frame speaks against the current ones (whole-body solvers).
+    /// Try other configurations of arms and legs if the frame contradicts the current ones (whole-body solvers).
     hypotheses: bool = true, "";
-    /// Look for a body that is lost, or elsewhere than it is tracked, where a detector sees a person; for a lost one that no detector
-    /// knows or sees in everything of its size that is no background (whole-body solvers).
+    /// Search for a lost or wrongly tracked body at detections of persons; without a detection, search for a lost body in all
+    /// foreground objects of its size (whole-body solvers).
     relocalization: bool = true, "";
-    /// Draw the limbs' rims to the body's outline in depth images, in the later steps of a frame (whole-body solvers).
+    /// Match the rims of limbs to the depth contour, in the later steps of a frame (whole-body solvers).
     depth_contour: bool = true, "";
-    /// Draw the limbs' contours to the edges of their colors in color pictures (whole-body solvers).
+    /// Match the contours of limbs to the color contours in color images (whole-body solvers).
     regions: bool = true, "";
     /// Match depth pixels inside a limb to the side that faces their camera (whole-body solvers).
     facing: bool = true, "";
-    /// Keep joints within their limits, softly (whole-body solvers).
+    /// Penalize joint angles outside their limits (whole-body solvers).
     limits: bool = true, "";
-    /// Axes of limbs are pushed out of other limbs that they are not joined to, and their ends up to the floor where it is known
-    /// (whole-body solvers).
+    /// Push the axes of limbs out of other limbs that they are not joined to, and their ends above the ground plane if it is
+    /// known (whole-body solvers).
     penetration: bool = true, "";
-    /// After a reset that fits sizes, the first frame's points also fit the girths.
+    /// After a reset with fitted sizes, also fit the girths to the points of the first frame.
     fit_girths: bool = true, "";
-    /// After a reset that fits sizes, the first frame decides between arms or legs of unlike lengths, and with the
-    /// whole-body solvers the frames that follow refine the limbs' lengths.
+    /// After a reset with fitted sizes, select between unequal lengths of arms or legs in the first frame, and with the
+    /// whole-body solvers refine the lengths of limbs in the following frames.
     fit_lengths: bool = true, "";
-    /// Free points lower than this above the ground plane are background, where the frame has a ground plane.
+    /// Free points below this height above the ground plane are background, if the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;
-    /// Threads for one step. The result is the same, bit by bit, for any number.
+    /// Number of threads of a step. Results are bit-identical for any number.
     threads: usize = 1, "", 1 ..= 256;
 }

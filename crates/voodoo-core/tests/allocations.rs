@@ -3,14 +3,16 @@
 
 mod color_scene;
 mod counting;
+mod people_allocations;
 mod scene;
 
 use counting::allocations_so_far;
+use people_allocations::TwoPersons;
 
 use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
 
-use voodoo_core::{Body, Config, People, PeopleOptions, Tracker};
+use voodoo_core::{Body, Config, Tracker};
 use voodoo_core::{Frame, PositionRelation, RayRelation};
 use voodoo_core::{Rendering, Viewpoint};
 
@@ -51,37 +53,6 @@ fn allocations(config: Config, frames: &[(Vec<u16>, Vec<[f64; 3]>)]) -> usize {
         }
     }
     count
-}
-
-/// Of frames of two persons who stand before a camera, how many allocate, after a warm-up, and how many there are.
-fn people_allocations() -> [usize; 2] {
-    let body = Body::human(1.75, HumanModel::Full).unwrap();
-    let camera = scene::DepthCamera { width: 160, height: 124, focal: 110.0 };
-    let mut noise = scene::Noise(3);
-    let mut pixels = vec![u16::MAX; 160 * 124];
-    let mut people = People::new(body.clone(), Config::default(), PeopleOptions::default()).unwrap();
-    for aside in [-0.6, 0.6] {
-        let shift = Vec3::new(0.3, aside, 0.0);
-        let place = |pose: &Pose| Pose::from_parts(pose.translation + shift, pose.rotation);
-        let poses: Vec<Pose> = scene::standing(&body).iter().map(place).collect();
-        let (frame_pixels, _) = camera.shoot(&body, &poses, 0.002, &mut noise);
-        pixels.iter_mut().zip(frame_pixels).for_each(|(all, pixel)| *all = pixel.min(*all));
-        let sites = (0..body.sites().len()).map(|site| (site, body.site_position(&poses, site)));
-        people.add(&sites.collect::<Vec<_>>(), false).unwrap();
-    }
-    let mut counts = [0, 0];
-    for index in 0..200 {
-        let images = [camera.image(&pixels)];
-        let frame = Frame::empty(index as f64 / 100.0).with_images(&images);
-        let before = allocations_so_far();
-        people.step(&frame, &[]).unwrap();
-        if index >= 140 {
-            counts[0] += usize::from(allocations_so_far() > before);
-            counts[1] += 1;
-        }
-    }
-    assert_eq!(people.present().count(), 2, "both are followed");
-    counts
 }
 
 /// Allocations of a rendering after one of the same size.
@@ -133,7 +104,13 @@ fn a_warm_step_or_rendering_allocates_nothing() {
     for cameras in [4, 2] {
         assert_eq!(region_allocations(cameras), 0, "color regions of {cameras} cameras");
     }
-    let [allocating, all] = people_allocations();
+    let two = TwoPersons::new();
+    let mut people = two.people();
+    for poses in &two.poses {
+        let sites = (0..two.body.sites().len()).map(|site| (site, two.body.site_position(poses, site)));
+        people.add(&sites.collect::<Vec<_>>(), false).unwrap();
+    }
+    let [allocating, all] = two.allocations(people);
     assert!(allocating == 0, "{allocating} of {all} frames of two persons");
 
     let mut frames = scene::swaying(&Body::human(1.75, HumanModel::Papers).unwrap(), 4);

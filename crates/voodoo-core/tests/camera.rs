@@ -41,7 +41,7 @@ fn within(noise: &mut Noise, low: f64, high: f64) -> f64 {
 }
 
 #[test]
-fn the_ray_behind_a_pixel_is_visible_in_it_and_the_pixel_of_a_ray_looks_along_it() {
+fn projection_inverts_the_ray_of_a_pixel_and_the_ray_inverts_projection() {
     let mut noise = Noise(5);
     for lens in lenses() {
         let camera = through(lens);

@@ -179,7 +179,7 @@ proptest! {
     }
 
     #[test]
-    fn a_single_ray_draws_its_site_onto_itself(offset in [-0.06..0.06_f64, -0.06..0.06, -0.06..0.06], from: u64) {
+    fn a_single_ray_pulls_its_site_onto_it(offset in [-0.06..0.06_f64, -0.06..0.06, -0.06..0.06], from: u64) {
         let poses = scene::standing(&human());
         let site = human().site_index("l_wrist").unwrap();
         let target = human().site_position(&poses, site) + Vec3::from_array(offset);
@@ -196,7 +196,7 @@ proptest! {
     }
 
     #[test]
-    fn a_single_position_draws_its_site_to_itself(offset in [-0.08..0.08_f64, -0.08..0.08, -0.08..0.08]) {
+    fn a_single_position_pulls_its_site_to_it(offset in [-0.08..0.08_f64, -0.08..0.08, -0.08..0.08]) {
         let poses = scene::standing(&human());
         let site = human().site_index("r_ankle").unwrap();
         let position = human().site_position(&poses, site) + Vec3::from_array(offset);
@@ -210,7 +210,7 @@ proptest! {
     }
 
     #[test]
-    fn a_ray_gives_no_pull_along_itself(along in -1.5..1.5_f64) {
+    fn a_ray_gives_no_pull_along_its_direction(along in -1.5..1.5_f64) {
         let poses = scene::standing(&human());
         let site = human().site_index("l_wrist").unwrap();
         let target = human().site_position(&poses, site);

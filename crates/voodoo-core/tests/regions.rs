@@ -92,13 +92,13 @@ fn a_body_is_followed_by_colors_or_gray_alone_and_its_limbs_are_measured() {
 }
 
 #[test]
-fn a_camera_that_looked_earlier_saw_the_body_of_then() {
+fn an_earlier_image_is_matched_with_the_body_at_its_stamp() {
     let (body, late) = (human(), [0.0, 0.5, 0.8, 0.3]);
     let [stamped, unstamped] = [true, false].map(|stamped| {
         let estimate = followed(Config::default(), late, stamped, false);
         off(&body, &estimate, (FRAMES - 1) as f64).1
     });
-    assert!(stamped < 0.015 && unstamped > stamped + 0.003, "told {stamped} m, untold {unstamped} m");
+    assert!(stamped < 0.015 && unstamped > stamped + 0.003, "with stamps {stamped} m, without {unstamped} m");
 }
 
 #[test]

@@ -22,8 +22,6 @@ use crate::sites::places_of;
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 type CandidatePlace = ((f64, f64), i32, usize, bool);
 type Ray<'py> = (usize, Row<'py>, Row<'py>, Option<Row<'py>>, f64);
-type BlobRow = (Option<usize>, usize, f64, Vec<f64>, Vec<f64>, Vec<f64>);
-
 fn row_of(candidate: &SkinCandidate) -> CandidatePlace {
     let [u, v] = candidate.pixel;
     ((u, v), candidate.region, candidate.area, candidate.hand)
@@ -162,18 +160,6 @@ impl PySkinCue {
     #[getter]
     fn assigned(&self) -> Vec<(usize, usize)> {
         self.cue.assigned.clone()
-    }
-
-    /// For all tracked regions: site, images, stamp, velocity, distance from each site, and time for which each was contradicted.
-    #[getter]
-    fn followed(&self) -> Vec<BlobRow> {
-        let blobs = self.cue.blobs.items.iter();
-        blobs
-            .map(|blob| {
-                let velocity = blob.velocity.to_array().to_vec();
-                (blob.label, blob.count, blob.stamp, velocity, blob.far.clone(), blob.mismatch.clone())
-            })
-            .collect()
     }
 
     /// Detects, tracks and assigns skin regions of an image. Returns for each detected site its index, a point and the direction

@@ -1,1 +1,1 @@
-"""A thousand recordings: each a task of its own, by Dask; results as one Parquet data set and a table of summaries."""
+"""Tracks many recordings, one Dask task each; results are a Parquet data set and a table of summaries."""

@@ -21,31 +21,31 @@ from voodoo.errors import VoodooError
 
 SUMMARY, SETTINGS = "summary.csv", "settings.json"
 _EVERY_S, _FRACTION = 2.0, 0.05
-"""The table of summaries is written anew at most so often [s], and in at most so much of the time: of a million recordings it is
-large."""
+"""Shortest time between two writes of the table of summaries [s], and largest fraction of the time spent on it, because the table
+of a million recordings is large."""
 _AHEAD = 4
-"""Number of tasks per worker that are submitted to the scheduler: a million at once would fill its memory."""
+"""Number of tasks per worker that are submitted to the scheduler: a million would fill its memory."""
 _CONNECT_S, _POLL_S = 30, 0.3
 
 
 class Batch:
-    """A folder of results and the recordings it is about.
+    """A folder of results and its recordings.
 
     Args:
         sources: see voodoo.batch.storage.find_sources.
-        out: path or URL of the folder; what an earlier run of the same settings did there is kept.
-        settings: of all recordings.
+        out: path or URL of the folder; results of an earlier run with the same settings are kept.
+        settings: settings for all recordings.
 
     Attributes:
-        rows: rows of the recordings that are done or failed, by name.
-        jobs: remaining jobs: recordings that were not tracked yet, and those that failed.
+        rows: rows of the finished and failed recordings, by name.
+        jobs: remaining jobs: untracked recordings, and failed ones.
 
     Raises:
-        VoodooError: the folder cannot be used, or holds results of other settings.
+        VoodooError: the folder cannot be used, or has results with other settings.
     """
 
     def __init__(self, sources: Sequence[str], out: str, settings: Settings) -> None:
-        """Find out which recordings are done."""
+        """Determine which recordings are done."""
         self._store = Store(out)
         self._check_settings(settings)
         text = self._store.read(SUMMARY)
@@ -77,7 +77,7 @@ class Batch:
             )
 
     def take(self, row: Row) -> None:
-        """Keep the row of a recording; the table is written now and then."""
+        """Store the row of a recording; the table is written at intervals."""
         self.rows[row.recording] = row
         if time.monotonic() - self._written >= max(_EVERY_S, self._took / _FRACTION):
             self.save()
@@ -93,16 +93,16 @@ class Batch:
 def run(
     jobs: Sequence[Job], *, workers: int, scheduler: str | None = None, stop: threading.Event | None = None
 ) -> Iterator[Row]:
-    """Do the jobs, one task each; their rows as they come, in any order.
+    """Run the jobs, one task each; yields their rows in the order of completion.
 
-    A task whose worker dies is done once more, by another one; if that one dies, too, it has failed. What is done is taken off
-    the workers at once, so that nothing else is lost with them.
+    A task whose worker dies is repeated once by another worker; if that dies, too, the task has failed. Results are fetched from
+    the workers immediately, so that a dead worker loses only its current task.
 
     Args:
-        jobs: what is to be done.
-        workers: processes on this machine; not used with a scheduler.
-        scheduler: address of a Dask scheduler that runs already.
-        stop: once it is set, nothing more is begun, and what was begun is given up.
+        jobs: the jobs to run.
+        workers: number of processes on this machine; ignored with a scheduler.
+        scheduler: address of a running Dask scheduler.
+        stop: when set, no more tasks start, and running ones are canceled.
 
     Raises:
         VoodooError: Dask is not installed, the scheduler does not answer, or it has no worker.
@@ -135,7 +135,7 @@ def run(
 def _row(task: Any, job: Job) -> Row:  # noqa: ANN401 - Dask has no types
     try:
         found = task.result()
-    except Exception as error:  # of the engine: a task itself never raises
+    except Exception as error:  # an error of the scheduler: a task itself never raises
         if type(error).__name__ == "KilledWorker":
             return failed(job, "the worker died, and another one that was given it again")
         return failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}")
@@ -148,7 +148,7 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
 
     with ExitStack() as stack:
         if scheduler is None:
-            # A worker holds no task but the one it does, and a task is tried twice.
+            # A worker has only its current task, and a task is tried twice.
             options = {"distributed.scheduler.allowed-failures": 1, "distributed.scheduler.worker-saturation": 1.0}
             stack.enter_context(dask.config.set(options))
             scratch = stack.enter_context(

@@ -1,4 +1,4 @@
-"""Where recordings come from and results go to: fsspec URLs, of which a path is one."""
+"""Access to recordings and results by fsspec URLs or paths."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def filesystem(url: str) -> tuple[Any, str]:
     """The file system of a URL or path, and the path in it.
 
     Raises:
-        VoodooError: fsspec, or what it needs for this protocol, is not installed, or the address cannot be.
+        VoodooError: fsspec or its library for this protocol is not installed, or the address is invalid.
     """
     try:
         from fsspec.core import url_to_fs
@@ -43,28 +43,28 @@ def filesystem(url: str) -> tuple[Any, str]:
 
 
 def is_local(word: str) -> bool:
-    """Whether this is a path, not a URL of another machine or archive."""
+    """Whether a word is a path, not a URL of another machine or archive."""
     return "://" not in word or word.startswith(("file://", "local://"))
 
 
 def local_path(word: str) -> Path:
-    """The path of what `is_local`.
+    """The path of a word that `is_local`.
 
     Raises:
-        VoodooError: it cannot be one, see `a_path`.
+        VoodooError: it is not a valid path, see `a_path`.
     """
     return a_path(unquote(word.split("://", 1)[1]) if "://" in word else word, error=VoodooError)
 
 
 def find_sources(words: Sequence[str], *, only: Sequence[str] = ()) -> list[str]:
-    """Recordings at paths and URLs; folders that are none are searched.
+    """Recordings at paths and URLs; other folders are searched.
 
     Args:
         words: paths, URLs, or patterns of them (`s3://bucket/*.mcap`).
         only: see voodoo.evaluation.search.find_recordings.
 
     Raises:
-        VoodooError: nothing there, or a file system that cannot be reached.
+        VoodooError: nothing was found, or a file system cannot be reached.
     """
     found: list[str] = []
     for word in words:
@@ -110,7 +110,7 @@ def _in_folder(files: Any, folder: str) -> list[str]:  # noqa: ANN401 - fsspec h
 
 @contextmanager
 def on_disk(source: str) -> Iterator[Path]:
-    """The recording as a path: itself, or a copy that is there until the end of the block.
+    """The recording as a local path, or a local copy that exists until the end of the block.
 
     Raises:
         RecordingError: it cannot be fetched.
@@ -127,17 +127,17 @@ def on_disk(source: str) -> Iterator[Path]:
 
 
 def name_of(source: str) -> str:
-    """A recording's name: that of its file or folder, without suffix."""
+    """Name of a recording: that of its file or folder, without suffix."""
     name = source.rstrip("/").rsplit("/", 1)[-1]
     return re.sub(r"(_depth\.mat|\.mcap|\.db3|\.bag|\.zip|\.trc|\.c3d)$", "", name) or "recording"
 
 
 def named(sources: Sequence[str], taken: dict[str, str]) -> list[tuple[str, str]]:
-    """(name, source) of each; a name that stands for another source gets a number.
+    """(name, source) pairs; a name that is taken by another source gets a number.
 
     Args:
-        sources: where they are.
-        taken: name -> source of earlier runs; what was named there keeps its name.
+        sources: paths and URLs.
+        taken: name -> source of earlier runs; their names are kept.
     """
     known = {source: name for name, source in taken.items() if source}
     used = dict(taken)
@@ -157,7 +157,7 @@ def named(sources: Sequence[str], taken: dict[str, str]) -> list[tuple[str, str]
 
 @dataclass(frozen=True)
 class Store:
-    """The folder that results go to.
+    """The folder for results.
 
     Args:
         url: path or URL.
@@ -172,7 +172,7 @@ class Store:
         return files, path.rstrip("/")
 
     def read(self, name: str) -> str | None:
-        """The text of a file; None: it is not there.
+        """The text of a file; None if it does not exist.
 
         Raises:
             VoodooError: it cannot be read.
@@ -182,7 +182,7 @@ class Store:
             return files.cat_file(f"{top}/{name}").decode("utf-8") if files.exists(f"{top}/{name}") else None
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file, which appears when it is complete.
+        """Write a file atomically.
 
         Raises:
             VoodooError: it cannot be written.
@@ -192,10 +192,10 @@ class Store:
             place = f"{top}/{name}"
             files.makedirs(place.rsplit("/", 1)[0], exist_ok=True)
             if not is_local(self.url):
-                files.pipe_file(place, content)  # an object appears as a whole
+                files.pipe_file(place, content)  # objects are written atomically
                 return
             target = Path(place)
-            for left in target.parent.glob(f".{target.name}.*"):  # by a worker that died
+            for left in target.parent.glob(f".{target.name}.*"):  # left by a worker that died
                 with contextlib.suppress(OSError):
                     left.unlink()
             part = target.with_name(f".{target.name}.{os.getpid()}-{os.urandom(4).hex()}")
@@ -206,17 +206,17 @@ class Store:
                 part.unlink(missing_ok=True)
 
     def place_of(self, recording: str) -> str:
-        """The name of a recording's table."""
+        """Path of a recording's table."""
         return f"frames/recording={quote(recording, safe=' ~+,@()')}/{_TABLE}"
 
     def opened(self, recording: str) -> Any | None:  # noqa: ANN401 - a file of fsspec
-        """A recording's table as a binary file; None: it is not there."""
+        """A recording's table as a binary file; None if it does not exist."""
         files, top = self._at
         place = f"{top}/{self.place_of(recording)}"
         return files.open(place, "rb") if files.exists(place) else None
 
     def recordings(self) -> set[str]:
-        """Names of those that have a folder of results."""
+        """Names of recordings with a folder of results."""
         files, top = self._at
         if not files.isdir(f"{top}/frames"):
             return set()

@@ -16,20 +16,20 @@ DONE, FAILED = "done", "failed"
 
 @dataclass(frozen=True)
 class Row:
-    """How one recording went.
+    """Summary of one recording.
 
     Args:
         recording: its name in the data set.
-        frames: how many have a row; 0 if it failed.
-        seconds: wall-clock time it took, reading and writing included [s].
+        frames: number of frames with a row; 0 if it failed.
+        seconds: wall-clock time, including reading and writing [s].
         status: "done" or "failed".
         error: why it failed, in one line; "" if it did not.
         recorded_s: its duration [s].
-        persons: how many were found.
-        tracking_share: share of the rows with the status tracking or degraded.
-        joint_error_m: mean error of the twelve joints where there is a truth or a reference: see `voodoo eval` [m].
-        left_out: how many measurements could not be used.
-        source: where it was read from.
+        persons: number of persons found.
+        tracking_share: fraction of the rows with the status tracking or degraded.
+        joint_error_m: mean error of the twelve joints if there is ground truth or a reference: see `voodoo eval` [m].
+        left_out: number of unusable measurements.
+        source: path or URL.
     """
 
     recording: str
@@ -45,15 +45,15 @@ class Row:
     source: str = ""
 
     def cells(self) -> list[str]:
-        """The row as text; what is not known is empty."""
+        """The row as text; unknown values are empty."""
         return [_cell(getattr(self, field.name)) for field in fields(self)]
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Row:
-        """The row of a mapping from field to text or number.
+        """A row from a mapping of fields to text or numbers.
 
         Raises:
-            ValueError, TypeError: fields are missing, or are none.
+            ValueError, TypeError: fields are missing or invalid.
         """
         kinds: dict[str, type] = {
             field.name: {"int": int, "float": float}.get(str(field.type), str) for field in fields(cls)
@@ -71,7 +71,7 @@ COLUMNS = tuple(field.name for field in fields(Row))
 
 
 def write_table(rows: Iterable[Row]) -> str:
-    """summary.csv, in the order of the rows' names."""
+    """The text of summary.csv, sorted by name."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -83,7 +83,7 @@ def read_table(text: str, source: object) -> dict[str, Row]:
     """The rows of a summary.csv by name.
 
     Raises:
-        VoodooError: it is none.
+        VoodooError: another format.
     """
     try:
         header, *rows = list(csv.reader(io.StringIO(text)))

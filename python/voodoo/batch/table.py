@@ -1,4 +1,4 @@
-"""A recording's result as a Parquet table: a row a frame and person."""
+"""The result of a recording as a Parquet table, with a row per frame and person."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from voodoo.export.track import Track
 Columns: TypeAlias = dict[str, npt.NDArray[Any] | list[str]]
 
 NOTE = b"voodoo"
-"""Key of the file's metadata, JSON: the recording's row of the summary, and the settings."""
+"""Key in the metadata of the file; the value is JSON with the recording's summary row and the settings."""
 
 
 def columns_of(tracks: Mapping[int, Track]) -> Columns:
-    """The columns of everybody's frames, in the order of time and person.
+    """The columns of all persons, sorted by time and person.
 
     `stamp_s` float64 [s], `person` int32, `status`, `residual_m`, NAME_x, NAME_y, NAME_z [m] and NAME_rad as float32 (a tenth of
-    a millimeter at a kilometer), LIMB_status, and NAME_sigma_m as in a result's .csv. NaN and "" are what is not known.
+    a millimeter at a kilometer), LIMB_status, and NAME_sigma_m as in a result's .csv. NaN and "" mean unknown.
 
     Args:
         tracks: of each person, from 1; with the same joints.
@@ -71,7 +71,7 @@ def _sigmas(track: Track) -> npt.NDArray[np.float64]:
 
 
 def stacked(parts: Sequence[Columns]) -> Columns:
-    """The rows of several tables, one after the other; a column that one has not is not known there."""
+    """Concatenates tables; a column that is missing in one of them is unknown there."""
     counts = [len(part["stamp_s"]) for part in parts]
     names = dict.fromkeys(name for part in sorted(parts, key=len, reverse=True) for name in part)
     found: Columns = {}
@@ -92,7 +92,7 @@ def stacked(parts: Sequence[Columns]) -> Columns:
 
 
 def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
-    """The bytes of a Parquet file, with a note in its footer.
+    """The bytes of a Parquet file with a note in its footer.
 
     Raises:
         VoodooError: pyarrow is not installed.
@@ -107,18 +107,18 @@ def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
     table = pa.Table.from_arrays(arrays, names=list(columns)).replace_schema_metadata({NOTE: json.dumps(note).encode()})
     words = [name for name, column in columns.items() if isinstance(column, list)]
     out = io.BytesIO()
-    # Neighboring frames share the high bytes of their numbers: sorted by byte they shrink.
+    # Neighboring frames have equal high bytes: splitting the numbers by byte improves compression.
     split = {name: "BYTE_STREAM_SPLIT" for name, column in columns.items() if name not in (*words, "person")}
     pq.write_table(table, out, compression="zstd", use_dictionary=[*words, "person"], column_encoding=split)
     return out.getvalue()
 
 
 def note_of(file: Any) -> dict[str, Any] | None:  # noqa: ANN401 - a binary file of any kind
-    """The note in the footer of a Parquet file; None: it has none, or is damaged."""
+    """The note in the footer of a Parquet file; None without one, or if the file is damaged."""
     _, pq = _pyarrow()
     try:
         found = json.loads(pq.read_metadata(file).metadata[NOTE])
-    except Exception:  # whatever a damaged file makes of the reader: it is written anew
+    except Exception:  # a damaged file can cause any error in the reader; the file is written again
         return None
     return found if isinstance(found, dict) else None
 

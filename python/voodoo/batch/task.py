@@ -36,21 +36,21 @@ from voodoo.sensors.settings import FrontEndSettings
 
 T = TypeVar("T")
 _TOGETHER = 500
-"""Frames whose estimates are held at a time."""
+"""Number of frames whose estimates are kept in memory."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How all recordings of a batch are tracked; see `voodoo track`.
+    """Settings for all recordings of a batch; see `voodoo track`.
 
     Args:
-        use: kinds of inputs; None: what each recording is best tracked by.
-        init: "auto": look for somebody whatever start lies beside a recording; None: take that one.
+        use: kinds of inputs; None: the best ones for each recording.
+        init: "auto": search for a person even if there is a start beside a recording; None: use that start.
         model, loader: see start_tracker and open_recording.
-        people: 1: one person; a larger number: up to so many; None: any number.
-        strict: a damaged recording fails; else what cannot be used is left out.
-        config: the parameters that are not the defaults.
-        version: of voodoo.
+        people: 1: one person; a larger number: at most that many; None: any number.
+        strict: a damaged recording fails; else unusable measurements are left out.
+        config: parameters that differ from the defaults.
+        version: version of voodoo.
     """
 
     use: tuple[str, ...] | None = None
@@ -63,14 +63,14 @@ class Settings:
     version: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The settings as JSON values."""
         found = {**vars(self), "use": None if self.use is None else list(self.use)}
         return {**found, "config": dict(self.config or {})}
 
 
 @dataclass(frozen=True)
 class Job:
-    """One recording: its name, where it is, where its table goes, and how it is tracked."""
+    """A recording to track: name, source, target of its table, and settings."""
 
     name: str
     source: str
@@ -79,10 +79,10 @@ class Job:
 
 
 def do(job: Job) -> Row:
-    """Track a recording and write its table, unless that was done; never raises.
+    """Track a recording and write its table, unless it exists; never raises.
 
     Raises:
-        Nothing: whatever goes wrong is in the row.
+        Nothing: errors are in the row.
     """
     began = time.perf_counter()
     _one_thread()
@@ -109,7 +109,7 @@ def failed(job: Job, why: str, seconds: float = float("nan")) -> Row:
 
 
 def row_of(job: Job) -> Row | None:
-    """The row in the table of a recording that was done before, from the same source and by the same settings; or None."""
+    """The row in the existing table of a recording, if it has the same source and settings; or None."""
     file = Store(job.out).opened(job.name)
     if file is None:
         return None
@@ -185,14 +185,14 @@ def _people(
 
 
 def _parts(items: Iterable[T]) -> Iterator[list[T]]:
-    """Lists of some hundred of them: the estimates of hours would fill the memory."""
+    """Yields lists of limited length, because the estimates of hours would fill the memory."""
     stream = iter(items)
     while part := list(itertools.islice(stream, _TOGETHER)):
         yield part
 
 
 def joined(parts: Sequence[Track]) -> Track:
-    """The frames of several tracks of one body, one after the other, without what only the table has or nobody."""
+    """Concatenates tracks of one body; limbs and joint angles are left out."""
     first = next((part for part in parts if part.found.any()), parts[0])
     return Track(
         stamps=np.concatenate([part.stamps for part in parts]),
@@ -213,6 +213,6 @@ def _error(recording: Recording, result: Track) -> float:
 
 
 def _one_thread() -> None:
-    """The tasks are the parallelism."""
+    """The tasks run in parallel, so each uses one thread."""
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
     cv2.setNumThreads(1)

@@ -1,6 +1,6 @@
 """The command line. Every command is a few calls of the package; nothing is computed here.
 
-What a command needs is imported when it runs, so that help and version are there at once.
+Modules are imported when a command runs, so that help and version are fast.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from voodoo.cli.track import track_command
 app = typer.Typer(
     name="voodoo",
     no_args_is_help=True,
-    rich_markup_mode=None,  # Rich takes longer to import than all the rest of the help
+    rich_markup_mode=None,  # importing Rich takes longer than the rest of the help
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -32,13 +32,13 @@ app = typer.Typer(
 def main() -> None:
     """Entry point of the `voodoo` command."""
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be of any bytes
+        sys.stdout.reconfigure(errors="backslashreplace")  # file names may contain any bytes
     app()
 
 
 def _show_version(expected: bool) -> None:
     if expected:
-        # Three times as fast as to read the metadata of the distribution.
+        # Three times as fast as reading the metadata of the distribution.
         from voodoo._core import __version__
 
         typer.echo(f"voodoo {__version__}")

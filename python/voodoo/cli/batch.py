@@ -17,21 +17,21 @@ from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, PeopleOp
 
 def batch_command(
     recordings: Annotated[
-        list[str], typer.Argument(metavar="RECORDING...", help="Recordings, folders that hold some, or URLs of either.")
+        list[str], typer.Argument(metavar="RECORDING...", help="Recordings, folders of recordings, or URLs of either.")
     ],
-    out: Annotated[str, typer.Option(metavar="DIR", help="Folder or URL for results; what is done there is kept.")],
+    out: Annotated[str, typer.Option(metavar="DIR", help="Folder or URL for results; existing results are kept.")],
     workers: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Processes on this machine; by default one for each core.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler that runs already, tcp://HOST:PORT.")
+        str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, tcp://HOST:PORT.")
     ] = None,
     init: Annotated[
         str | None,
-        typer.Option(metavar="auto", help="auto: look for the person instead of taking the recordings' own starts."),
+        typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
     ] = None,
     only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
+        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
     ] = None,
     config: ConfigOption = None,
     model: ModelOption = None,
@@ -46,11 +46,11 @@ def batch_command(
     every recording: recording, frames, seconds, status (done, failed), error, and more. It needs
     pip install 'voodoo-tracker[batch]'.
 
-    Run it again to go on: what is done is not done again, what failed is tried again. A recording that fails is a row that says
-    why, and ends the command with exit code 1. A worker that dies costs its task once more.
+    Run it again to resume: finished recordings are skipped, failed ones are repeated. The row of a failed recording has the
+    reason, and the command ends with exit code 1. The task of a worker that dies is repeated once.
 
-    RECORDING and DIR may be URLs that fsspec knows (s3://, gs://, sftp://, with the library of the protocol). Whoever reaches
-    a Dask scheduler can run any code on its workers: it must be on a network that is trusted.
+    RECORDING and DIR may be URLs of fsspec (s3://, gs://, sftp://, with the library of the protocol). Everyone who can connect
+    to a Dask scheduler can run any code on its workers, so it must be on a trusted network.
 
     Examples
 
@@ -114,7 +114,7 @@ def batch_command(
 
 @contextmanager
 def _ctrl_c() -> Iterator[threading.Event]:
-    """Ctrl-C within sets the event, so that the engine ends in order; a second one ends the program."""
+    """Ctrl-C inside sets the event, so that the run ends in an orderly way; a second one ends the program."""
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 INTERRUPTED = 130
-"""Exit code after Ctrl-C, as of every program that SIGINT ends."""
+"""Exit code after Ctrl-C, by convention 128 + SIGINT."""
 
 
 def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
-    """The loader's options of "depth=/front/depth/image" each.
+    """Options of the loader from words like "depth=/front/depth/image".
 
     Raises:
         VoodooError: another form or kind, or several calibrations.
@@ -39,7 +39,7 @@ def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
 
 
 def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
-    """The loader's options of "rate=30" each.
+    """Options of the loader from words like "rate=30".
 
     Raises:
         VoodooError: another form or name.
@@ -58,7 +58,7 @@ def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
 
 
 def refuse_both(name: str, value: object, **others: object) -> None:
-    """Refuse options that would not be read beside another one; None: not given.
+    """Reject options that exclude another one; None: not given.
 
     Raises:
         typer.BadParameter: one of them is given.
@@ -69,12 +69,12 @@ def refuse_both(name: str, value: object, **others: object) -> None:
 
 
 def states(result: Track) -> str:
-    """How many frames the tracker itself called what, e.g. "88 tracking, 2 lost"."""
+    """Number of frames per status, e.g. "88 tracking, 2 lost"."""
     return ", ".join(f"{result.status.count(word)} {word}" for word in dict.fromkeys(result.status))
 
 
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Show a progress bar on stderr, if a person looks at it."""
+    """Show a progress bar on stderr, if it is a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -85,7 +85,7 @@ def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
 
 
 def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:
-    """The items up to Ctrl-C, and whether it came."""
+    """The items up to Ctrl-C, and whether it was pressed."""
     found: list[T] = []
     try:
         for item in items:
@@ -96,10 +96,10 @@ def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:
 
 
 def print_interrupted(interrupted: bool, done: str) -> None:
-    """After Ctrl-C say what is there on stderr and end with its exit code.
+    """After Ctrl-C, print what was done on stderr and exit with its code.
 
     Raises:
-        typer.Exit: it came.
+        typer.Exit: it was pressed.
     """
     if interrupted:
         typer.echo(f"voodoo: interrupted: {done}", err=True)
@@ -108,9 +108,9 @@ def print_interrupted(interrupted: bool, done: str) -> None:
 
 @contextmanager
 def clear_errors() -> Iterator[None]:
-    """Turn errors that have a clear message into that one line on stderr and exit code 1.
+    """Convert expected errors to one line on stderr and exit code 1.
 
-    What NumPy warns of (a number too large for its type in a damaged file) is told by an error or nothing; -W shows it.
+    NumPy's warnings (e.g. on overflow in a damaged file) are suppressed; -W shows them.
     """
     try:
         with warnings.catch_warnings():

@@ -16,8 +16,8 @@ def demo_command(
 ) -> None:
     """Run the main job on the bundled recording, a person who bends, scoops and reaches up.
 
-    Nobody tells where the person is: they are found first. Writes pose.csv, overlay.mp4 and sheet.png and compares the pose
-    with the recording's exact truth.
+    No start is given: the person is detected first. Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the
+    recording's exact ground truth.
     """
     import numpy as np
 

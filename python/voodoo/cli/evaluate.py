@@ -10,55 +10,47 @@ import typer
 
 from voodoo.cli.common import clear_errors, print_interrupted, progressing, until_interrupted
 from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
-from voodoo.errors import VoodooError
 
 
 def eval_command(
     recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders that hold some.")
+        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders of recordings.")
     ],
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plot.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plots.")] = None,
     init: Annotated[
         str | None,
-        typer.Option(metavar="auto", help="auto: look for the person instead of taking the recordings' own starts."),
+        typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
     ] = None,
     config: ConfigOption = None,
     jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Recordings at the same time; by default one for each core.")
+        int | None, typer.Option(metavar="N", min=1, help="Number of parallel recordings; by default one per core.")
     ] = None,
     only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name fits, e.g. 'a0?_s1_*'.")
+        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
     ] = None,
     model: ModelOption = None,
     use: UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
-    ablation: Annotated[
-        bool, typer.Option("--ablate", help="Once for every switch turned over: what each of them buys.")
-    ] = False,
     result: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="Judge this result of several people instead of tracking, of one RECORDING."
+            metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
         ),
     ] = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
 ) -> None:
-    """Track recordings that bring a truth or a reference skeleton, and measure the result.
+    """Track recordings with ground truth or a reference skeleton, and evaluate the result.
 
-    Prints the table over all sequences. With --out also sequences.csv (a row each), frames/NAME.csv (a row a frame),
+    Prints the table over all sequences. With --out also sequences.csv (a row per recording), frames/NAME.csv (a row per frame),
     summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be tracked to its
     end. Ctrl-C keeps the recordings that are done and ends with exit code 130.
 
-    With --ablate the evaluation runs once as configured and once for each single change of the configuration (every
-    switch turned over, the other solvers, no prediction, no jitter penalty)
-    and prints a row each; --out gets ablation.md and ablation.csv.
+    A recording with truth_people.csv beside it is tracked with --people any and evaluated for MOTA, IDF1, identity switches,
+    false bodies and joints. With --result a .csv of any program is evaluated: stamp_s, person, status, residual_m, then
+    NAME_x, NAME_y, NAME_z. people.csv and people.md are written to --out.
 
-    A recording with truth_people.csv beside it is tracked with --people any and judged for MOTA, IDF1, switches of identity,
-    false bodies and joints. With --result a .csv that any program wrote is judged: stamp_s, person, status, residual_m, then
-    NAME_x, NAME_y, NAME_z. --out gets people.csv and people.md.
-
-    Several people, and the pictures of --out, need pip install 'voodoo-tracker[eval]'.
+    Several persons, and the plots of --out, need pip install 'voodoo-tracker[eval]'.
 
     Examples
 
@@ -68,13 +60,10 @@ def eval_command(
 
     voodoo eval rendered/ --init auto
 
-    voodoo eval rendered/ --ablate --out report
-
     voodoo eval two_walk/ --result theirs.csv
     """
     from voodoo.cli.people import judged, refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
-    from voodoo.evaluation.ablation import ablate, table, variants, write_tables
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.figure import new_figure
     from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
@@ -86,25 +75,13 @@ def eval_command(
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         automatic = None if init is None else AUTO
-        config_of(config)  # a bad file is one error here instead of one for each recording
+        config_of(config)  # an invalid file is one error here instead of one per recording
         paths = find_recordings(recordings, only=only or ())
         if result is not None:
             show_people([judged(paths, result, loader, frame)], out)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
-        if ablation:
-            chosen = config_of(config)
-            runs = ablate(paths, config=chosen, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
-            ablations, interrupted = until_interrupted(progressing(runs, "ablating", len(variants(chosen))))
-            typer.echo(table(ablations))
-            if out is not None:
-                typer.echo("wrote " + ", ".join(str(file) for file in write_tables(out, ablations)))
-            print_interrupted(interrupted, f"{len(ablations)} of {len(variants(chosen))} configurations are done")
-            failed = [score for item in ablations for score in item.failures]
-            if failed:
-                raise VoodooError(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
-            return
         several = [path for path in paths if has_people(path)]
         judgments = list(
             progressing(
@@ -120,7 +97,7 @@ def eval_command(
         if not paths:
             return
         if out is not None:
-            new_figure(1.0, 1.0)  # what is missing is said before the work, not after it
+            new_figure(1.0, 1.0)  # a missing library is reported before the work
         done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])

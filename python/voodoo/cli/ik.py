@@ -39,21 +39,20 @@ def ik_command(
     ] = None,
     sites: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME,...", help="The sites that are known: by default head, trunk, hands (or wrists), ankles."
-        ),
+        typer.Option(metavar="NAME,...", help="The known sites: by default head, trunk, hands (or wrists), ankles."),
     ] = None,
     pictures: Annotated[
         str, typer.Option(metavar="WORD", help="Silhouettes from: depth, color (still background), regions, or none.")
     ] = "depth",
     alone: Annotated[
-        bool, typer.Option("--alone", help="Solve every frame by itself, from the first pose, not from the one before.")
+        bool,
+        typer.Option("--alone", help="Solve every frame independently from the first pose, not from the previous one."),
     ] = False,
     rest: Annotated[
         bool,
         typer.Option(
             "--rest/--no-rest",
-            help="Draw what nothing tells to the mean of the postures so far, or leave it where it is (not with --alone).",
+            help="Regularize undetermined angles to the mean of the postures so far, or keep them (not with --alone).",
         ),
     ] = True,
     init: InitOption = None,
@@ -72,10 +71,10 @@ def ik_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
 ) -> None:
-    """Find postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
+    """Compute postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
-    The .csv has the columns of voodoo track, its NAME_rad led by the six of the root; the other formats are those of voodoo
-    track, too. Sites that are not among the known ones are compared with the reference, if it has them. Ctrl-C writes the
+    The .csv has the columns of voodoo track, with the six of the root before the other NAME_rad; the other formats are those of
+    voodoo track, too. Other sites are compared with the reference, if it has them. Ctrl-C writes the
     frames up to there and ends with exit code 130.
 
     Examples

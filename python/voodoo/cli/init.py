@@ -30,10 +30,10 @@ def init_command(
         float | None,
         typer.Option(
             metavar="S",
-            help="Look from here on: seconds after the first frame, or a stamp. By default from the first frame.",
+            help="Search from this time on: seconds after the first frame, or a stamp. By default from the first frame.",
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where to write; by default to stdout.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write; by default stdout.")] = None,
     body: BodyOption = None,
     height: HeightOption = None,
     model: ModelOption = None,
@@ -45,11 +45,11 @@ def init_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
 ) -> None:
-    """Find the first pose and write it as JSON, as --init of voodoo track reads it.
+    """Find the first pose and write it as JSON for --init of voodoo track.
 
-    It is that of the first frame at or after S in which somebody is found: joints in meters in the recording's root frame,
-    the stature, and the frame's stamp. A start, truth or reference that lies beside the recording is not read. Edit the file
-    and give it to voodoo track where the start is wrong. Exit code 1 if nobody is found.
+    It is the pose in the first frame at or after S in which a person is found: joints in meters in the recording's root frame,
+    the stature, and the frame's stamp. A start, truth or reference beside the recording is not read. If the pose is wrong, edit
+    the file before giving it to voodoo track. Exit code 1 if no person is found.
 
     Examples
 

@@ -36,7 +36,7 @@ def live_command(
         list[str],
         typer.Argument(
             metavar="SOURCE...",
-            help="realsense[:SERIAL], ros2:TOPIC[,TOPIC...], grow:FOLDER, or a recording that is played.",
+            help="realsense[:SERIAL], ros2:TOPIC[,TOPIC...], grow:FOLDER, or a recording to play.",
         ),
     ],
     init: InitOption = None,
@@ -51,33 +51,35 @@ def live_command(
         Path | None,
         typer.Option(
             metavar="FILE.mcap",
-            help="Write inputs and results, for voodoo track to read: it stores pictures of people.",
+            help="Write inputs and results to a file for voodoo track; it contains images of people.",
         ),
     ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Write rate, latency, drops and faults at the end.")
     ] = None,
-    duration: Annotated[float | None, typer.Option(metavar="S", min=0.0, help="End after so many seconds.")] = None,
-    rate: Annotated[float, typer.Option(metavar="N", help="How many times as fast a recording is played.")] = 1.0,
-    loop: Annotated[bool, typer.Option("--loop", help="Play a recording again and again.")] = False,
+    duration: Annotated[float | None, typer.Option(metavar="S", min=0.0, help="End after this time.")] = None,
+    rate: Annotated[float, typer.Option(metavar="N", help="Speed factor for a recording.")] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Repeat a recording.")] = False,
     publish: Annotated[
         bool | None,
         typer.Option(
             "--publish/--no-publish",
-            help="Publish transforms, joint states and markers on ROS 2; by default where a source is ros2.",
+            help="Publish transforms, joint states and markers on ROS 2; by default if a source is ros2.",
         ),
     ] = None,
     view: ViewOption = False,
     serve: Annotated[
         str | None,
-        typer.Option(metavar="[HOST:]PORT", help="Show it in a browser: Rerun's web viewer; on 127.0.0.1 unless told."),
+        typer.Option(
+            metavar="[HOST:]PORT", help="Show it in a browser with Rerun's web viewer; on 127.0.0.1 by default."
+        ),
     ] = None,
     use: UseOption = None,
     depth_range: DepthRangeOption = None,
     calibration: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE.toml", help="Where a camera is (root_frame, root_from_sensor): one for each SOURCE, in order."
+            metavar="FILE.toml", help="Pose of a camera (root_frame, root_from_sensor): one for each SOURCE, in order."
         ),
     ] = None,
     exclude: ExcludeOption = None,
@@ -86,11 +88,11 @@ def live_command(
     option: LoaderNumberOption = None,
     loader: LoaderOption = None,
 ) -> None:
-    """Track what a source measures, as it comes: the newest frame each time; what comes too fast is dropped and counted.
+    """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
 
-    Ends after --duration, with the recording, or with Ctrl-C or SIGTERM; files are finished then.
-    Once a second a line on stderr says rate, latency, drops and the status of each person.
-    What is wrong with the source is named there and counted.
+    Ends after --duration, with the recording, or with Ctrl-C or SIGTERM; then files are completed.
+    Every second a line on stderr has rate, latency, drops and the status of each person.
+    Faults of the source are reported there and counted.
 
     Examples
 

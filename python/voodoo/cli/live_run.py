@@ -1,4 +1,4 @@
-"""What `voodoo live` does: open sources, follow, publish until a signal. Imported when the command runs, not for its help."""
+"""Implementation of `voodoo live`: opens sources, tracks, and publishes until a signal. Not imported for its help."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ _STANDING = {
 _TICK_S = 0.05
 _LINE_S = 1.0
 _NO_SCREEN = "--save FILE.rrd writes a file"
-"""What `Viewer` advises where there is no screen."""
+"""Advice in the error of `Viewer` without a screen."""
 _SWITCH_S = 5e-4
 """Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the command line asks for."""
+    """Settings of the command line."""
 
     beginning: Beginning | None
     body: Path | None
@@ -80,7 +80,7 @@ class Wishes:
 
 @dataclass
 class Done:
-    """How a session ended: by which signal ("": none), and what was written."""
+    """Result of a session: the signal that ended it ("": none), and the written files."""
 
     signal: str = ""
     written: list[Path] = field(default_factory=list)
@@ -99,7 +99,7 @@ def entered(
     """The sources of the command line.
 
     Raises:
-        VoodooError: more calibrations than sources, or a source that cannot be.
+        VoodooError: more calibrations than sources, or an invalid source.
     """
     if len(calibrations) > len(words):
         raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
@@ -115,7 +115,7 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
 
     Raises:
-        VoodooError, OSError: a source or an output that failed.
+        VoodooError, OSError: a source or an output failed.
     """
     done = Done()
     warm_up()
@@ -139,7 +139,7 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
 
 
 def _check_states(session: Session, signals: Sequence[str], duration: float | None) -> None:
-    """Say a line a second until the end."""
+    """Print a line every second until the end."""
     clock = session.live.clock
     began = reported = clock.now()
     while session.wait(_TICK_S) and not signals:
@@ -152,7 +152,7 @@ def _check_states(session: Session, signals: Sequence[str], duration: float | No
 
 
 def write_report(path: Path, session: Session) -> None:
-    """Write what happened as JSON; the file appears whole."""
+    """Write the report as JSON, atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.part")
     part.write_text(json.dumps(session.report(), indent=2) + "\n", encoding="utf-8")
@@ -208,12 +208,12 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
 
 
 class ShowOutput(Output):
-    """Shows steps in Rerun; a viewer that is late shows fewer."""
+    """Shows steps in Rerun; a slow viewer skips steps."""
 
     name = "view"
 
     def __init__(self, viewer: Viewer, *, several: bool) -> None:
-        """Keep both."""
+        """Store the arguments."""
         self.viewer, self._several = viewer, several
 
     def publish(self, step: Step) -> None:
@@ -232,7 +232,7 @@ class ShowOutput(Output):
 
 @contextmanager
 def _prompt_threads() -> Iterator[None]:
-    """Threads wait less for each other, and what is loaded by now is not looked through for garbage again."""
+    """Shortens the switch interval of threads, and excludes the loaded objects from garbage collection."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)
     gc.collect()
@@ -246,7 +246,7 @@ def _prompt_threads() -> Iterator[None]:
 
 @contextmanager
 def _signals() -> Iterator[list[str]]:
-    """Names of SIGINT and SIGTERM as they come; a second one ends the program at once."""
+    """Collects the names of received SIGINT and SIGTERM; a second one ends the program immediately."""
     found: list[str] = []
     before = {}
 
@@ -264,7 +264,7 @@ def _signals() -> Iterator[list[str]]:
 
 
 def warm_up() -> None:
-    """Do once what the first frames would wait for: a small picture of somebody is tracked and put into messages."""
+    """Run initialization that would delay the first frames: track a person in a small image and serialize the result."""
     camera = Camera(80, 60, 66.0, 66.0, 39.5, 29.5)
     body = Body.human(model="measured")
     tracker = Tracker(body)

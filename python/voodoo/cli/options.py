@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options of several commands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from voodoo.names import INPUTS, TOPIC_KINDS, HumanModel
 from voodoo.recordings.loaders import LOADERS
 
 TOPICS = (*TOPIC_KINDS, "camera_info")
-"""What a topic can be chosen for."""
+"""Kinds for which a topic can be chosen."""
 
 RecordingArgument = Annotated[
     Path,
@@ -20,13 +20,14 @@ RecordingArgument = Annotated[
     ),
 ]
 LoaderOption = Annotated[
-    str | None, typer.Option("--loader", metavar="NAME", help=f"Instead of a guess: {', '.join(LOADERS)}.")
+    str | None,
+    typer.Option("--loader", metavar="NAME", help=f"Loader instead of the detected one: {', '.join(LOADERS)}."),
 ]
 ConfigOption = Annotated[
     Path | None, typer.Option("--config", metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
 ]
 BodyOption = Annotated[
-    Path | None, typer.Option("--body", metavar="FILE", help="What to track, as TOML; `voodoo body` prints the human.")
+    Path | None, typer.Option("--body", metavar="FILE", help="Body to track, as TOML; `voodoo body` prints the human.")
 ]
 HeightOption = Annotated[
     float | None,
@@ -37,8 +38,8 @@ InitOption = Annotated[
     typer.Option(
         "--init",
         metavar="FILE|auto",
-        help="First pose as JSON, or an earlier result (.csv, .npz); auto: look for somebody, whatever start lies beside the "
-        "recording. By default the recording's own start; auto where none comes with it.",
+        help="First pose as JSON, or an earlier result (.csv, .npz); auto: search for a person, even if there is a start beside "
+        "the recording. By default the recording's start; auto if it has none.",
     ),
 ]
 DetectorOption = Annotated[
@@ -46,7 +47,7 @@ DetectorOption = Annotated[
     typer.Option(
         "--detector",
         metavar="FILE.onnx",
-        help="A network that finds people in depth images, instead of the shipped one (pip install 'voodoo-tracker[onnx]').",
+        help="A network that detects persons in depth images, instead of the shipped one (pip install 'voodoo-tracker[onnx]').",
     ),
 ]
 ExcludeOption = Annotated[
@@ -54,14 +55,14 @@ ExcludeOption = Annotated[
     typer.Option(
         "--exclude",
         metavar="X0,Y0,Z0,X1,Y1,Z1",
-        help="A box in the root frame, two corners in meters, in which nobody is looked for or tracked; repeatable.",
+        help="A box in the root frame, two corners in meters, in which no person is searched for or tracked; repeatable.",
     ),
 ]
 ModelOption = Annotated[
     HumanModel | None,
     typer.Option(
         "--model",
-        help="The human: full (eighteen limbs), papers (their ten), or measured (full, as bodies are; if nobody tells a pose).",
+        help="The human: full (eighteen limbs), papers (ten limbs), or measured (full, mean sizes; default without a start).",
     ),
 ]
 PeopleOption = Annotated[
@@ -69,7 +70,7 @@ PeopleOption = Annotated[
     typer.Option(
         "--people",
         metavar="any|N",
-        help="How many to follow: 1 (default) the most visible person; any, or up to N, each with an id that lasts.",
+        help="Number of persons: 1 (default), the most visible person; any, or at most N, each with a persistent id.",
     ),
 ]
 FrameOption = Annotated[
@@ -81,13 +82,13 @@ TopicOption = Annotated[
     typer.Option(
         "--topic",
         metavar="KIND=NAME",
-        help=f"Topic of a bag, where it has several of a kind: {', '.join(TOPICS)}; repeatable, depth cameras add up.",
+        help=f"Topic of a bag with several of a kind: {', '.join(TOPICS)}; repeatable; several depth cameras are used together.",
     ),
 ]
 StrictOption = Annotated[
     bool,
     typer.Option(
-        "--strict", help="Refuse a damaged recording; by default what cannot be used is left out and counted."
+        "--strict", help="Reject a damaged recording; by default unusable measurements are left out and counted."
     ),
 ]
 BackgroundOption = Annotated[
@@ -95,7 +96,7 @@ BackgroundOption = Annotated[
     typer.Option(
         "--background",
         metavar="DIR",
-        help="Pictures of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
+        help="Images of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
     ),
 ]
 NUMBERS = ("rate", "meters_per_unit", "tf_max_age")
@@ -115,13 +116,15 @@ UseOption = Annotated[
     typer.Option(
         "--use",
         metavar="KIND,...",
-        help=f"Inputs to use: {', '.join(INPUTS)}. By default all there are, color only where nothing else tells the pose.",
+        help=f"Inputs to use: {', '.join(INPUTS)}. By default all; color only if no other input determines the pose.",
     ),
 ]
 DepthRangeOption = Annotated[
     str | None,
     typer.Option(
-        "--depth-range", metavar="NEAR,FAR", help="Leave out depth beyond these meters, and flying pixels at edges."
+        "--depth-range",
+        metavar="NEAR,FAR",
+        help="Remove depth outside these limits in meters, and flying pixels at edges.",
     ),
 ]
 ViewOption = Annotated[

@@ -1,4 +1,4 @@
-"""`voodoo track --people` and `voodoo eval` of several people."""
+"""`voodoo track --people` and `voodoo eval` for several persons."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ANY = "any"
 
 
 def limit_of(word: str) -> tuple[bool, int | None]:
-    """Whether several people are followed, and how many at most (None: any number), of "any" or a number from 1.
+    """Parse "any" or a number from 1: whether several persons are tracked, and the largest number (None: any).
 
     Raises:
         VoodooError: another word.
@@ -44,7 +44,7 @@ def limit_of(word: str) -> tuple[bool, int | None]:
 
 
 def no_starts(init: str | None) -> Automatic:
-    """Several people are always looked for.
+    """Several persons are always searched for.
 
     Raises:
         VoodooError: a start was given.
@@ -57,7 +57,7 @@ def no_starts(init: str | None) -> Automatic:
 
 
 def body_of(body: Path | None, *, height: float | None, model: HumanModel | None) -> Body | None:
-    """What every new person gets a copy of: a file's, a human of a stature, or None, the default."""
+    """The body that is copied for new persons: from a file, a human of a stature, or None for the default."""
     from voodoo.model.body import Body
 
     if body is not None:
@@ -69,7 +69,7 @@ def body_of(body: Path | None, *, height: float | None, model: HumanModel | None
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """Where a result goes: files, pictures, Rerun."""
+    """Targets of a result: files, images, Rerun."""
 
     targets: Sequence[Path]
     overlay: Path | None
@@ -80,7 +80,7 @@ class Outputs:
 def follow_people(
     source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
 ) -> None:
-    """Track everybody in a recording, and write what was asked for."""
+    """Track all persons in a recording, and write the requested outputs."""
     from voodoo.export.people_files import save_people
 
     result, bodies, interrupted = _run(source, people, settings, outputs, left_out)
@@ -111,7 +111,7 @@ class _Followed(NamedTuple):
 def _run(
     source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
 ) -> _Followed:
-    """Track and draw. Ctrl-C ends it with the frames up to there, if any."""
+    """Track and draw. Ctrl-C ends the run with the frames so far, if any."""
     from voodoo.export.people import PeopleTrack
     from voodoo.pipeline.people import track_people
     from voodoo.visualization.image_writer import PictureWriter
@@ -142,7 +142,7 @@ def _run(
 
 
 def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:
-    """The score of a result file, which belongs to one recording."""
+    """Evaluate a result file of one recording."""
     from voodoo.evaluation.people_evaluate import evaluate_result
 
     if len(paths) != 1:
@@ -151,7 +151,7 @@ def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str |
 
 
 def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
-    """Print the table of several people, and write it."""
+    """Print and write the table of several persons."""
     from voodoo.evaluation.people_report import people_markdown, write_people
 
     typer.echo(people_markdown(scores))
@@ -160,7 +160,7 @@ def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
 
 
 def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:
-    """End with an error where a recording could not be tracked to its end.
+    """Raise an error if a recording could not be tracked to its end.
 
     Raises:
         VoodooError: names the first.

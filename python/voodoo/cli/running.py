@@ -30,8 +30,8 @@ from voodoo.visualization.rerun_viewer import Viewer
 
 
 class Run(NamedTuple):
-    """What a run over a recording leaves: the result, the time of every frame [s], the pictures that were asked for, and
-    whether Ctrl-C ended it before the recording did."""
+    """Outcome of a run over a recording: the result, the time of every frame [s], the requested images, and whether it was
+    ended by Ctrl-C."""
 
     track: Track
     seconds: list[float]
@@ -40,14 +40,14 @@ class Run(NamedTuple):
 
 
 def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
-    """The recording, in the root frame that was asked for."""
+    """Open a recording, in the requested root frame."""
     if frame is not None:
         options["root_frame"] = frame
     return open_recording(path, loader=loader, **options)
 
 
 def kinds_of(words: str | None) -> tuple[str, ...] | None:
-    """The kinds of inputs in "depth,scan"; None: whatever the recording is best tracked by.
+    """The kinds of inputs in "depth,scan"; None: the best ones for the recording.
 
     Raises:
         VoodooError: an unknown kind.
@@ -61,7 +61,7 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
     """The filter of "NEAR,FAR" in meters; none for None.
 
     Raises:
-        VoodooError: not two numbers, or limits that leave nothing.
+        VoodooError: not two numbers, or an empty range.
     """
     if words is None:
         return None
@@ -73,13 +73,12 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
 
 
 def bare_for(init: Beginning | None) -> dict[str, Any]:
-    """The option of `open_recording` with which nothing beside the recording is read where another start is given, or
-    looked for."""
+    """The option of `open_recording` that ignores files beside the recording if another start is given or searched for."""
     return {} if init is None else {"bare": True}
 
 
 def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
-    """The boxes of "X0,Y0,Z0,X1,Y1,Z1" each, with the lower corner first.
+    """Parse boxes of the form "X0,Y0,Z0,X1,Y1,Z1", lower corner first.
 
     Raises:
         VoodooError: not six finite numbers, or a box without inside.
@@ -98,15 +97,15 @@ def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
 
 
 def config_of(path: Path | None) -> Config:
-    """The configuration of a file; the defaults for None."""
+    """Load a configuration; None: the defaults."""
     return Config() if path is None else Config.load(path)
 
 
 def detector_of(path: Path | None) -> AnyDetector:
-    """The network of an ONNX file; the shipped detector for None.
+    """Load the network of an ONNX file; None: the shipped detector.
 
     Raises:
-        ConfigError: no such network.
+        ConfigError: the file is not such a network.
     """
     return "shipped" if path is None else OnnxDetector(path)
 
@@ -122,7 +121,7 @@ def run(
     viewer: Viewer | None = None,
     left_out: LeftOut | None = None,
 ) -> Run:
-    """Track and draw, with `sheet` pictures spread over the recording. Ctrl-C ends it with the frames up to there, if any."""
+    """Track and draw, with `sheet` images spread over the recording. Ctrl-C ends the run with the frames so far, if any."""
     estimates, seconds, pictures, interrupted = [], [], [], False
     chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
     rate = source.info().rate_hz
@@ -163,5 +162,5 @@ def run(
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:
-    """The viewer that was asked for, opened before the work so that a missing Rerun is told at once."""
+    """Open the requested viewer before the work, so that a missing Rerun is reported immediately."""
     return Viewer(save=save, name=name) if view or save is not None else nullcontext()

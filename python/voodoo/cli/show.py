@@ -1,4 +1,4 @@
-"""`voodoo info`, `voodoo config` and `voodoo body`: what there is."""
+"""`voodoo info`, `voodoo config` and `voodoo body`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def info_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
 ) -> None:
-    """Say what is in a recording: sensors, topics, frames, rates, root frame, reference and range of depths."""
+    """Print the contents of a recording: sensors, topics, frames, rates, root frame, reference and range of depths."""
     from voodoo.cli.running import opened
     from voodoo.recordings.depth_range import depth_range
     from voodoo.recordings.left_out import LeftOut
@@ -43,7 +43,7 @@ def info_command(
 
 
 def config_command() -> None:
-    """Print the default configuration as commented TOML, to change and give back with --config.
+    """Print the default configuration as commented TOML, to edit and pass with --config.
 
     Example
 

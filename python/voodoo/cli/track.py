@@ -48,16 +48,16 @@ def track_command(
     people: PeopleOption = "1",
     out: OutOrNameOption = None,
     overlay: Annotated[
-        Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a film.")
+        Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a video.")
     ] = None,
     draw_regions: Annotated[
         bool,
-        typer.Option("--draw-regions", help="In --overlay, also what is the body by its colors, and edges found."),
+        typer.Option(
+            "--draw-regions", help="Also draw the color regions of the body and the color edges in --overlay."
+        ),
     ] = False,
     view: ViewOption = False,
-    save: Annotated[
-        Path | None, typer.Option(metavar="FILE.rrd", help="Write what --view shows to a file, to open elsewhere.")
-    ] = None,
+    save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write the data of --view to a file.")] = None,
     use: UseOption = None,
     depth_range: DepthRangeOption = None,
     with_: Annotated[
@@ -69,10 +69,12 @@ def track_command(
         list[str] | None,
         typer.Option(metavar="SENSOR=DIR", help="OpenPose JSON files, one for each image of SENSOR; repeatable."),
     ] = None,
-    layout: Annotated[str, typer.Option(metavar="NAME", help=f"Of all keypoints: {', '.join(LAYOUTS)}.")] = "body25b",
+    layout: Annotated[
+        str, typer.Option(metavar="NAME", help=f"Layout of all keypoints: {', '.join(LAYOUTS)}.")
+    ] = "body25b",
     marker_map: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="TOML: which sites the markers of .trc and .c3d files stand for."),
+        typer.Option(metavar="FILE", help="TOML that assigns the markers of .trc and .c3d files to sites."),
     ] = None,
     topic: TopicOption = None,
     frame: FrameOption = None,
@@ -82,31 +84,32 @@ def track_command(
     background: BackgroundOption = None,
     strict: StrictOption = False,
 ) -> None:
-    """Find a person in a recording, follow them, and write one row a frame.
+    """Find a person in a recording, track them, and write one row per frame.
 
-    All inputs the recording has are used: depth images, point clouds, laser scans, skin in color images, 2-D
+    All inputs of the recording are used: depth images, point clouds, laser scans, skin in color images, 2-D
     keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
 
-    Pictures of calibrated cameras alone (a bag, or a folder with videos and Calib*.toml) are followed by the color regions of
-    the body; --use color does so where there is more. They need a start: --init FILE, or one that lies beside them.
+    If there are only images of calibrated cameras (a bag, or a folder with videos and Calib*.toml), the color regions of the
+    body are tracked; with other inputs, --use color does so. This needs a start: --init FILE, or a file beside the images.
 
-    The start is the recording's own, if one comes with it. Else somebody is looked for: in markers, keypoints of several
-    cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until then, and when the
-    person is gone, the status is searching and the coordinates are empty.
+    The start is that of the recording, if it has one. Otherwise a person is searched for in markers, keypoints of several
+    cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until a person is found,
+    and when the person has left, the status is searching and the coordinates are empty.
 
     The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in the
-    recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, what is known of every
-    limb. The .npz adds the pose of every limb. Ctrl-C writes the frames up to there and ends with exit code 130.
+    recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
+    limb. The .npz adds the pose of every limb. Ctrl-C writes the frames so far and ends with exit code 130.
 
-    Frames that cannot be used (a repeated or late stamp, a blank or undecodable image) are left out: they have no row. They are
-    counted by reason on stderr and in the .npz. With --strict the first one ends without any result.
+    Unusable frames (a repeated or late stamp, a blank or undecodable image) are left out and have no row. They are counted by
+    reason on stderr and in the .npz. With --strict the first one ends the command without a result.
 
-    --init FILE gives the pose in the first frame, by any subset of names that fixes it, or with stamp_s that of a later one:
+    --init FILE gives the pose in the first frame, by any subset of names that determines it, or with stamp_s in a later frame:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
-    --people any or N follows several people, found in depth images; no start is read. The .csv then begins stamp_s, person,
-    status, residual_m and has a row for every person who is there; person is an id from 1, which whoever comes back has again.
-    The .npz and bags hold everybody (frames body_1, body_2, ...); of .bvh and .trc there is one file a person: NAME_1.bvh, ...
+    --people any or N tracks several persons, detected in depth images; no start is read. The .csv then begins with stamp_s,
+    person, status, residual_m and has a row for every person who is present; person is an id from 1, which is kept when a person
+    returns. The .npz and bags have all persons (frames body_1, body_2, ...); .bvh and .trc have one file per person: NAME_1.bvh,
+    ...
 
     Examples
 
@@ -161,7 +164,7 @@ def track_command(
         options = topics_of(topic) | loader_options(recording, loader, **about)
         if background is not None:
             options["background"] = background
-        # A number that no other recording takes is this one's, whose loader may refuse it.
+        # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
@@ -228,7 +231,7 @@ def _print_left_out(source: Recording, left_out: LeftOut | None) -> None:
 
 
 def _print_warnings(source: Recording, result: Track, left_out: LeftOut | None) -> None:
-    """Say on stderr what was left out, and what may be wrong where nobody was tracked."""
+    """Print on stderr what was left out, and possible reasons if no person was tracked."""
     from voodoo.recordings.depth_range import depth_range
 
     _print_left_out(source, left_out)

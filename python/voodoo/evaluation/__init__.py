@@ -1,1 +1,1 @@
-"""Measuring the tracker on recordings with truth or a reference; nothing of the product imports it."""
+"""Evaluation of the tracker on recordings with ground truth or a reference. The rest of the package does not import it."""

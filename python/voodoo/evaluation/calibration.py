@@ -22,7 +22,7 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 DROPPED = 0.2
 """Fraction of the joints that are dropped for the sparsification: the most uncertain ones, or the worst."""
 NORMAL = (0.683, 0.954)
-"""Shares within one and two standard deviations of a normal distribution."""
+"""Fractions within one and two standard deviations of a normal distribution."""
 
 _ARM = np.array([name.split("_")[1] in ("shoulder", "elbow", "wrist") for name in metrics.JOINTS])
 _TRUNK = np.array([name.split("_")[1] in ("shoulder", "hip") for name in metrics.JOINTS])
@@ -30,12 +30,12 @@ _TRUNK = np.array([name.split("_")[1] in ("shoulder", "hip") for name in metrics
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Deviations:
-    """Errors of F frames and what was said of them, joint by joint of metrics.JOINTS.
+    """Errors and standard deviations of metrics.JOINTS in F frames.
 
     Args:
         errors: (F, 12, 3) estimate less reference [m], NaN where there is none.
         sigma: (F, 12, 3) standard deviations [m].
-        measured: (F, 12) whether the limb that ends at the joint was called measured.
+        measured: (F, 12) whether the status of the limb that ends at the joint is "measured".
     """
 
     errors: FloatArray
@@ -44,20 +44,20 @@ class Deviations:
 
 
 def sigma_of(estimate: Estimate) -> FloatArray:
-    """Standard deviations (12, 3) [m] of metrics.JOINTS; NaN where nothing is said."""
+    """Standard deviations (12, 3) [m] of metrics.JOINTS; NaN where unknown."""
     unknown = np.full(3, np.nan)
     return np.array([estimate.joint_sigma.get(name, unknown) for name in metrics.JOINTS], dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """How errors of some joints compare with their standard deviations, by coordinate.
+    """Errors of a group of joints compared with their standard deviations, by coordinate.
 
     Args:
-        name: which joints.
-        coordinates: how many numbers.
+        name: the group.
+        coordinates: number of coordinates.
         error_m, sigma_m: root mean squares.
-        within_one, within_two: shares of the errors within one and two standard deviations.
+        within_one, within_two: fractions of the errors within one and two standard deviations.
     """
 
     name: str
@@ -73,9 +73,9 @@ class UncertaintyCalibration:
     """Agreement of errors with their standard deviations.
 
     Args:
-        shares: of all joints, those of the trunk, and the ends of limbs that were called measured or not.
-        quartiles: of the joints of arms and of legs, a quarter each by their standard deviations, the smallest first.
-        mean_m, kept_m, oracle_m: mean error of all joints, without the DROPPED most uncertain ones, and without the worst.
+        coverages: of all joints, those of the trunk, and the ends of limbs with and without the status "measured".
+        quartiles: of the joints of arms and of legs, divided into quarters by standard deviation, the smallest first.
+        mean_m, kept_m, oracle_m: mean error of all joints, without the most uncertain fraction DROPPED, and without the worst.
     """
 
     coverages: tuple[Coverage, ...]
@@ -86,12 +86,12 @@ class UncertaintyCalibration:
 
     @property
     def ratio(self) -> float:
-        """Remaining error without the most uncertain joints, as a multiple of that without the worst: 1 at best."""
+        """Remaining error without the most uncertain joints, divided by that without the worst: at best 1."""
         return self.kept_m / self.oracle_m
 
 
 def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
-    """Compare errors with their standard deviations; None where nothing is known of either."""
+    """Compare errors with their standard deviations; None if no joint has both."""
     if not found:
         return None
     errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
@@ -141,7 +141,7 @@ def _coverage(name: str, errors: FloatArray, sigma: FloatArray) -> Coverage:
 
 
 def calibration_markdown(calibration: UncertaintyCalibration, against: str) -> str:
-    """The table as Markdown; `against` is what the errors were measured with."""
+    """The table as Markdown; `against` names the ground truth or reference."""
     one, two = (f"{100 * fraction:.1f} %" for fraction in NORMAL)
     lines = [
         f"## Standard deviations against {against}\n",
@@ -164,7 +164,7 @@ def calibration_markdown(calibration: UncertaintyCalibration, against: str) -> s
 
 
 def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
-    """Shares within so many standard deviations, beside error over standard deviation."""
+    """Plot the cumulative distribution of normalized errors, and error over standard deviation."""
     errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
     measured = np.concatenate([each.measured for each in found])
     known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)

@@ -1,11 +1,11 @@
 """Agreement of a pose with depth images: distances of the person's points to the model, and overlap of the silhouettes.
 
-Which depth pixels belong to the person is decided without the tracker wherever that is possible, so that a lost track
-cannot select the pixels that it is judged by:
+The depth pixels of the person are selected without the tracker where possible, so that a lost track cannot select the
+pixels that it is evaluated with:
 
-* "segmented": the recording has the person cut out (UTD-MHAD): every pixel with depth (chair and floor band included).
+* "segmented": the person is segmented in the recording (UTD-MHAD): every pixel with depth (chair and floor band included).
 * "truth": exact joint positions are known: pixels within the capsules of CAPSULES around them.
-* "model": neither: pixels within 10 cm of the box around the model (K06 IV-B 1). Such numbers are too good for a lost track.
+* "model": neither: pixels within 10 cm of the box around the model (K06 IV-B 1). Such values are too good for a lost track.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ CAPSULES: tuple[tuple[str, str, float], ...] = (
         )
     ),
 )
-"""Segments between true joints and the radius [m] within which depth is the person's. Wide enough for a heavy person in
-clothes, narrow enough that at the ankles (8 cm above the floor) only a few square decimetres of floor are taken."""
+"""Segments between true joints and the radius [m] within which points belong to the person. Large enough for a heavy person
+in clothes, small enough that at the ankles (8 cm above the floor) only a few square decimeters of floor are included."""
 
 _BOX_MARGIN_M = 0.1
 WITHIN_M = 0.05
@@ -55,9 +55,9 @@ WITHIN_M = 0.05
 
 @dataclass(frozen=True, eq=False)
 class FrameWitness:
-    """One frame: unsigned distances (N,) [m] of the person's points to the model, which of them (N,) lie within CAPSULES
-    about known joints (chair and floor mostly do not), and the silhouettes' overlap (NaN without a depth image or without a
-    person in it)."""
+    """Agreement in one frame: unsigned distances (N,) [m] of the person's points to the model, which of them (N,) are within
+    CAPSULES around known joints (chair and floor mostly are not), and the overlap of the silhouettes (NaN without a depth image
+    or without a person in it)."""
 
     distances: FloatArray
     about_joints: BoolArray
@@ -76,17 +76,17 @@ def witness(
     truth: Mapping[str, FloatArray],
     selection: Selection,
 ) -> FrameWitness:
-    """Compare depth images and clouds of a frame with the model as it stands now.
+    """Compare depth images and clouds of a frame with the current model.
 
     Args:
         recorded: the frame just tracked.
-        tracker: gives the distance to its current model.
+        tracker: provides the distance to its current model.
         estimate: of this frame.
-        truth: true joint positions [m] in the root frame, or those of a reference; only "truth" selects by them.
+        truth: true joint positions [m] in the root frame, or those of a reference; used for selection only with "truth".
         selection: see the module.
 
     Returns:
-        Nothing of a searching frame: there is no model to compare with.
+        Empty arrays for a searching frame, which has no model to compare with.
     """
     distances, about, overlaps = [np.empty(0)], [np.empty(0, dtype=bool)], [np.empty(0)]
     for item in recorded.measurements if estimate.joints else ():
@@ -152,7 +152,7 @@ def _select(
 
 
 def _overlap(depth: DepthImage, person: BoolArray, body: Body, estimate: Estimate) -> float:
-    """Intersection over union of the model's outline and the person's pixels; NaN when no pixel is the person's."""
+    """Intersection over union of the model's silhouette and the person's pixels; NaN when no pixel is the person's."""
     if not person.any():
         return float("nan")
     height, width = depth.image.shape

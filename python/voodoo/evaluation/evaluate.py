@@ -1,4 +1,4 @@
-"""Measuring the tracker on recordings with truth or a reference skeleton, one recording a process."""
+"""Evaluates the tracker on recordings with ground truth or a reference skeleton, in parallel processes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _CARRIER = {
 """The limb that ends at a joint."""
 
 NOWHERE_M = 10.0
-"""Error of a joint that is there when nobody was found, for the class: beyond every limit."""
+"""Error of a joint while no person is tracked, larger than every limit, for the tracking class."""
 _SEGMENTED_LOADERS = ("utd-mhad",)
 
 
@@ -58,15 +58,15 @@ def evaluate(
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
 ) -> tuple[Score, FrameTable]:
-    """Track a recording from its own start and measure the result.
+    """Track a recording from its own start and evaluate the result.
 
     Args:
         path: of the recording.
         config: None means the defaults.
         loader: see open_recording.
         model: see start_tracker.
-        use: from which of its inputs; None: all.
-        init: "auto" leaves the recording's own start out and looks for somebody, as is done where none comes with it.
+        use: kinds of inputs; None: all.
+        init: "auto" ignores the start of the recording and searches for a person, as for recordings without a start.
 
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
@@ -104,7 +104,7 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
 
 
 def differences(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
-    """The same by coordinate, (F, 12, 3): estimate less reference."""
+    """Errors by coordinate, (F, 12, 3): estimate minus reference."""
     column = {name: index for index, name in enumerate(result.joint_names)}
     positions = np.full((len(result), len(metrics.JOINTS), 3), np.nan)
     for index, name in enumerate(metrics.JOINTS):
@@ -116,12 +116,12 @@ def differences(recording: Recording, result: Track, *, at_best_lag: bool = Fals
 
 
 def called_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
-    """Of which of metrics.JOINTS (12,) the limb that ends there is called measured; joints of the trunk end none."""
+    """For metrics.JOINTS (12,), whether the status of the limb that ends there is "measured"; False for joints of the trunk."""
     return np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
 
 
 def limb_ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
-    """Which of the joints (F, 12) are ends of limbs, and farther than LIMIT_EXACT_M from the truth or nearer."""
+    """Masks (F, 12) of the joints at ends of limbs that are farther than LIMIT_EXACT_M from the truth, and of the nearer ones."""
     ends = np.array([name in _CARRIER for name in metrics.JOINTS])
     return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
 
@@ -143,7 +143,7 @@ def evaluate_all(
     init: Automatic | None = None,
     jobs: int = 1,
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
-    """Evaluate recordings in parallel processes; (index in `paths`, score, frames) as each is done, in any order.
+    """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
 
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
     """
@@ -177,7 +177,7 @@ def evaluate_all(
         raise VoodooError(f"evaluation: a worker process died ({error}); try fewer --jobs") from error
     finally:
         if not done:
-            # A worker ends its recording before it looks for another task; nobody waits for that after Ctrl-C.
+            # A worker finishes its recording before it takes another task; after Ctrl-C it is terminated.
             for worker in set(multiprocessing.active_children()) - others:
                 worker.kill()
         pool.shutdown(wait=done, cancel_futures=True)
@@ -185,7 +185,7 @@ def evaluate_all(
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Processes started within ignore Ctrl-C, which a terminal sends to all its processes; this process ends them."""
+    """Processes started inside ignore Ctrl-C, which a terminal sends to all processes; this process terminates them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -197,7 +197,7 @@ def _deaf_children() -> Iterator[None]:
 
 
 def _one_thread() -> None:
-    """In a worker: the processes are the parallelism."""
+    """Initialize a worker: one thread each, because the processes run in parallel."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["RAYON_NUM_THREADS"] = "1"
     cv2.setNumThreads(1)
@@ -325,7 +325,7 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
 def _first_pose(
     stamps: FloatArray, status: Sequence[str], reference: FloatArray, errors: FloatArray
 ) -> tuple[float, float]:
-    """How long after the reference's first frame the first pose came [s], and its mean error [m]; NaN without either."""
+    """Time from the first frame of the reference to the first pose [s], and its mean error [m]; NaN without either."""
     found = [index for index, word in enumerate(status) if word != SEARCHING]
     known = np.flatnonzero(np.isfinite(reference).all(axis=(1, 2)))
     if not found or not len(known):

@@ -1,4 +1,4 @@
-"""Where pictures of an evaluation are drawn."""
+"""Creates the figures of an evaluation."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from voodoo.errors import VoodooError
 
 
 def new_figure(width: float, height: float) -> Any:  # noqa: ANN401 - of a library that may not be there
-    """An empty figure of Matplotlib, which is optional; inches.
+    """An empty figure of Matplotlib, which is optional; sizes in inches.
 
     Raises:
-        VoodooError: Matplotlib is not installed; says how.
+        VoodooError: Matplotlib is not installed; says how to install it.
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg

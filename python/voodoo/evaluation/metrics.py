@@ -1,6 +1,6 @@
 """Measures of a trajectory against a reference: pure functions on arrays.
 
-Everywhere F frames, J joints, distances in meters, NaN = not known.
+F is the number of frames, J the number of joints; distances are in meters, NaN is unknown.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MAX_LAG = 5
 """Lags from -MAX_LAG to MAX_LAG frames are tried."""
 
 STILL_M, STILL_S = 0.02, 0.2
-"""A joint of the reference stands still in a frame when it stays this near [m] for so long [s] before and after."""
+"""A joint of the reference stands still in a frame if it stays within this distance [m] for this time [s] before and after."""
 
 BONE_OFF = 0.25
 """Tolerated relative change of the length of a reference's bone: twice the variation of Kinect's skeleton."""
@@ -41,9 +41,9 @@ _STAMP_TOLERANCE_S = 1e-6
 def match_reference(
     stamps: FloatArray, reference_stamps: FloatArray, positions: FloatArray, *, tolerance: float
 ) -> FloatArray:
-    """Reference positions (F, J, 3) at `stamps` (F,): of the nearest stamp, NaN where none is within `tolerance` [s].
+    """Reference positions (F, J, 3) at `stamps` (F,), those of the nearest stamp; NaN if none is within `tolerance` [s].
 
-    Nearest instead of interpolated, because a reference that runs at the frames' rate has one value for every frame.
+    They are not interpolated, because a reference with the frames' rate has one value for every frame.
     """
     after = np.clip(np.searchsorted(reference_stamps, stamps), 0, len(reference_stamps) - 1)
     before = np.maximum(after - 1, 0)
@@ -61,7 +61,7 @@ def joint_errors(estimated: FloatArray, reference: FloatArray, *, lag: int = 0) 
         estimated: one position for each frame.
         reference: the same frames.
         lag: frame i of the estimate is compared with frame i - lag of the reference: positive means that the estimate
-            is late. Frames whose partner is outside are NaN.
+            is late. Frames whose counterpart is outside are NaN.
     """
     return np.asarray(np.linalg.norm(estimated - shifted(reference, lag), axis=2))
 
@@ -69,8 +69,8 @@ def joint_errors(estimated: FloatArray, reference: FloatArray, *, lag: int = 0) 
 def without_offsets(estimated: FloatArray, reference: FloatArray) -> FloatArray:
     """Distances (F, J) of estimated to reference positions of JOINTS, each joint's constant offset removed.
 
-    Another tracker's hip is another place on the body than ours, always by the same: the median, over the frames, of each
-    joint's difference in the reference's trunk axes (from right to left shoulder, from the hips up) is no error.
+    Trackers define joints at different positions on the body, with a constant offset: the median over the frames of each
+    joint's difference in the axes of the reference's trunk (from right to left shoulder, from the hips up) is removed.
 
     Args:
         estimated, reference: (F, 12, 3) [m], frame by frame.
@@ -91,10 +91,11 @@ def without_offsets(estimated: FloatArray, reference: FloatArray) -> FloatArray:
 
 
 def without_contradictions(reference: FloatArray) -> FloatArray:
-    """A reference skeleton (F, 12, 3) without what it cannot mean: NaN at the far end of a bone whose length is BONE_OFF off its
-    median over the frames.
+    """A reference skeleton (F, 12, 3) without implausible joints: NaN at the distal end of a bone whose length deviates by
+    BONE_OFF from its median over the frames.
 
-    Another tracker's skeleton loses joints, too: in lunges Kinect's hidden ankle lies in the knee. No estimate is asked.
+    The skeleton of another tracker has lost joints, too: in lunges Kinect puts a hidden ankle into the knee. The estimate is not
+    used.
     """
     column = {name: index for index, name in enumerate(JOINTS)}
     judged = reference.copy()
@@ -150,7 +151,7 @@ def angle_error(estimated: FloatArray, reference: FloatArray) -> tuple[float, fl
 
 
 def shifted(reference: FloatArray, lag: int) -> FloatArray:
-    """The reference (F, ...) as an estimate that is `lag` frames late is compared with it; NaN where it has no frame."""
+    """The reference (F, ...) shifted for an estimate that is `lag` frames late; NaN outside."""
     moved = np.full(reference.shape, np.nan)
     source = np.arange(len(reference)) - lag
     inside = (source >= 0) & (source < len(reference))
@@ -158,13 +159,13 @@ def shifted(reference: FloatArray, lag: int) -> FloatArray:
     return moved
 
 
-def best_lag(estimated: FloatArray, reference: FloatArray, *, max_lag: int = MAX_LAG) -> int:
-    """The constant lag [frames] in [-max_lag, max_lag] with the least mean joint error.
+def best_lag(estimated: FloatArray, reference: FloatArray) -> int:
+    """The constant lag [frames] in [-MAX_LAG, MAX_LAG] with the least mean joint error.
 
-    All lags are judged on the same frames, those that have a partner at every lag; a recording too short for that is
-    judged at the largest range that leaves half of it. Ties go to the smaller lag in size, then to the positive one.
+    All lags are compared on the same frames, those with a counterpart at every lag; for a short recording the range is reduced
+    so that half of the frames remain. Of equal errors the smaller absolute lag is taken, then the positive one.
     """
-    reach = min(max_lag, len(estimated) // 4)
+    reach = min(MAX_LAG, len(estimated) // 4)
     inner = slice(reach, len(estimated) - reach)
     errors = {
         lag: mean_or_nan(joint_errors(estimated, reference, lag=lag)[inner])
@@ -174,13 +175,11 @@ def best_lag(estimated: FloatArray, reference: FloatArray, *, max_lag: int = MAX
     return min(known, key=known.__getitem__) if known else 0
 
 
-def lost_frames(
-    far: BoolArray, known: BoolArray, stamps: FloatArray, *, longer_than: float = LOST_AFTER_S
-) -> BoolArray:
-    """Frames (F,) in which one joint counts as lost: runs of `far` that last longer than `longer_than` seconds.
+def lost_frames(far: BoolArray, known: BoolArray, stamps: FloatArray) -> BoolArray:
+    """Frames (F,) in which one joint counts as lost: runs of `far` that last longer than LOST_AFTER_S.
 
     A run lasts from its first to its last frame plus one frame period (the median of the stamps' differences), so ten
-    frames of a 30 Hz recording last 1/3 s. Frames where the reference is not known neither end nor lengthen a run.
+    frames of a 30 Hz recording last 1/3 s. Frames without a reference neither end nor lengthen a run.
     """
     lost = np.zeros(len(far), dtype=bool)
     observed = np.flatnonzero(known)
@@ -191,33 +190,30 @@ def lost_frames(
     edges = np.flatnonzero(flags[1:] != flags[:-1])
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         run = observed[first:end]
-        if stamps[run[-1]] - stamps[run[0]] + period > longer_than + _STAMP_TOLERANCE_S:
+        if stamps[run[-1]] - stamps[run[0]] + period > LOST_AFTER_S + _STAMP_TOLERANCE_S:
             lost[run] = True
     return lost
 
 
-def tracking_class(
-    errors: FloatArray, stamps: FloatArray, *, limit: float, longer_than: float = LOST_AFTER_S
-) -> tuple[int | None, BoolArray]:
-    """The class of a sequence in K06 Table I, made automatic.
+def tracking_class(errors: FloatArray, stamps: FloatArray, *, limit: float) -> tuple[int | None, BoolArray]:
+    """The class of a sequence as in K06 Table I, computed automatically.
 
-    A joint is lost while it is farther than `limit` from the reference for longer than `longer_than` seconds.
+    A joint is lost while it is farther than `limit` from the reference for longer than LOST_AFTER_S.
 
     Args:
         errors: (F, J) distances; NaN where the reference is missing.
         stamps: (F,) [s].
         limit: [m].
-        longer_than: [s].
 
     Returns:
-        2 when no joint was ever lost, 1 when some were but none is in the last frame it is known in, 0 when some
-        joint is still lost there, None when nothing is known; and which joints were lost when, (F, J).
+        2 if no joint was lost, 1 if some were but none in its last known frame, 0 if a joint is lost in its last known
+        frame, None if nothing is known; and a mask (F, J) of lost joints.
     """
     known = np.isfinite(errors)
     lost = np.zeros(errors.shape, dtype=bool)
     at_end = False
     for joint in range(errors.shape[1]):
-        lost[:, joint] = lost_frames(errors[:, joint] > limit, known[:, joint], stamps, longer_than=longer_than)
+        lost[:, joint] = lost_frames(errors[:, joint] > limit, known[:, joint], stamps)
         observed = np.flatnonzero(known[:, joint])
         at_end |= len(observed) > 0 and bool(lost[observed[-1], joint])
     if not known.any():
@@ -226,36 +222,34 @@ def tracking_class(
 
 
 def jitter(positions: FloatArray) -> float:
-    """Mean norm [m] of the second difference of joint positions (F, J, 3) from frame to frame; NaN under three frames.
+    """Mean norm [m] of the second difference of joint positions (F, J, 3) over time; NaN for fewer than three frames.
 
-    A body that stands still or moves uniformly has none; real acceleration counts too, so compare it with the
-    reference's own.
+    It is zero for a body that stands still or moves uniformly. Since it includes real acceleration, compare it with that of
+    the reference.
     """
     if len(positions) < 3:
         return float("nan")
     return mean_or_nan(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2))
 
 
-def standing_still(
-    reference: FloatArray, stamps: FloatArray, *, within: float = STILL_M, around: float = STILL_S
-) -> BoolArray:
+def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
     """Where each joint of the reference (F, J, 3) stands still, (F, J).
 
-    It does in a frame when it is known and within `within` [m] of its place there in all frames from `around` [s] before to
-    `around` after. A reference's own noise is less than that; a motion slower than 0.1 m/s is not told from standing. The
-    first and last frames, which lack neighbors, do not count.
+    It does in a frame in which it is known, if it stays within STILL_M of its position there from STILL_S before to STILL_S
+    after. The noise of a reference is less than that; a motion slower than 0.1 m/s counts as standing. The first and last
+    frames, which lack neighbors, do not count.
     """
     frames = len(reference)
     still = np.zeros(reference.shape[:2], dtype=bool)
     period = float(np.median(np.diff(stamps))) if frames > 1 else 0.0
-    reach = max(round(around / period), 1) if period > 0.0 else frames
+    reach = max(round(STILL_S / period), 1) if period > 0.0 else frames
     if frames <= 2 * reach:
         return still
     middle = reference[reach : frames - reach]
     quiet = np.isfinite(middle).all(axis=2)
     for shift in range(-reach, reach + 1):
         away = np.linalg.norm(reference[reach + shift : frames - reach + shift] - middle, axis=2)
-        quiet &= away <= within
+        quiet &= away <= STILL_M
     still[reach : frames - reach] = quiet
     return still
 
@@ -266,10 +260,10 @@ def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) ->
     Args:
         positions: of the estimate, or of the reference itself.
         still: (F, J), see standing_still.
-        lag: frame i is judged by frame i - lag of `still`: positive when the estimate is late.
+        lag: frame i is compared with frame i - lag of `still`: positive if the estimate is late.
 
     Returns:
-        NaN when no joint ever stands still.
+        NaN if no joint stands still.
     """
     if len(positions) < 3:
         return float("nan")
@@ -283,12 +277,12 @@ def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) ->
 
 
 def fraction_within(distances: FloatArray, limit: float) -> float:
-    """Share of the known distances that are at most `limit`; NaN when none is known."""
+    """Fraction of the known distances that are at most `limit`; NaN if none is known."""
     known = distances[np.isfinite(distances)]
     return float(np.mean(known <= limit)) if known.size else float("nan")
 
 
 def mean_or_nan(values: FloatArray) -> float:
-    """Mean of the known values; NaN when none is known."""
+    """Mean of the known values; NaN if none is known."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")

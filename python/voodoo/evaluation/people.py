@@ -1,7 +1,7 @@
-"""Measures of a result of several people against the truth: CLEAR MOT, identities, false bodies, and joints.
+"""Evaluates a result of several persons against the ground truth: CLEAR MOT, identities, false bodies, and joints.
 
-A match is a root (humanoid_root) within MATCH_M of a person's; only persons with IN_VIEW of their pixels in view are expected.
-Persons who are less in view may be tracked or not: neither counts. MOTA, IDF1 and switches of identity are those of py-motmetrics
+A match is a root (humanoid_root) within MATCH_M of that of a person. Persons with at least the fraction IN_VIEW of their pixels
+in view are expected; others may be tracked or not without effect. MOTA, IDF1 and switches of identity are those of py-motmetrics
 (Bernardin and Stiefelhagen 2008; Ristani et al. 2016).
 """
 
@@ -24,15 +24,15 @@ from voodoo.export.people_rows import PeopleRows
 from voodoo.recordings.people_truth import PeopleTruth
 
 MATCH_M = 0.5
-"""A root is a person's within this [m]."""
+"""Largest distance of matching roots [m]."""
 IN_VIEW = 0.3
-"""Persons are expected from this share of their pixels on."""
+"""Persons with at least this fraction of their pixels in view are expected."""
 JOINTS_IN_VIEW = 0.8
-"""Joints count from this share on; who was so much in view has come."""
+"""Joints are evaluated from this fraction on; a person who reaches it has arrived."""
 ABSENT_S = 2.0
-"""Who was not in view at all for longer than this [s] has left."""
+"""A person who was not in view for longer than this [s] has left."""
 SAME_TIME_S = 0.01
-"""Stamps of truth and result that differ by less [s] are one frame."""
+"""Largest difference of the stamps of truth and result in one frame [s]."""
 ROOT = "humanoid_root"
 _NEVER = 1e6
 _LAST = 10.0
@@ -40,27 +40,27 @@ _LAST = 10.0
 
 @dataclass(frozen=True)
 class PeopleScore:
-    """How the people of one recording, or of several together, were followed; meters, seconds, NaN where not known.
+    """Evaluation of the persons of one or several recordings; meters, seconds, NaN if unknown.
 
     Args:
         name, path: of the recording.
-        failure: why it could not be tracked or judged; "" when it was.
+        failure: why it could not be tracked or evaluated; "" if it was.
         seconds: duration.
-        persons: how many the truth has.
-        ids: how many the result has.
-        expected: persons in frames, of those with enough in view.
-        missed, extra: of these without a match, and rows of the result that match nobody.
-        switches: of identity: a person is matched with another id than before, however long ago.
-        id_true, id_false, id_missed: rows that belong together, rows too many and too few, see `idf1`.
-        returns, returned: persons who came back after they had left, and how often with the id they had.
-        visits, visits_matched: persons who came, and how many of these visits were ever matched.
+        persons: number in the truth.
+        ids: number in the result.
+        expected: number of pairs of a person and a frame with enough pixels in view.
+        missed, extra: number of these without a match, and of rows of the result without a match.
+        switches: identity switches: a person is matched with another id than at the last match.
+        id_true, id_false, id_missed: IDTP, IDFP and IDFN, see `idf1`.
+        returns, returned: number of returns after leaving, and of those with the same id.
+        visits, visits_matched: number of arrivals, and of those with a match.
         first_pose_s: time from JOINTS_IN_VIEW of a person to the first match, mean over the visits that had one.
         worst_first_pose_s: the longest of them.
-        false_bodies: stretches of an id that match nobody and do not follow on a match of this id.
-        left_behind: those that do: a body that stays, or drifts, where its person is not.
+        false_bodies: intervals of an id without a match that do not follow a match of this id.
+        left_behind: those that follow a match: a body that stays or drifts away from its person.
         joint_error_m: mean over `joints` distances of metrics.JOINTS.
-        joints: how many.
-        step_s: mean time of a frame; NaN of a result that was read.
+        joints: number of distances.
+        step_s: mean time of a frame; NaN for a result from a file.
     """
 
     name: str
@@ -90,18 +90,18 @@ class PeopleScore:
 
     @property
     def mota(self) -> float:
-        """1 - (missed + extra + switches) / expected; NaN without anybody."""
+        """1 - (missed + extra + switches) / expected; NaN if no person is expected."""
         return 1.0 - (self.missed + self.extra + self.switches) / self.expected if self.expected else float("nan")
 
     @property
     def idf1(self) -> float:
-        """2 IDTP / (2 IDTP + IDFP + IDFN) under the best pairing of persons and ids; NaN without anybody."""
+        """2 IDTP / (2 IDTP + IDFP + IDFN) for the best assignment of ids to persons; NaN without persons."""
         total = 2.0 * self.id_true + self.id_false + self.id_missed
         return 2.0 * self.id_true / total if total else float("nan")
 
     @property
     def false_a_minute(self) -> float:
-        """False bodies a minute."""
+        """False bodies per minute."""
         return 60.0 * self.false_bodies / self.seconds if self.seconds else float("nan")
 
 
@@ -111,10 +111,9 @@ class Matches:
 
     Args:
         stamps: (F,) [s].
-        ids: I ids of the result, rising.
+        ids: I ids of the result, increasing.
         of_person: (F, P) index of the id matched with a person, -1 without.
-        of_id: (F, I) index of the person, -1 where the id matches nobody, -2 where it has no pose, -3 where it is at somebody who
-            is not expected.
+        of_id: (F, I) index of the person, -1 without a match, -2 without a pose, -3 at a person who is not expected.
         counts: of py-motmetrics.
     """
 
@@ -132,17 +131,17 @@ NOBODY, NO_POSE, ASIDE = -1, -2, -3
 def score(
     name: str, path: Path, truth: PeopleTruth, rows: PeopleRows, *, seconds: float | None = None, step_s: float = np.nan
 ) -> PeopleScore:
-    """Measure a result.
+    """Evaluate a result.
 
     Args:
         name, path: of the recording.
         truth: in the result's root frame.
         rows: the result.
-        seconds: how long the recording is; None: from the first to the last stamp of truth and result.
+        seconds: duration of the recording; None: from the first to the last stamp of truth and result.
         step_s: mean time of a frame.
 
     Raises:
-        VoodooError: no stamp of the result is one of the truth's, or py-motmetrics is not installed.
+        VoodooError: no stamp of the result is in the truth, or py-motmetrics is not installed.
     """
     frames = _frames(truth, rows)
     found = match(truth, rows, frames)
@@ -195,7 +194,7 @@ def _frames(truth: PeopleTruth, rows: PeopleRows) -> _Frames:
             f"result: expected stamps of the truth, {truth.stamps[0]:.6f} to {truth.stamps[-1]:.6f} s, found "
             f"{own[0]:.6f} to {own[-1]:.6f} s and none in common"
         )
-    # Frames of the result without anybody in the scene are frames, too.
+    # Stamps of the result without persons in the truth are frames, too.
     stamps = np.concatenate([truth.stamps, own[~same]])
     of_truth = np.concatenate([np.arange(len(truth.stamps)), np.full(int((~same).sum()), -1)])
     frame_of = np.full(len(own), -1)
@@ -249,7 +248,7 @@ def _at_others(away: FloatArray, expected: npt.NDArray[np.bool_]) -> npt.NDArray
 
 
 def _visits(truth: PeopleTruth, found: Matches) -> tuple[list[float], int, int, int]:
-    """Times [s] to the first match of the visits that have one; how many visits and returns, and returns with the same id."""
+    """Times [s] to the first match of visits with one; numbers of visits, returns, and returns with the same id."""
     place = np.searchsorted(found.stamps, truth.stamps)
     waits: list[float] = []
     visits = returns = returned = 0
@@ -275,7 +274,7 @@ def _visits(truth: PeopleTruth, found: Matches) -> tuple[list[float], int, int, 
 
 
 def _false_bodies(found: Matches) -> tuple[int, int]:
-    """Stretches of ids that match nobody: those that begin so, and those that follow on a match."""
+    """Numbers of intervals of ids without a match: those that begin so, and those that follow a match."""
     appeared = left = 0
     for column in range(len(found.ids)):
         before = NO_POSE
@@ -302,10 +301,10 @@ def _joint_errors(truth: PeopleTruth, rows: PeopleRows, frames: _Frames, found: 
 
 
 def motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
-    """The library, which is optional.
+    """py-motmetrics, which is optional.
 
     Raises:
-        VoodooError: it is not installed; says how.
+        VoodooError: it is not installed; says how to install it.
     """
     try:
         import motmetrics as library
@@ -315,7 +314,7 @@ def motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
 
 
 def together(scores: Sequence[PeopleScore]) -> PeopleScore:
-    """Those that did not fail as one: counts added up, means weighted by what they are means of."""
+    """Combines the scores without failure: sums of counts, and means weighted by their counts."""
     good = [one for one in scores if not one.failure]
     added = ["seconds", "persons", "ids", "expected", "missed", "extra", "switches", "id_true", "id_false", "id_missed"]
     added += ["returns", "returned", "visits", "visits_matched", "false_bodies", "left_behind", "joints"]

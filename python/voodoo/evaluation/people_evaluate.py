@@ -1,4 +1,4 @@
-"""Judging several people: the result of a recording, by whatever program."""
+"""Evaluates results of several persons, of voodoo or other programs."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from voodoo.sensors.settings import FrontEndSettings
 
 
 def has_people(path: Path) -> bool:
-    """Whether a recording comes with the truth of several people, without opening it."""
+    """Whether a recording has the ground truth of several persons, without opening it."""
     return find_beside(path, PEOPLE_TRUTH_FILE) is not None
 
 
 def evaluate_result(
     path: Path, result: Path, *, loader: str | None = None, root_frame: str | None = None
 ) -> PeopleScore:
-    """Judge a result file of several people, see voodoo.export.people_rows.
+    """Evaluate a result file of several persons, see voodoo.export.people_rows.
 
     Args:
         path: of the recording, with truth_people.csv beside it.
@@ -41,7 +41,7 @@ def evaluate_result(
         root_frame: of the result; None: the recording's own.
 
     Raises:
-        VoodooError: one of them cannot be read, or they do not belong together.
+        VoodooError: one of them cannot be read, or their stamps do not match.
     """
     options: dict[str, Any] = {} if root_frame is None else {"root_frame": root_frame}
     recording = open_recording(path, loader=loader, **options)
@@ -66,14 +66,14 @@ def evaluate_people(
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
 ) -> PeopleScore:
-    """Track everybody in a recording, without a start, and judge the result.
+    """Track all persons in a recording, without a start, and evaluate the result.
 
     Args:
         path: of the recording, with truth_people.csv beside it.
         config: None means the defaults.
         loader: see open_recording.
-        model: which human; None: that of `voodoo.People`.
-        use: from which of its inputs; None: all.
+        model: model of the human; None: that of `voodoo.People`.
+        use: kinds of inputs; None: all.
 
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
@@ -84,10 +84,10 @@ def evaluate_people(
 
 
 def judge(recording: Recording, people: People, *, settings: FrontEndSettings | None = None) -> PeopleScore:
-    """Track everybody in a recording, and judge the result.
+    """Track all persons in a recording and evaluate the result.
 
     Raises:
-        VoodooError: the recording has no truth of several people, or a frame was refused.
+        VoodooError: the recording has no ground truth of several persons, or a frame was rejected.
     """
     truth = truth_of(recording)
     motmetrics()  # a missing library must be reported before the work
@@ -116,7 +116,7 @@ def evaluate_all_people(
 
 
 def truth_of(recording: Recording) -> PeopleTruth:
-    """The truth of several people.
+    """The ground truth of several persons.
 
     Raises:
         RecordingError: it has none.

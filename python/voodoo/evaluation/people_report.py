@@ -1,4 +1,4 @@
-"""The table of an evaluation of several people, as Markdown and as .csv."""
+"""Writes the evaluation of several persons as Markdown and .csv."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _DERIVED = ("mota", "idf1", "false_a_minute")
 
 
 def people_markdown(scores: Sequence[PeopleScore]) -> str:
-    """A row for each recording and one for all of them together."""
+    """A table with a row per recording, and one for all together."""
     lines = ["## Several people, against exact truth\n", _row(_HEADER), "|" + "---|" * len(_HEADER)]
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
@@ -45,7 +45,7 @@ def people_markdown(scores: Sequence[PeopleScore]) -> str:
 
 
 def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
-    """Write people.csv (a row a recording) and people.md; returns both.
+    """Write people.csv (a row per recording) and people.md; returns both paths.
 
     Raises:
         OSError: a file cannot be written.

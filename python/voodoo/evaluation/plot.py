@@ -1,4 +1,4 @@
-"""A picture of the errors of all sequences."""
+"""Plots the errors of all sequences."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _CLASS_COLORS = ("#c8553d", "#e8b04b", "#4c8c6b")
 
 
 def plot_errors(path: Path, scores: Sequence[Score]) -> None:
-    """Error over the sequences, colored by class, beside how many are in each class."""
+    """Plot the error of each sequence, colored by class, and the number of sequences in each class."""
     figure = new_figure(11.0, 4.2)
     done = [score for score in scores if np.isfinite(score.error_m) and score.tracking_class is not None]
     left, right = figure.subplots(1, 2, width_ratios=(4, 1))

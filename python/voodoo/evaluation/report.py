@@ -1,4 +1,4 @@
-"""Tables and a picture of an evaluation: what was measured, sequence by sequence and over all of them."""
+"""Tables and figures of an evaluation, for each sequence and over all of them."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
 
 
 def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) -> str:
-    """The table over all sequences, the joints, and a line for each sequence, as Markdown; of `tables` (one a score) also how
-    errors compare with their standard deviations."""
+    """Tables over all sequences, over joints, and with a row per sequence, as Markdown; with `tables` (one per score) also a
+    comparison of errors with their standard deviations."""
     text = []
     deviations = deviations_of(scores, tables)
     for summary in summarize(scores):
@@ -99,7 +99,7 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
 
 
 def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> dict[str, list[Deviations]]:
-    """Errors and what was said of them, by what they were measured with."""
+    """Errors and standard deviations, grouped by kind of reference."""
     found: dict[str, list[Deviations]] = {}
     for score, table in zip(scores, tables, strict=False):
         if table is not None and table.deviations is not None:
@@ -110,7 +110,7 @@ def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) 
 def write_reports(
     folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None], *, picture: bool = True
 ) -> list[Path]:
-    """Write sequences.csv, summary.csv, summary.md, with `picture` errors.png and calibration.png (the latter where joints were
+    """Write sequences.csv, summary.csv, summary.md, with `picture` errors.png and calibration.png (the latter if joints were
     compared with a reference), and frames/NAME.csv; returns all but the last.
 
     Raises:

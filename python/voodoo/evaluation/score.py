@@ -13,45 +13,45 @@ from voodoo.evaluation.depth_agreement import Selection
 from voodoo.evaluation.metrics import FloatArray
 
 LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
-"""How far a joint may be from exact truth, and from another tracker's skeleton, before it counts as lost [m]."""
+"""Distances from exact truth, and from another tracker's skeleton, beyond which a joint is lost [m]."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """How one recording was tracked; meters, seconds and shares in [0, 1], NaN where it cannot be known.
+    """Evaluation of one recording; meters, seconds and fractions in [0, 1], NaN if unknown.
 
     Args:
         name: of the recording.
         path: of the recording.
-        failure: why it could not be tracked to its end; "" when it was. Then all numbers are NaN.
-        frames: how many were tracked.
+        failure: why it could not be tracked to its end, with all numbers NaN; "" if it was.
+        frames: number of tracked frames.
         exact: compared with exact truth (else with another tracker's skeleton), None without any reference.
         error_m: mean error of the twelve joints: at lag 0 against exact truth, at the best lag against a reference.
         error_lag0_m, error_best_lag_m: both.
         best_lag: constant lag [frames] with the least error; positive: the estimate is late.
-        error_without_offsets_m: the same error, each joint's constant offset removed, see metrics.without_offsets.
+        error_without_offsets_m: the same error without each joint's constant offset, see metrics.without_offsets.
         first_pose_s: time from the first frame with a reference to the first with a pose.
         first_pose_error_m: mean error in that frame, at lag 0.
-        within_5cm, within_10cm: share of joint errors, at the same lag as `error_m`.
+        within_5cm, within_10cm: fraction of joint errors, at the same lag as `error_m`.
         joint_error_m: mean error of each of the twelve joints, at the same lag.
         class_without_offsets, lost_without_offsets: the class, and whether a joint is lost at the end (0 or 1), of that error.
         tracking_class: 2, 1 or 0 as in K06 Table I, see metrics.tracking_class, at the same lag.
         lost_joints: the joints that were ever lost.
-        selection: how the person's depth points were found, see witness.
+        selection: how the person's depth points were selected, see witness.
         depth_within_5cm, depth_median_m, depth_p95_m: of their distances to the model.
-        person_within_5cm: share within 5 cm of the points about the joints of truth or reference, see FrameWitness.
+        person_within_5cm: fraction within 5 cm of the points near the joints of truth or reference, see FrameWitness.
         silhouette_iou: mean over the frames.
         jitter_m, reference_jitter_m: mean norm of the second difference of the twelve joints, over all frames.
         standing_jitter_m, reference_standing_jitter_m: the same over the joints and frames in which the reference stands
             still, see metrics.standing_still.
-        degraded_share, lost_share, searching_share: frames in which the tracker itself said so. A searching frame has no
-            errors; in the class it counts as lost where the reference knows the person.
-        lost_recall, false_alarm_rate: of the elbows, wrists, knees and ankles farther than 10 cm from the truth the share whose
-            limb was not called measured; and of the nearer ones.
-        far_ends, near_ends: how many such joints there were, over all frames.
+        degraded_share, lost_share, searching_share: fractions of frames with this status. A searching frame has no errors;
+            in the class it counts as lost if the reference has the person.
+        lost_recall, false_alarm_rate: of the elbows, wrists, knees and ankles farther than 10 cm from the truth the fraction
+            whose limb does not have the status "measured"; and of the nearer ones.
+        far_ends, near_ends: numbers of such joints, over all frames.
         step_s: mean time of a frame from measurements to estimate.
         angle_error_deg, angle_spread_deg: of eight joint angles at the same lag, see metrics.angle_error [deg].
-        left_out_share: joints of a reference skeleton that nothing is compared with, see metrics.without_contradictions.
+        left_out_share: fraction of the joints of a reference skeleton that are not used, see metrics.without_contradictions.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Score:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrameTable:
-    """The same, frame by frame.
+    """Evaluation of each frame.
 
     Args:
         stamps: (F,) [s].
@@ -106,7 +106,7 @@ class FrameTable:
         errors: (F, 12) of metrics.JOINTS [m] at the lag of the score.
         lost: (F, 12).
         depth_within_5cm, silhouette_iou, step_s: (F,).
-        deviations: errors by coordinate and what was said of them; None where there is no reference.
+        deviations: errors by coordinate and their standard deviations; None without a reference.
     """
 
     stamps: FloatArray

@@ -1,4 +1,4 @@
-"""Finding recordings to evaluate."""
+"""Finds recordings to evaluate."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3", ".zip")
 
 
 def find_recordings(paths: Sequence[Path], *, only: Sequence[str] = ()) -> list[Path]:
-    """Recordings at `paths`, in that order; folders that are none are searched, their content in natural order.
+    """Recordings at `paths`, in that order; other folders are searched, in natural order of their contents.
 
     Args:
-        paths: recordings, or folders that hold some, e.g. that of UTD-MHAD or of the rendered recordings.
-        only: patterns like "a0?_s1_*" or "*_cmu"; a recording is kept when its file or folder name fits one.
+        paths: recordings, or folders of recordings, e.g. that of UTD-MHAD or of the rendered recordings.
+        only: patterns like "a0?_s1_*" or "*_cmu"; a recording is kept if its file or folder name matches one.
 
     Raises:
-        RecordingError: nothing there, or nothing left.
+        RecordingError: a path does not exist, or no recording is left.
     """
     found: list[Path] = []
     for path in paths:

@@ -16,15 +16,15 @@ CLASSES = (0, 1, 2)
 
 @dataclass(frozen=True)
 class Summary:
-    """Means over sequences of one kind, every sequence counting the same; meters and shares, NaN where unknown.
+    """Means over sequences of one kind, with equal weights; meters and fractions, NaN if unknown.
 
     Args:
         kind: "exact truth", "reference skeleton" or "no reference".
-        sequences: how many were tracked to their end.
-        failures: how many were not.
-        classes: how many in class 0, 1 and 2 of K06 Table I.
+        sequences: number tracked to their end.
+        failures: number of the others.
+        classes: numbers in class 0, 1 and 2 of K06 Table I.
         lags: (lag [frames], sequences) for each best lag that occurs.
-        means: by the name of the Score field; with "_together" behind it, over the limbs of all sequences.
+        means: by the name of the Score field; with the suffix "_together" over the limbs of all sequences.
     """
 
     kind: str
@@ -36,7 +36,7 @@ class Summary:
 
     @property
     def class_average(self) -> float:
-        """Mean class; NaN when no sequence has one."""
+        """Mean class; NaN if no sequence has one."""
         count = sum(self.classes)
         return (
             sum(value * number for value, number in zip(CLASSES, self.classes, strict=True)) / count
@@ -56,15 +56,14 @@ MEANS = (
 
 
 TOGETHER = {"lost_recall": "far_ends", "false_alarm_rate": "near_ends"}
-"""Shares that are also taken of all sequences together, because some have few such limbs, and what they are shares of."""
+"""Fractions that are also computed over all sequences together, because some have few such limbs, and their totals."""
 
 
 SUMMARY = (*MEANS, *(f"{name}_together" for name in TOGETHER))
 
 
 def summarize(scores: Sequence[Score]) -> list[Summary]:
-    """One summary for each kind of comparison that occurs; failures are counted with the kind "no reference" unless
-    something was known about them."""
+    """One summary for each kind of comparison; failures have the kind "no reference", unless their kind is known."""
     kinds = {True: "exact truth", False: "reference skeleton", None: "no reference"}
     summaries = []
     for exact, kind in kinds.items():
@@ -91,7 +90,7 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
 
 
 def _together(scores: Sequence[Score], name: str, count: str) -> float:
-    """Share over all sequences, each counted by how many there are of what it is a share of; NaN when there are none."""
+    """Fraction over all sequences, weighted by their totals; NaN if these are zero."""
     counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
     total = sum(number for _, number in counts)
     return sum(fraction * number for fraction, number in counts) / total if total else math.nan

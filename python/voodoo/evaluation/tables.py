@@ -1,4 +1,4 @@
-"""The tables of an evaluation as CSV files."""
+"""Writes the tables of an evaluation as CSV files."""
 
 from __future__ import annotations
 

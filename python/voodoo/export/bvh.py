@@ -22,21 +22,20 @@ _MOVES_M = 1e-4
 def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.0) -> None:
     """Write a track as BVH.
 
-    Axes are X left, Y up, Z forward at rest; with zero rotations the body stands at rest. Rotations are in the order
-    Z, X, Y in degrees. Joints are where the track has them: one whose place on its parent changes by more than 0.1 mm
-    (lengths are refined while tracking) has channels for its position, too, which stand for its OFFSET; that is the
-    median then. End sites are those of `body`. The format has one constant frame time, the median of the track's, and no
-    gaps: a searching frame repeats the pose before it, those before the first pose show that one, and a track of nobody
-    the body at rest.
+    At rest, axes are X left, Y up, Z forward; with zero rotations the body stands at rest. Rotations are in the order Z, X, Y
+    in degrees. Joints have the positions of the track: a joint whose position on its parent changes by more than 0.1 mm
+    (lengths are refined while tracking) has position channels, which replace its OFFSET, the median. End sites are those of
+    `body`. The format has a constant frame time, the median of the track, and no gaps: a searching frame repeats the previous
+    pose, frames before the first pose have the first one, and a track without a pose has the body at rest.
 
     Args:
         path: .bvh file.
         track: with limb poses, in a frame whose z points up.
-        body: in the sizes it was tracked with (`Tracker.body`).
+        body: with the sizes it was tracked with (`Tracker.body`).
         scale: BVH units per meter; animation programs expect centimeters.
 
     Raises:
-        VoodooError: the track has no limb poses, is of another body, or its stamps do not rise.
+        VoodooError: the track has no limb poses, is of another body, or its stamps do not increase.
         OSError: the file cannot be written.
     """
     posed = held(skeleton(track, body), track.found)
@@ -44,7 +43,7 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     lines = ["HIERARCHY"]
     order: list[int] = []
     offsets = posed.offsets()
-    # Of what is known of the offsets only found frames count; where there are none the body stands at rest.
+    # Only frames with a pose determine the offsets; without any the body is at rest.
     known = offsets[track.found] if track.found.any() else offsets
     still = np.median(known, axis=0)
     moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
@@ -73,7 +72,7 @@ def _describe(
 ) -> None:
     """Append the joint of a bone and, depth first, those of its children; `order` is that of the channels.
 
-    `sizes`: BVH units per meter, offset (L, 3) of every joint, and which of them (L,) move.
+    `sizes`: BVH units per meter, offset (L, 3) of every joint, and which of them (L,) have position channels.
     """
     bone, (scale, offsets, moving) = parts[index], sizes
     order.append(index)
@@ -101,7 +100,7 @@ def _describe(
 
 
 def _word(name: str) -> str:
-    """A name in ASCII and without spaces, at which readers cut."""
+    """The name in ASCII without spaces, which end names in readers."""
     return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in name).replace(" ", "_")
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from voodoo.errors import VoodooError
@@ -50,6 +51,23 @@ def is_folder(path: Path) -> bool:
     return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
 
 
+def is_bag(path: Path) -> bool:
+    """Whether a name is that of a bag: an .mcap file or a folder."""
+    return path.suffix == ".mcap" or is_folder(path)
+
+
+@contextmanager
+def bag_folder(path: Path) -> Iterator[Path]:
+    """The folder to write a bag to: `path`, or for .mcap a temporary one, whose only file is moved to `path` at the end."""
+    if path.suffix != ".mcap":
+        yield path
+        return
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        bag = Path(folder) / path.stem
+        yield bag
+        shutil.move(next(bag.glob("*.mcap")), path)
+
+
 def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
     """Write a track: .csv, .npz, .bvh, .trc, .mcap, or a ROS 2 bag folder.
 
@@ -69,12 +87,8 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
         write_bvh(path, track, body)
     elif path.suffix == ".trc":
         write_trc(path, track)
-    elif path.suffix == ".mcap":
-        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            bag = Path(folder) / path.stem
-            write_bag(bag, track, body, root_frame=root_frame)
-            shutil.move(next(bag.glob("*.mcap")), path)
-    elif is_folder(path):
-        write_bag(path, track, body, root_frame=root_frame)
+    elif is_bag(path):
+        with bag_folder(path) as folder:
+            write_bag(folder, track, body, root_frame=root_frame)
     else:
         track.save(path)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from voodoo.export.bvh import write_bvh
-from voodoo.export.files import check_target, is_folder
+from voodoo.export.files import bag_folder, check_target, is_bag
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import write_people_bag
 from voodoo.export.trc import write_trc
@@ -44,15 +42,10 @@ def save_people(result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], 
                 write_trc(own, track)
             written.append(own)
         return written
-    if path.suffix == ".mcap" or is_folder(path):
+    if is_bag(path):
         people = {str(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
-        if path.suffix != ".mcap":
-            write_people_bag(path, people, root_frame=root_frame)
-            return [path]
-        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            bag = Path(folder) / path.stem
-            write_people_bag(bag, people, root_frame=root_frame)
-            shutil.move(next(bag.glob("*.mcap")), path)
-        return [path]
-    result.save(path)
+        with bag_folder(path) as folder:
+            write_people_bag(folder, people, root_frame=root_frame)
+    else:
+        result.save(path)
     return [path]

@@ -14,16 +14,16 @@ from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
 
 
 def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:
-    """Write the joints and sites of a track as markers, in meters; those of searching frames are empty cells.
+    """Write the joints and sites of a track as markers, in meters; searching frames have empty cells.
 
     Args:
         path: .trc file.
-        track: any.
-        names: which joints and sites; None means all.
-        y_up: turn from z up (REP-103) to OpenSim's Y up: (X, Y, Z) = (y, z, x); False keeps the axes.
+        track: the track.
+        names: joints and sites to write; None means all.
+        y_up: rotate from z up (REP-103) to OpenSim's Y up: (X, Y, Z) = (y, z, x); False keeps the axes.
 
     Raises:
-        VoodooError: a name that is not in the track, none at all, or stamps that do not rise.
+        VoodooError: a name that is not in the track, none at all, or stamps that do not increase.
         OSError: the file cannot be written.
     """
     chosen = list(track.joint_names if names is None else names)
@@ -46,7 +46,7 @@ def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = N
         "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in numbers),
         "",
     ]
-    # OpenSim starts its clock near zero; epoch seconds would lose their fraction in it.
+    # OpenSim starts its clock near zero; Unix times would lose their fraction in it.
     for index, (stamp, row) in enumerate(zip(track.stamps - track.stamps[0], positions, strict=True), start=1):
         lines.append(f"{index}\t{stamp:.6f}\t" + "\t".join(_cell(value) for value in np.ravel(row)))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

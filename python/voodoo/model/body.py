@@ -1,4 +1,4 @@
-"""The tracked body: a tree of limbs with elastic-band joints and named sites; a TOML file describes it."""
+"""The tracked body: a tree of limbs with elastic-band joints and named sites, described by a TOML file."""
 
 from __future__ import annotations
 
@@ -67,8 +67,7 @@ class Body:
         Args:
             height: stature [m], 0.3 to 3.0.
             model: "papers": ten limbs and nine joints (K06 III-C); "full": eighteen, with waist, neck, clavicles, hands and feet;
-                "measured": the same with joints and girths as the mean of 120 bodies has them, for people whose first pose
-                nobody tells.
+                "measured": the same with the mean joints and girths of 120 bodies, for persons without a given first pose.
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.
@@ -77,7 +76,7 @@ class Body:
         if not isinstance(model, str):
             raise BodyError(f"model: expected one of {', '.join(get_args(HumanModel))}, found {short(model)}")
         if model == "measured":
-            # Heights are checked where the other models are made.
+            # The core checks the stature of the other models.
             _core.Body.human(height, "full")
             return cls.load(_MEASURED).scaled(height / _MEASURED_M)
         return cls(_core.Body.human(height, model))
@@ -87,7 +86,7 @@ class Body:
         """A body from TOML text; the format is that of `to_toml`, explained in docs/how-to/describe-a-body.md.
 
         Raises:
-            BodyError: it names the key, what was expected and what was found.
+            BodyError: names the key, what was expected and what was found.
         """
         return cls(core_body(text, source=source))
 
@@ -96,7 +95,7 @@ class Body:
         """A body from a TOML file.
 
         Raises:
-            BodyError: it cannot be read, or as `from_toml`; it names the file.
+            BodyError: unreadable, or as `from_toml`; names the file.
         """
         return cls.from_toml(read_text(path, error=BodyError), source=str(path))
 
@@ -104,7 +103,7 @@ class Body:
         """The body with all lengths multiplied by a factor.
 
         Raises:
-            BodyError: no number, or one that leaves no body.
+            BodyError: not a number, or the result is not a valid body.
         """
         return Body(self._core.scaled(number_of("factor", factor)))
 
@@ -117,7 +116,7 @@ class Body:
         return type(self), (self._core,)
 
     def __eq__(self, other: object) -> bool:
-        """Equal when every limb, joint and site is."""
+        """Equal if all limbs, joints and sites are equal."""
         return isinstance(other, Body) and bool(self._core == other._core)
 
     __hash__ = None  # type: ignore[assignment]
@@ -133,7 +132,7 @@ def checked_joints(
     """Positions by name as plain numbers.
 
     Raises:
-        BodyError: no mapping, or an entry is not three finite numbers; it names the entry.
+        BodyError: not a mapping, or an entry is not three finite numbers; names the entry.
     """
     if not isinstance(joints, Mapping):
         raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
@@ -153,8 +152,8 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
     """Poses (4, 4) by name in the order of the body's limbs; the core checks that they are rigid.
 
     Raises:
-        BodyError: no mapping, or a limb is missing or unknown.
-        MeasurementError: a pose that is no array of numbers; it names the limb.
+        BodyError: not a mapping, or a limb is missing or unknown.
+        MeasurementError: a pose is not an array of numbers; names the limb.
     """
     if not isinstance(world_from_limb, Mapping):
         raise BodyError(

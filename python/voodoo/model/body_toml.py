@@ -1,4 +1,4 @@
-"""Bodies as TOML: checked when read, exact to 1e-9 m when written."""
+"""Reads and writes bodies as TOML, exact to 1e-9 m."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def core_body(text: str, *, source: str) -> _core.Body:
     """The body of a TOML text.
 
     Raises:
-        BodyError: it names the key, what was expected and what was found.
+        BodyError: names the key, what was expected and what was found.
     """
     values = parse_toml(text, source=source, error=BodyError)
     try:

@@ -18,7 +18,7 @@ from voodoo.model.joint import as_numbers, short
 CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "inverse_plumb_bob"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
 (and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle); and Brown-Conrady
-from distorted to undistorted coordinates, as RealSense's color cameras are calibrated."""
+from distorted to undistorted coordinates, the calibration of RealSense's color cameras."""
 
 _COEFFICIENTS: dict[str, tuple[int, ...]] = {
     "plumb_bob": (0, 4, 5),
@@ -33,7 +33,7 @@ _ALIASES = {
     "Inverse Brown Conrady": "inverse_plumb_bob", "Kannala Brandt4": "equidistant",
 }  # fmt: skip
 MOST_PIXELS = 2**25
-"""Maximum number of pixels: those of an 8K image. Larger sizes are typing errors; the core has the same limit."""
+"""Maximum number of pixels: those of an 8K image. Larger sizes are errors; the core has the same limit."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Camera:
         fx, fy: focal lengths [px].
         cx, cy: principal point [px].
         distortion: coefficients in OpenCV's order; () means none.
-        model: how `distortion` is meant, see CameraModel.
+        model: lens model of `distortion`, see CameraModel.
 
     Raises:
         CameraError: a number is out of range or the count of coefficients does not fit the model.
@@ -115,12 +115,12 @@ class Camera:
             k: 3x3 intrinsics, row by row: 9 numbers, or (3, 3).
             d: distortion coefficients.
             model: `distortion_model`; "" and "none" mean no distortion, "fisheye" means equidistant; librealsense's
-                names are known, too.
+                names are accepted, too.
             p: 3x4 projection matrix of the rectified image, row by row: 12 numbers, or (3, 4).
-            rectified: the image is a rectified one: use `p` (when it is set) and no distortion.
+            rectified: the image is rectified: use `p` (if it is set) and no distortion.
 
         Raises:
-            CameraError: no numbers, wrong counts, an uncalibrated camera (fx = 0), or an unknown model.
+            CameraError: not numbers, wrong counts, an uncalibrated camera (fx = 0), or an unknown model.
         """
         k = _numbers("camera k", k, count=9)
         if rectified and p is not None:
@@ -134,7 +134,7 @@ class Camera:
 
     @property
     def distorted(self) -> bool:
-        """True when pixels are not simply u = fx x/z + cx, v = fy y/z + cy."""
+        """Whether the projection differs from u = fx x/z + cx, v = fy y/z + cy."""
         return self.model == "equidistant" or bool(self.distortion)
 
     @property
@@ -150,7 +150,7 @@ class Camera:
 
         Returns:
             (N, 2) pixel coordinates (u, v), not clipped to the image; NaN for points at or behind z = 0, and beyond the
-            radius at which the lens's distortion stops growing: there, two directions would fall on one pixel.
+            radius at which the distortion function stops increasing, where two directions would have the same pixel.
 
         Raises:
             CameraError: the shape is not (N, 3).
@@ -168,14 +168,14 @@ class Camera:
 
         Returns:
             (height, width, 2) float32, read-only and cached; depth (along z) times (x, y, 1) is the point. NaN where
-            the lens puts no direction, as happens in the corners of strongly distorted images.
+            the lens model has no direction, as in the corners of strongly distorted images.
         """
         return _rays(self)
 
     def undistorted(self, pixels: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Normalized coordinates x/z, y/z (N, 2) of pixels (N, 2) at any subpixel position, lens distortion removed.
 
-        NaN where the lens puts no direction, see `rays`. The shape is not checked, see voodoo.sensors.pixels.normalized.
+        NaN where the lens model has no direction, see `rays`. The shape is not checked, see voodoo.sensors.pixels.normalized.
         """
         return self.core.undistorted(np.ascontiguousarray(pixels, dtype=np.float64))
 
@@ -187,7 +187,7 @@ class Camera:
 
 @lru_cache(maxsize=16)
 def _core_of(camera: Camera) -> _core.Camera:
-    """Equal cameras share one, and its rays."""
+    """Cached, so that equal cameras share it and its rays."""
     intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
     return _core.Camera(camera.width, camera.height, intrinsics, camera.model, camera.distortion)
 

@@ -1,4 +1,4 @@
-"""Joints of a body and where they are."""
+"""Joints of a body and their poses."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 class Strict(BaseModel):
-    """Frozen, and without entries that nobody knows."""
+    """Frozen, and without unknown entries."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class _Part(Strict):
-    """What callers make themselves: what is wrong with it is a BodyError."""
+    """Models constructed by callers, whose errors are BodyErrors."""
 
-    if not TYPE_CHECKING:  # to type checkers the fields are the arguments
+    if not TYPE_CHECKING:  # for type checkers, the fields are the arguments
 
         def __init__(self, **values: Any) -> None:  # noqa: ANN401 - checked here
             try:
@@ -33,7 +33,7 @@ class _Part(Strict):
             except ValidationError as error:
                 raise BodyError(f"{type(self).__name__}: {problems(values, error)}") from None
 
-        # Not called for a part of a larger whole, whose error names the key from the top.
+        # Not called for nested models, whose errors name the full key.
         __init__.__pydantic_base_init__ = True
 
 
@@ -59,10 +59,10 @@ class Joint(_Part):
             about that axis, both positive: elliptic.
         weight: strength relative to the other joints of a limb.
         limits: least and greatest value of each component of the joint's rotation vector [rad]; None: free.
-        motion: standard deviation of the joint's unexpected turn in 1/30 s [rad].
+        motion: standard deviation of the joint's unexpected rotation in 1/30 s [rad].
 
     Raises:
-        BodyError: an entry that is missing, unknown or no such number.
+        BodyError: an entry is missing, unknown or invalid.
     """
 
     name: str
@@ -74,13 +74,13 @@ class Joint(_Part):
     motion: Number = 0.3
 
     def parts(self) -> tuple[Any, ...]:
-        """The joint as the core takes it."""
+        """The joint in the format of the core."""
         places = [(place.position, place.rotation) for place in (self.on_parent, self.on_limb)]
         return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
 
 
 def problems(values: dict[str, Any], error: ValidationError) -> str:
-    """Errors of pydantic, each with its key; parts of lists with their names."""
+    """Errors of pydantic with their keys; items of lists with their names."""
 
     def key(location: tuple[str | int, ...]) -> str:
         parts: list[str] = []
@@ -102,10 +102,10 @@ def _child(node: object, part: str | int) -> object:
 
 
 def number_of(name: str, value: object, expected: str = "a number") -> float:
-    """A plain number that a caller gave.
+    """Check a number given by the caller.
 
     Raises:
-        BodyError: it is none; names the argument.
+        BodyError: it is not a number; names the argument.
     """
     try:
         if isinstance(value, str):
@@ -119,7 +119,7 @@ def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """An array of real numbers.
 
     Raises:
-        TypeError, ValueError, OverflowError: they are none; NumPy would take dates and cut complex numbers.
+        TypeError, ValueError, OverflowError: other values; NumPy would accept dates and truncate complex numbers.
     """
     found = np.asarray(values)
     if found.dtype.kind not in "biufO":
@@ -128,9 +128,9 @@ def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def short(value: object) -> str:
-    """A value as it is shown in a message."""
+    """A value as text for a message."""
     try:
         text = repr(value)
-    except Exception:  # what nests too deeply, or is no good object
+    except Exception:  # nested too deeply, or an object whose repr fails
         text = f"a {type(value).__name__} that cannot be shown"
     return text if len(text) < 80 else text[:77] + "..."

@@ -1,11 +1,11 @@
-"""Two standing legs: the body that a laser at the height of the shins can follow."""
+"""A body of two standing legs, which can be tracked with a laser at shin height."""
 
 from __future__ import annotations
 
 from voodoo.model.body import Body
 
 HIP, LEG, HALF_WIDTH = 0.530, 0.491, 0.052
-"""Height of the hips, length of a leg and half the distance of the hips, in statures: those of the default human."""
+"""Height of the hips, length of a leg and half the distance of the hips, as fractions of the stature of the default human."""
 _GIRTH = (0.075, 0.05)
 """Radii at hip and ankle [m], in trousers."""
 
@@ -35,13 +35,13 @@ position = [0.0, 0.0, {z}]
 
 
 def legs_body(height: float = 1.75) -> Body:
-    """Two legs on a pelvis, without knees: what a planar laser sees of a person.
+    """Two legs on a pelvis, without knees, as observed by a planar laser.
 
     Args:
         height: stature of the person [m].
 
     Raises:
-        BodyError: a stature that makes no body.
+        BodyError: the stature gives no valid body.
     """
     thick, thin = _GIRTH
     sides = (("l", HALF_WIDTH * height), ("r", -HALF_WIDTH * height))

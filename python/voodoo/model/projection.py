@@ -20,20 +20,20 @@ _NEAREST_M = 0.05
 
 
 class View(Protocol):
-    """Projects points of the root frame into a picture."""
+    """Projects points of the root frame into an image."""
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pixels (N, 2) of points (N, 3) [m], NaN where they cannot be seen, and their depths (N,) [m]."""
+        """Pixels (N, 2) of points (N, 3) [m], NaN for invisible points, and their depths (N,) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """What a camera sees.
+    """View of a camera.
 
     Args:
         camera: its calibration.
         root_from_sensor: (4, 4) pose of its optical frame.
-        scale: enlargement of the picture over the camera's image.
+        scale: scale factor of the image.
     """
 
     camera: Camera
@@ -45,17 +45,17 @@ class CameraView:
         sensor_from_root = np.linalg.inv(self.root_from_sensor)
         points = points_root @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
         points[points[:, 2] < _NEAREST_M] = np.nan
-        # Integer coordinates are pixel centers, so enlarging moves them by half a pixel as well.
+        # Integer coordinates are pixel centers, so scaling includes an offset of half a pixel.
         return (self.camera.project(points) + 0.5) * self.scale - 0.5, points[:, 2]
 
 
 @dataclass(frozen=True)
 class TopView:
-    """Straight from above, without perspective: forward is up in the picture, left is left.
+    """Orthographic view from above: forward is up in the image, left is left.
 
     Args:
-        center: (x, y, z) [m] of the root frame shown in the middle.
-        meters_per_pixel: of the picture.
+        center: (x, y, z) [m] of the root frame at the center of the image.
+        meters_per_pixel: scale of the image.
         size: width = height [px].
         axes: "rep103" for root frames with x forward, y left, z up; "optical" for x right, y down, z forward.
     """
@@ -78,24 +78,24 @@ def transform(a_from_b: FloatArray, points_b: FloatArray) -> FloatArray:
     return np.asarray(points_b @ a_from_b[:3, :3].T + a_from_b[:3, 3])
 
 
-def limb_rings(shape: TaperedEllipticCylinder, *, rings: int = 2, samples: int = 48) -> FloatArray:
-    """Cross-sections of a limb as (rings, samples, 3) points [m] in the limb frame, from proximal to distal end."""
+def limb_rings(shape: TaperedEllipticCylinder, *, samples: int = 48) -> FloatArray:
+    """Both end ellipses of a limb as (2, samples, 3) points [m] in the limb frame, the proximal one first."""
     angle = np.linspace(0.0, 2.0 * np.pi, samples, endpoint=False)
-    t = np.linspace(0.0, 1.0, rings)[:, None]
+    t = np.array([[0.0], [1.0]])
     a, b = shape.a0 + (shape.a1 - shape.a0) * t, shape.b0 + (shape.b1 - shape.b0) * t
-    return np.stack([a * np.cos(angle), b * np.sin(angle), np.broadcast_to(shape.length * t, (rings, samples))], axis=2)
+    return np.stack([a * np.cos(angle), b * np.sin(angle), np.broadcast_to(shape.length * t, (2, samples))], axis=2)
 
 
 def limb_silhouette(
     shape: TaperedEllipticCylinder, root_from_limb: FloatArray, view: View
 ) -> npt.NDArray[np.float32] | None:
-    """Outline of a limb in a view: (K, 2) pixels, convex.
+    """Silhouette of a limb in a view: (K, 2) pixels, convex.
 
-    The solid is a union of segments between its two end ellipses, so its outline is the hull of theirs (up to lens
-    distortion, and to the 0.1 mm by which a tapered side may be hollow).
+    The solid is a union of segments between its two end ellipses, so its silhouette is their convex hull (except for lens
+    distortion, and up to 0.1 mm by which a tapered side may be concave).
 
     Returns:
-        None when a part of the limb is behind the camera.
+        None if a part of the limb is behind the camera.
     """
     points = transform(root_from_limb, limb_rings(shape).reshape(-1, 3))
     pixels, _ = view.project(points)
@@ -106,7 +106,7 @@ def limb_silhouette(
 
 
 def body_mask(body: Body, estimate: Estimate, view: View, *, width: int, height: int) -> npt.NDArray[np.bool_]:
-    """Pixels (height, width) whose centers lie inside the outline of a limb."""
+    """Pixels (height, width) whose centers lie inside the silhouette of a limb."""
     mask = np.zeros((height, width), dtype=bool)
     for limb in body.limbs:
         contour = limb_silhouette(limb.shape, estimate.world_from_limb[limb.name], view)
@@ -118,7 +118,7 @@ def body_mask(body: Body, estimate: Estimate, view: View, *, width: int, height:
 def _fill(mask: npt.NDArray[np.bool_], contour: FloatArray) -> None:
     """Set the pixels whose centers lie in a convex polygon (K, 2).
 
-    Not cv2.fillConvexPoly: it also sets every pixel the border touches, half a pixel too many all around.
+    cv2.fillConvexPoly would also set all pixels that the border touches, which adds half a pixel on all sides.
     """
     height, width = mask.shape
     low = np.clip(np.ceil(contour.min(axis=0)), 0, (width, height)).astype(int)

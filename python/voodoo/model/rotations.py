@@ -10,16 +10,16 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 _NO_TURN = 1e-3
-"""Below this angle [rad] a series stands for what divides by it."""
+"""Below this angle [rad] a series is used instead of a division by it."""
 _LOCKED = 1e-7
-"""The middle angle is so near to where the first and third have one axis [rad]."""
+"""Tolerance for gimbal lock: distance of the middle angle from its singular value [rad]."""
 _SKEWED = 1e-12
-"""Products of rows may be so far from those of unit vectors at right angles."""
+"""Tolerance for the products of rows of a rotation matrix."""
 
 
 def quaternions(rotations: FloatArray) -> FloatArray:
-    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), by the greatest of four divisors (Markley, "Unit quaternion
-    from rotation matrix", JGCD 2008); a matrix that is only nearly one counts as the nearest one."""
+    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), by the largest of four divisors (Markley, "Unit quaternion
+    from rotation matrix", JGCD 2008); a matrix that is only approximately a rotation is replaced by the nearest rotation."""
     matrices = np.asarray(rotations, dtype=np.float64)
     skewed = np.any(
         np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)) > _SKEWED, axis=(-2, -1), keepdims=True
@@ -72,7 +72,7 @@ def _quaternion_of_turn(x: float, y: float, z: float) -> tuple[float, float, flo
 
 
 def _turn_of_quaternion(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
-    # Of the two quaternions of a rotation, the one with an angle of at most half a circle.
+    # Of the two quaternions of a rotation, the one with an angle of at most pi.
     if w < 0.0 or (w == 0.0 and (x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0))))):
         x, y, z, w = -x, -y, -z, -w
     angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
@@ -108,7 +108,7 @@ def euler_angles(rotations: FloatArray, order: str) -> FloatArray:
     """Angles (N, 3) [rad] about moving axes, such as "ZXY", of rotation matrices (N, 3, 3) (Bernardes and Viollet, "Quaternion to
     Euler angles conversion: a direct, general and computationally efficient method", PLOS ONE 2022).
 
-    Where first and third axis are the same line only their sum is known: the third angle is then zero.
+    If the first and third axes are parallel, only their sum is determined; the third angle is then zero.
     """
     i, j, k = ("XYZ".index(axis) for axis in reversed(order))
     proper = i == k

@@ -1,4 +1,4 @@
-"""TOML: read with one clear error of the caller's kind, written by tomlkit, which keeps comments."""
+"""Reads TOML with errors of the caller's class, and writes it with tomlkit, which keeps comments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ else:
     import tomli as tomllib
 
 _LARGEST = 10_000_000
-"""Bytes of a TOML file; no body or configuration has a thousandth of it."""
+"""Largest size of a TOML file [bytes]; bodies and configurations are a thousand times smaller."""
 
 
 def parse_toml(text: str, *, source: str, error: type[VoodooError]) -> dict[str, Any]:
@@ -23,15 +23,15 @@ def parse_toml(text: str, *, source: str, error: type[VoodooError]) -> dict[str,
 
     Args:
         text: the TOML.
-        source: where it comes from, for the message.
-        error: what to raise.
+        source: origin of the text, for the message.
+        error: class of the error.
 
     Raises:
         VoodooError: of the class `error`, naming the source and the place of the syntax error.
     """
     if not isinstance(text, str):
         raise error(f"{source}: expected TOML text, found {type(text).__name__}")
-    # Tables nested a thousand deep and numbers of ten thousand digits make the parser fail in other ways.
+    # Deeply nested tables and numbers with thousands of digits raise other errors in the parser.
     with reading(source, "a TOML file", error=error):
         try:
             return tomllib.loads(text)
@@ -53,7 +53,7 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
 
 
 def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:
-    """Entries as TOML, each below the lines of its note."""
+    """Entries as TOML, each below the lines of its comment."""
     import tomlkit
 
     document = tomlkit.document()
@@ -70,14 +70,14 @@ def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequ
 def edited(
     text: str, values: Mapping[str, Any], *, defaults: Mapping[str, Any], source: str, error: type[VoodooError]
 ) -> str:
-    """A TOML text with other values at its top level; comments, order and layout stay.
+    """Change values at the top level of a TOML text; comments, order and layout are kept.
 
     Args:
         text: the TOML.
-        values: by key; keys that the text has not are added at its end, unless they are at their defaults.
-        defaults: of the keys.
-        source: where the text comes from, for the message.
-        error: what to raise.
+        values: by key; missing keys are appended unless they have their default values.
+        defaults: default values.
+        source: origin of the text, for the message.
+        error: class of the error.
 
     Raises:
         VoodooError: of the class `error`, see `parse_toml`.

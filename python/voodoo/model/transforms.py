@@ -1,4 +1,4 @@
-"""Rigid transforms that callers give."""
+"""Checks rigid transforms given by callers."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from voodoo.errors import MeasurementError
 from voodoo.model.joint import as_numbers
 
 _OFF = 1e-4
-"""How far the products of a rotation's rows may be from those of unit vectors at right angles, as in the core."""
+"""Tolerance for the products of the rows of a rotation, as in the core."""
 
 
 def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArray[np.float64]:
     """A rigid transform (4, 4), checked.
 
     Raises:
-        MeasurementError: numbers of another shape, not finite, or no rotation and shift; it names `name`.
+        MeasurementError: another shape, not finite, or not a rotation and translation; names `name`.
     """
     try:
         pose = as_numbers(value)
@@ -31,10 +31,10 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
     return pose
 
 
-# Sensors stand still for most of the time, and several steps of a frame ask.
+# Cached, because most sensors are static, and several steps of a frame check the same transform.
 @lru_cache(maxsize=64)
 def _turns_and_shifts(entries: bytes) -> bool:
-    # Sixteen numbers are faster without arrays; what is not finite fails a comparison.
+    # Sixteen numbers are faster without arrays; numbers that are not finite fail a comparison.
     numbers = struct.unpack("16d", entries)
     x, y, z, last = (numbers[start : start + 4] for start in (0, 4, 8, 12))
     across = (y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0])

@@ -1,4 +1,4 @@
-"""Recordings: what sensors saw, as frames with stamps, calibrations and poses in one root frame."""
+"""Recordings: the measurements of sensors as frames with stamps, calibrations and poses in one root frame."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -37,7 +37,7 @@ __all__ = [
     "sample_path",
 ]
 
-# Imported when they are first used: the command line lists loaders without NumPy.
+# Imported on first use, so that the command line lists the loaders without NumPy.
 _HOMES = {
     "voodoo.recordings.loaders": ("LOADERS", "open_recording"),
     "voodoo.recordings.recording": ("Recording", "RecordingInfo", "Reference", "SensorInfo", "Start"),

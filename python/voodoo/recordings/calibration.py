@@ -1,4 +1,4 @@
-"""calibration.toml: the camera of a folder of images."""
+"""Reads calibration.toml, the camera of a folder of images."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from voodoo.recordings.stored import check_stored, read_stored
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
 _ROUNDING, _TYPED = 1e-9, 2e-3
-"""How far from a rotation a matrix may be: by rounding of doubles, and typed with three digits."""
+"""Tolerances for the deviation of a matrix from a rotation: by rounding of doubles, and with three typed digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """One camera: model, frame name and pose (4, 4) in the root frame."""
+    """A camera: model, frame name and pose (4, 4) in the root frame."""
 
     camera: Camera
     sensor_frame: str
@@ -54,7 +54,7 @@ sensor_frame = "camera_depth_optical_frame"
 
 
 def template(like: Path | None) -> str:
-    """A calibration.toml to fill in, of the size of a picture."""
+    """A template of calibration.toml with the size of an image."""
     try:
         width, height = (640, 480) if like is None else picture_size(read_stored(like, "a readable picture"), like)
     except RecordingError:
@@ -63,11 +63,11 @@ def template(like: Path | None) -> str:
 
 
 def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibration:
-    """Read a calibration.toml; its form is described at FolderRecording.
+    """Read a calibration.toml; see FolderRecording for the format.
 
     Args:
         path: the file.
-        like: one of the pictures, whose size is proposed where there is no such file.
+        like: one of the images, whose size is used in the template if there is no such file.
 
     Raises:
         RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
@@ -142,7 +142,7 @@ def _pose(rows: object, where: str) -> FloatArray:
         raise RecordingError(
             f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {short(rows)}"
         )
-    # Typed with three or four digits it is near a rotation, not one; the tracker wants one.
+    # A matrix typed with three or four digits is only approximately a rotation, but the tracker needs an exact one.
     if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), rtol=0.0, atol=_ROUNDING):
         u, _, v = np.linalg.svd(pose[:3, :3])
         pose[:3, :3] = u @ v

@@ -33,10 +33,10 @@ def read_camera_toml(path: str | Path) -> tuple[PlacedCamera, ...]:
 
     Each table holds `size` [px], `matrix` (3x3), `distortions` (OpenCV's order), `rotation` (Rodrigues vector [rad])
     and `translation` [m] of camera_from_world, and optionally `name` and `fisheye`. Tables without a `matrix`
-    (metadata) are passed over.
+    (metadata) are ignored.
 
     Raises:
-        RecordingError: not TOML, no camera, or a key that is missing or not of that form; names the camera.
+        RecordingError: not TOML, no camera, or a missing or invalid key; names the camera.
     """
     path = Path(path)
     if not path.is_file():

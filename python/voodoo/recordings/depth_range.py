@@ -1,4 +1,4 @@
-"""Range of depths in a recording's depth images; reveals a wrong unit before it causes a lost body."""
+"""The range of depths in a recording's depth images, which reveals a wrong unit before it causes a lost body."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def find_background(place: Path) -> Path | None:
 
 
 def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str, tuple[Path, ...]]:
-    """The files of each camera: NAME.jpg, NAME_0.jpg, NAME-7.png, ... or all in a folder NAME/.
+    """The files of each camera are NAME.jpg, NAME_0.jpg, NAME-7.png, ... or all in a folder NAME/.
 
     Args:
         folder: folder of the images.
@@ -59,8 +59,8 @@ def read_pictures(
 
     Args:
         files: of each sensor.
-        cameras: of each sensor; a picture of another size is refused.
-        left_out: counts pictures that cannot be read, which are left out then; None: they are refused.
+        cameras: of each sensor; an image of another size is an error.
+        left_out: counts unreadable images, which are then left out; None: they are errors.
 
     Raises:
         RecordingError: it names the file.
@@ -81,7 +81,7 @@ def read_pictures(
 
 
 def no_pictures(folder: str | Path, cameras: Mapping[str, Sequence[str]]) -> RecordingError:
-    """The error of a folder that was named and holds no camera's pictures."""
+    """The error for a folder set by the user that has no camera's images."""
     listed = "; ".join(f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()) or "no camera"
     return RecordingError(
         f"{folder}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({listed}), found none"

@@ -32,19 +32,19 @@ _PADDING_PX = 16
 
 
 class Pictures(ABC):
-    """The pictures of one calibrated camera.
+    """The images of one calibrated camera.
 
     Args:
         sensor: name of the video or folder.
         placed: the camera, as calibrated.
-        size: (width, height) of the pictures [px].
+        size: (width, height) of the images [px].
 
     Attributes:
-        stamps: of the pictures [s].
-        camera: calibration of the pictures as they are.
+        stamps: of the images [s].
+        camera: calibration for the size of the images.
 
     Raises:
-        RecordingError: the pictures have another size than calibrated.
+        RecordingError: the size of the images differs from the calibration.
     """
 
     stamps: Sequence[float]
@@ -81,14 +81,14 @@ class Video(Pictures):
         path: the file.
         sensor: its name.
         placed: the camera, as calibrated.
-        rate: pictures a second; None: as the file says.
+        rate: images per second; None: the rate in the file.
 
     Raises:
-        RecordingError: no video, or of another size than calibrated.
+        RecordingError: not a video, or of another size than calibrated.
     """
 
     def __init__(self, path: Path, sensor: str, placed: PlacedCamera, rate: float | None) -> None:
-        """Read size, rate and number of pictures."""
+        """Read size, rate and number of images."""
         self._path = path
         film = _opened(path)
         count = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
@@ -110,13 +110,13 @@ class PictureFolder(Pictures):
     """A folder of PNG or JPEG files, named by stamps or numbered.
 
     Args:
-        files: the pictures.
+        files: the images.
         sensor: name of the folder.
         placed: the camera, as calibrated.
         clock: converts names to stamps.
 
     Raises:
-        RecordingError: the first picture cannot be read or has another size than calibrated, or two have one stamp.
+        RecordingError: the first image cannot be read or has another size than calibrated, or two have the same stamp.
     """
 
     def __init__(self, files: Sequence[Path], sensor: str, placed: PlacedCamera, clock: FrameClock) -> None:
@@ -135,12 +135,12 @@ class PictureFolder(Pictures):
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The picture files in a folder, in the order of their names."""
+    """The image files in a folder, sorted by name."""
     return sorted(item for item in folder.iterdir() if item.suffix.lower() in PICTURES)
 
 
 def _number(file: Path) -> str:
-    """The path with only the stamp as its name: the last number in a name that is not a number itself."""
+    """The path with only the stamp as its name: the last number in the name."""
     try:
         float(file.stem)
     except ValueError:
@@ -166,7 +166,7 @@ class _VideoReader:
         self._next = 0
 
     def picture(self, index: int) -> ByteImage:
-        """A picture (H, W, 3) BGR uint8 by its number."""
+        """An image (H, W, 3) BGR uint8 by its number."""
         with reading(self._path, "a readable video"):
             if self._film is None or index < self._next:
                 self._film, self._next = _opened(self._path), 0

@@ -20,16 +20,15 @@ from voodoo.recordings.recording import (
     SensorInfo,
     mean_rate,
     number_option,
-    reference_words,
     refuse_blank,
 )
 from voodoo.recordings.stored import read_stored, read_stored_text
 from voodoo.recordings.truth import read_start, read_truth
 
 _RATE = 30.0
-"""Images per second of numbered images, as most depth cameras give by default."""
+"""Assumed images per second of numbered images, the default of most depth cameras."""
 _MOST_NUMBERED = 1_000_000
-"""Larger whole numbers are times in seconds, not numbers of images: nine hours of them."""
+"""Larger integers are times in seconds, not image numbers: the limit is nine hours of images."""
 _CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
 """Number of digits of a time since 1970 -> its unit in seconds."""
 _PICTURES = (".png", ".jpg", ".jpeg")
@@ -43,7 +42,7 @@ class FolderRecording(Recording):
         rgb/, rgb.txt                 optional: the same for color (PNG or JPEG)
         calibration.toml              the camera
         truth.csv                     optional: exact joint positions in the root frame, as beside a rendered bag
-        init.json                     optional: where the person is in the first frame, as --init reads it
+        init.json                     optional: pose of the person in the first frame, as read by --init
 
     There is one frame for each depth image, holding the color images since the previous one. A groundtruth.txt (the
     camera's path, in that benchmark) is not used. calibration.toml::
@@ -65,7 +64,7 @@ class FolderRecording(Recording):
         width = 640
         ...
 
-    Images that are numbered come at `rate`; names of 13, 16 or 19 digits are stamps in milli-, micro- or nanoseconds.
+    Numbered images have the rate `rate`; names of 13, 16 or 19 digits are stamps in milli-, micro- or nanoseconds.
 
     Args:
         path: the folder.
@@ -75,7 +74,7 @@ class FolderRecording(Recording):
         left_out: counts unusable images, which are then left out; None: they are errors.
 
     Raises:
-        RecordingError: no images, no calibration, names that are no stamps, or stamps that do not rise.
+        RecordingError: no images, no calibration, names that are not stamps, or stamps that do not increase.
     """
 
     def __init__(
@@ -162,19 +161,8 @@ class FolderRecording(Recording):
         if self._color and self._calibration.color is not None:
             sensors.append(_sensor("color", "pictures", self._color, self._calibration.color))
         first, last = self._depth[0][0], self._depth[-1][0]
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="folder",
-            frames=len(self),
-            start_stamp=first,
-            duration=last - first,
-            rate_hz=mean_rate(len(self), last - first),
-            root_frame=self.root_frame,
-            sensors=tuple(sensors),
-            unused=self._unused,
-            reference=reference_words(self.reference),
-            notes=self.assumed,
+        return self._described(
+            "folder", sensors, start=first, duration=last - first, unused=self._unused, notes=self.assumed
         )
 
 
@@ -182,14 +170,14 @@ class FrameClock:
     """Stamps from the names of files.
 
     Args:
-        rate: images per second where they are numbered; None: 30.
+        rate: images per second of numbered images; None: 30.
 
     Attributes:
-        notes: what was assumed.
+        notes: assumptions that were made.
     """
 
     def __init__(self, rate: float | None) -> None:
-        """Nothing assumed yet."""
+        """Start without assumptions."""
         self._rate = rate
         self.notes: list[str] = []
 
@@ -197,7 +185,7 @@ class FrameClock:
         """Stamps [s] of the names of a folder's files.
 
         Raises:
-            RecordingError: a name that is no number.
+            RecordingError: a name that is not a number.
         """
         numbers = [_stamp(file.stem, str(file)) for file in files]
         stems = [file.stem for file in files]
@@ -216,7 +204,7 @@ class FrameClock:
 def _listing(
     path: Path, name: str, suffixes: tuple[str, ...], clock: FrameClock, left_out: LeftOut | None
 ) -> list[tuple[float, Path]]:
-    """(stamp, file) of NAME.txt, else of the files in NAME/."""
+    """(stamp, file) pairs of NAME.txt if it exists, else of the files in NAME/."""
     table = path / f"{name}.txt"
     entries: list[tuple[float, Path]] = []
     if table.is_file():
@@ -251,7 +239,7 @@ def _inside(name: str, where: str) -> str:
     """The name of a file in the folder.
 
     Raises:
-        RecordingError: it leads elsewhere.
+        RecordingError: it is outside the folder.
     """
     if PurePath(name).is_absolute() or ".." in PurePath(name).parts or "\0" in name:
         raise RecordingError(f"{where}: expected a file inside the folder, found {name!r:.80}")

@@ -65,11 +65,11 @@ class Joined(Recording):
         return self._first.root_from(frame, stamp)
 
     def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
-        """Those of all recordings."""
+        """Images of the empty scene of all recordings."""
         return {name: observed for one in (*self._others, self._first) for name, observed in one.empty_scene().items()}
 
     def info(self) -> RecordingInfo:
-        """That of the first, with the sensors of all."""
+        """The summary of the first, with the sensors of all."""
         about = self._first.info()
         sensors = tuple(sensor for other in self._others for sensor in other.info().sensors)
         joined = ", ".join(str(other.path) for other in self._others)
@@ -99,7 +99,7 @@ class _Ahead:
 
 
 class WithKeypoints(Recording):
-    """A recording whose pictures come with the keypoints that a network found in them.
+    """A recording whose images have the keypoints that a network detected in them.
 
     Args:
         recording: with color or depth images.
@@ -147,7 +147,7 @@ class WithKeypoints(Recording):
                 if isinstance(item, (ColorImage, DepthImage)) and count.get(item.sensor, -1) >= 0:
                     number = count[item.sensor]
                     if self._left_out is not None:
-                        # If images were left out, the others keep their numbers.
+                        # The numbers of images count those that were left out.
                         number = self._left_out.numbers.get((item.sensor, item.stamp), number)
                     count[item.sensor] = number + 1
                     items += self._keypoints(item, self._files[item.sensor][number])
@@ -182,7 +182,7 @@ class WithKeypoints(Recording):
         return self._recording.empty_scene()
 
     def info(self) -> RecordingInfo:
-        """That of the recording, with the keypoints."""
+        """The summary of the recording, with the keypoints."""
         about = self._recording.info()
         sensors = tuple(
             replace(sensor, name=f"{sensor.name}/keypoints", kind="keypoints", detail=f"{self._layout} keypoints")

@@ -1,4 +1,4 @@
-"""Tables of joint positions as .csv: what truth.csv and truth_people.csv have in common."""
+"""Reads .csv tables of joint positions: truth.csv and truth_people.csv."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read_positions(path: Path, first: tuple[str, ...]) -> tuple[tuple[str, ...],
     """The names and cells (R, C) of a table whose columns are `first` and then NAME_x, NAME_y, NAME_z; NaN for empty cells.
 
     Raises:
-        RecordingError: another header, a short row, a cell that is no number.
+        RecordingError: another header, a short row, a cell that is not a number.
     """
     with reading(path, "a table of joint positions"):
         rows = list(csv.reader(io.StringIO(read_stored_text(path, "a table of joint positions"))))

@@ -18,7 +18,7 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
     """People in an OpenPose JSON file (one image): one (K, 3) array of (u, v, confidence) each; empty without any.
 
     Raises:
-        RecordingError: not readable, not of that form, or another number of keypoints than the layout's.
+        RecordingError: unreadable, of another format, or with a number of keypoints that differs from the layout.
     """
     count = layout_of(layout).count
     path = Path(path)
@@ -30,7 +30,7 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
     found = []
     for index, person in enumerate(people):
         flat = person.get("pose_keypoints_2d") if isinstance(person, dict) else None
-        if person == {} or flat == []:  # Pose2Sim and OpenPose write these where they found no body
+        if person == {} or flat == []:  # Pose2Sim and OpenPose write these if no body was detected
             continue
         if not isinstance(flat, list) or not all(isinstance(value, (int, float)) for value in flat):
             raise RecordingError(f"{path}, person {index}: expected a list of numbers pose_keypoints_2d")

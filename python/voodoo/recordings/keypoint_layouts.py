@@ -1,10 +1,10 @@
 """Table that maps the keypoints of common networks to the sites of the body.
 
-Each row: site, {keypoint index: weight}, spread [m]. A site is the weighted sum of its keypoints; the spread is the
+Each row has a site, {keypoint index: weight} and a spread [m]. A site is the weighted sum of its keypoints; the spread is the
 distance between the network's definition of the joint and ours (a hip keypoint sits on the skin, a neck keypoint between
 the shoulders, ears below the middle of the head).
-Sites that would only repeat keypoints used already (a neck that a network computes from its two shoulders) are left
-out: they would count one error twice.
+Sites that only repeat other keypoints (a neck that a network computes from the two shoulders) are left out, because they
+would count one error twice.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "k
 
 @dataclass(frozen=True)
 class SiteKeypoints:
-    """A site and the keypoints it is made of."""
+    """A site and the keypoints it is computed from."""
 
     site: str
     weights: Mapping[int, float]
@@ -28,7 +28,7 @@ class SiteKeypoints:
 
 @dataclass(frozen=True)
 class Layout:
-    """A network's keypoints: how many, and which sites they give."""
+    """The keypoints of a network: their number, and the sites computed from them."""
 
     count: int
     parts: tuple[SiteKeypoints, ...]
@@ -56,7 +56,7 @@ def _body_25(start: Mapping[str, int], *, toe: int) -> dict[str, int]:
 
 
 def _ears(left: int, right: int) -> SiteKeypoints:
-    # The middle of the ears is the middle of the head, from every side.
+    # The midpoint of the ears is the center of the head from every direction.
     return SiteKeypoints("head_center", {left: 0.5, right: 0.5}, 0.06)
 
 
@@ -70,7 +70,7 @@ _COCO_LEFT, _COCO_RIGHT = _joints("left", 5)
 LAYOUTS: dict[str, Layout] = {
     # nose, eyes, ears (3, 4), then pairs from the shoulders to the ankles
     "coco17": Layout(17, (*_parts(_COCO_LEFT, _COCO_RIGHT), _ears(3, 4))),
-    # OpenPose: its neck (1) and mid-hip (8) are made of the shoulders and hips
+    # OpenPose: its neck (1) and mid-hip (8) are computed from the shoulders and hips
     "body25": Layout(
         25,
         (
@@ -132,7 +132,7 @@ def layout_of(name: str) -> Layout:
     """The layout called `name`, see LAYOUTS.
 
     Raises:
-        MeasurementError: unknown; lists the known ones.
+        MeasurementError: the name is unknown; lists the known ones.
     """
     if name not in LAYOUTS:
         raise MeasurementError(f"layout {name!r}: expected one of {', '.join(LAYOUTS)}")

@@ -13,24 +13,24 @@ class LeftOut:
     A loader that gets this object leaves such measurements out and continues; without it, the first one is an error.
 
     Attributes:
-        counts: reason -> how many.
-        first: reason -> the first of them, in words.
-        numbers: (sensor, stamp) -> number of that message among the sensor's, for what is paired with them by number.
+        counts: reason -> number.
+        first: reason -> description of the first one.
+        numbers: (sensor, stamp) -> index of that message among those of the sensor, for data that is paired by index.
     """
 
     def __init__(self) -> None:
-        """Nothing yet."""
+        """Start with no counts."""
         self.counts: dict[str, int] = {}
         self.first: dict[str, str] = {}
         self.numbers: dict[tuple[str, float], int] = {}
 
     def add(self, reason: str, words: object, count: int = 1) -> None:
-        """Count what was left out.
+        """Count measurements that were left out.
 
         Args:
             reason: the same words for the same kind of damage.
-            words: which it was, and what was wrong.
-            count: how many.
+            words: which measurement, and what is wrong with it.
+            count: number of measurements.
         """
         self.counts[reason] = self.counts.get(reason, 0) + count
         self.first.setdefault(reason, str(words))

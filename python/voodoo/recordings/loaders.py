@@ -1,4 +1,4 @@
-"""Finding the loader of a recording."""
+"""Selects the loader of a recording."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Loader:
     """Opener and file layout of one kind of recording.
 
     Args:
-        find: imports what opens it; other loaders' libraries are not needed.
-        expects: in words.
+        find: imports the opener; the libraries of other loaders are not needed.
+        expects: description of the files.
     """
 
     find: Callable[[], Callable[..., Recording]]
@@ -109,7 +109,7 @@ def open_recording(
             UtdMhadRecording and FolderRecording.
 
     Raises:
-        RecordingError: nothing there, no loader for it, an unknown loader or option, or damage.
+        RecordingError: the path does not exist, no loader for it, an unknown loader or option, or damage.
     """
     path = a_path(path, error=RecordingError)
     if loader is not None and loader not in LOADERS:
@@ -127,7 +127,7 @@ def open_recording(
         message = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
         raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {message}")
     recording = LOADERS[name].open(path, **options)
-    found = getattr(recording, "loader", name)  # a bag itself reports which of the two kinds it is
+    found = getattr(recording, "loader", name)  # the bag determines which of the two kinds it is
     if found != name:
         raise RecordingError(f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {found!r}")
     return recording
@@ -139,10 +139,10 @@ def options_of(name: str) -> tuple[str, ...]:
 
 
 def guess_loader(path: Path) -> str:
-    """Name of the loader for what lies at `path`.
+    """Name of the loader for a path.
 
     Raises:
-        RecordingError: nothing fits; the message lists the loaders.
+        RecordingError: no loader matches; the message lists the loaders.
     """
     from voodoo.recordings.ros_bag import find_bag, zip_members
 
@@ -180,8 +180,8 @@ def guess_loader(path: Path) -> str:
 
 
 def _of_cameras(path: Path) -> str | None:
-    """The loader of a folder of several cameras: that of their keypoints, if there are some, else of their pictures; None: it is
-    none.
+    """The loader of a folder of several cameras, for their keypoints if there are any, else for their images; None: not such a
+    folder.
 
     Raises:
         RecordingError: videos without a calibration.

@@ -22,7 +22,7 @@ FRAME = "world"
 
 
 class OnLimb(BaseModel):
-    """Where a marker is worn.
+    """The place of a marker on the body.
 
     Args:
         limb: name of the limb.
@@ -36,12 +36,12 @@ class OnLimb(BaseModel):
 
 
 class MarkerMap(BaseModel):
-    """What the markers of a file mean.
+    """Assigns the markers of a file to sites and limbs.
 
     Args:
         sites: marker name -> site name. Markers named like a site of the default human need no entry, nor do
             Pose2Sim's.
-        limbs: marker name -> where it is worn; it becomes a site of its own.
+        limbs: marker name -> its place on a limb; it becomes a new site.
         y_up: the file's axes are OpenSim's (Y up) and are turned to z up; False keeps them.
         sigma_m: standard deviation of a marker's position [m].
     """
@@ -55,10 +55,10 @@ class MarkerMap(BaseModel):
 
     @classmethod
     def load(cls, path: Path) -> MarkerMap:
-        """Read it from TOML.
+        """Read a map from TOML.
 
         Raises:
-            RecordingError: not readable, or not of that form; names file and key.
+            RecordingError: unreadable or of another format; names file and key.
         """
         tables = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
         try:
@@ -69,7 +69,7 @@ class MarkerMap(BaseModel):
             raise RecordingError(f"{path}: {key}: {problem['msg']}, found {short(problem['input'])}") from error
 
     def worn(self) -> dict[str, tuple[str, tuple[float, float, float]]]:
-        """The markers on limbs as voodoo.sensors.markers.body_with_markers takes them."""
+        """The markers on limbs, in the format of voodoo.sensors.markers.body_with_markers."""
         return {name: (place.limb, place.position) for name, place in self.limbs.items()}
 
 
@@ -78,9 +78,9 @@ class MarkerRecording(Recording):
 
     Args:
         path: the file.
-        markers: what its markers mean; None: they have names of the default human's sites, or Pose2Sim's. Others are
-            not used.
-        bare: the first instant is no start; its markers are measurements like any others.
+        markers: assigns the markers; None: their names are those of the default human's sites, or Pose2Sim's. Others
+            are not used.
+        bare: the first instant is not used as the start; its markers are measurements like all others.
 
     Raises:
         RecordingError: the file is damaged.
@@ -128,14 +128,5 @@ class MarkerRecording(Recording):
         duration = float(self._stamps[-1] - self._stamps[0])
         rate = mean_rate(len(self), duration)
         detail = f"{len(self._sites)} markers"
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="markers",
-            frames=len(self),
-            start_stamp=float(self._stamps[0]),
-            duration=duration,
-            rate_hz=rate,
-            root_frame=FRAME,
-            sensors=(SensorInfo(self.path.name, "markers", FRAME, len(self), rate, detail),),
-        )
+        sensor = SensorInfo(self.path.name, "markers", FRAME, len(self), rate, detail)
+        return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration)

@@ -23,7 +23,7 @@ Z_UP_FROM_Y_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1
 """Rotation from OpenSim's axes (X forward, Y up, Z to the right) to REP-103's order of axes (Z up): (x, y, z) = (Z,
 X, Y).
 
-It is Pose2Sim's convention; it keeps right-handedness, not the direction a person faces."""
+This is Pose2Sim's convention; it preserves handedness, but not the direction in which a person faces."""
 
 _METERS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
 
@@ -49,23 +49,23 @@ class MarkerTrajectories:
         return f"MarkerTrajectories({len(self.stamps)} frames, {len(self.names)} markers, {self.rate_hz:g} Hz)"
 
     def of(self, names: Mapping[str, str]) -> tuple[tuple[str, ...], FloatArray]:
-        """The markers that stand for sites.
+        """Select the markers that correspond to sites.
 
         Args:
             names: marker name -> site name.
 
         Returns:
-            The site names, and their positions (F, N, 3), of those markers that the file has.
+            Names and positions (F, N, 3) of the sites whose markers are in the file.
         """
         kept = [(index, names[name]) for index, name in enumerate(self.names) if name in names]
         return tuple(site for _, site in kept), self.positions[:, [index for index, _ in kept]]
 
 
 def read_markers(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
-    """Read a .trc or .c3d file, whichever the suffix says; see `read_trc` and `read_c3d`.
+    """Read a .trc or .c3d file, selected by the suffix; see `read_trc` and `read_c3d`.
 
     Raises:
-        RecordingError: another suffix, damage, or another form.
+        RecordingError: another suffix, damage, or another format.
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".trc":
@@ -83,7 +83,7 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         world_from_file: (3, 3) rotation applied to every position, e.g. Z_UP_FROM_Y_UP; None keeps the file's axes.
 
     Raises:
-        RecordingError: not of that form; names the line.
+        RecordingError: another format; names the line.
     """
     path = Path(path)
     if not path.is_file():
@@ -126,8 +126,7 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
 
 
 def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
-    """Read the points of a .c3d file with the library c3d, which is plain Python: compiled readers have been killed by
-    damaged files.
+    """Read the points of a .c3d file with the library c3d, which is pure Python: damaged files have crashed compiled readers.
 
     Args:
         path: the file.
@@ -157,7 +156,7 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         )
     table = np.array(frames)
     positions = table[:, :, :3] * _METERS[unit]
-    positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not seen
+    positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not observed
     stamps = (first + np.arange(len(table))) / rate
     return _trajectories(path, stamps, names, positions, rate, world_from_file)
 

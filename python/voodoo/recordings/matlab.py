@@ -1,7 +1,7 @@
 """Numeric arrays of MATLAB files (level 5), read without a library.
 
-SciPy's reader is compiled code that trusts a file's lengths: damaged ones have killed the process. What recordings need is
-one array of numbers, and every length here is checked against what is there. See MathWorks, "MAT-File Format".
+SciPy's reader is compiled code that trusts the lengths in a file: damaged files have crashed the process. Recordings need only
+numeric arrays, and here every length is checked against the size of the data. See MathWorks, "MAT-File Format".
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from voodoo.recordings.stored import read_stored
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-"""How numbers are stored, by the type in their tag."""
+"""Storage types of numbers, by the type in their tag."""
 _CLASSES = range(6, 16)
 """Classes of arrays that hold numbers."""
 _COMPLEX = 0x08
 _MOST = 2**30
-"""Bytes of an array when unpacked."""
+"""Largest size of a decompressed array [bytes]."""
 
 
 def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """The numeric arrays of a .mat file by name, in the type they are stored in (whole doubles are stored as integers); other
+    """The numeric arrays of a .mat file by name, in their storage type (integer-valued doubles are stored as integers); other
     variables (text, cells, structures) are left out.
 
     Raises:
-        RecordingError: no MATLAB file of level 5, damage, or more than a gigabyte; it names the file.
+        RecordingError: not a MATLAB file of level 5, damage, or more than a gigabyte; names the file.
     """
     data = read_stored(path, "a MATLAB file")
     if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
@@ -67,11 +67,11 @@ def _inflated(data: bytes) -> bytes:
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """(type, content) of the elements that follow each other in `data`."""
+    """(type, content) of the consecutive elements in `data`."""
     at = 0
     while at + 8 <= len(data):
         kind, length = struct.unpack_from(order + "II", data, at)
-        if kind >> 16:  # up to four bytes stand in the tag itself
+        if kind >> 16:  # up to four bytes are stored in the tag itself
             kind, length = kind & 0xFFFF, kind >> 16
             start, after = at + 4, at + 8
         else:
@@ -93,7 +93,7 @@ def _matrices(data: bytes, order: str) -> Iterator[tuple[str, npt.NDArray[Any]]]
 
 
 def _matrix(data: bytes, order: str) -> tuple[str, npt.NDArray[Any]] | None:
-    """Name and numbers of an array; None for one that holds no numbers, or complex ones."""
+    """Name and numbers of an array; None if it is not numeric, or complex."""
     parts = _elements(data, order)
     (_, flags), (_, shape), (_, name) = next(parts), next(parts), next(parts)
     (word,) = struct.unpack_from(order + "I", flags)

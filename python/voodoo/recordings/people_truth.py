@@ -24,7 +24,7 @@ class PeopleTruth:
     """Exact joints of P persons at F stamps.
 
     Args:
-        stamps: (F,) [s], rising; those at which anybody is in the scene.
+        stamps: (F,) [s], increasing; those at which a person is in the scene.
         persons: (P,) numbers from 1, the same when a person comes back.
         in_view: (F, P) fraction of a person's pixels that is visible to the depth camera, 0..1; 0 outside the scene.
         names: J site names.
@@ -64,7 +64,7 @@ def read_people_truth(path: Path, root_from_truth: Callable[[float], FloatArray]
         root_from_truth: (4, 4) root_from_base_link at a stamp [s].
 
     Raises:
-        RecordingError: another header, a short row, a cell that is no number, or two rows of a person at one stamp.
+        RecordingError: another header, a short row, a cell that is not a number, or two rows of a person at one stamp.
     """
     names, table = read_positions(path, _FIRST)
     if not names:

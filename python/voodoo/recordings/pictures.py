@@ -24,7 +24,7 @@ def check_png(data: bytes, source: object) -> None:
     """Check signature, chunk lengths and checksums of a PNG up to its end mark.
 
     Raises:
-        RecordingError: naming the first thing that is wrong.
+        RecordingError: names the first error.
     """
     if data[:8] != _PNG_MAGIC:
         raise RecordingError(f"{source}: expected a PNG, found bytes starting with {data[:8]!r}")
@@ -44,10 +44,10 @@ def check_png(data: bytes, source: object) -> None:
 
 
 def picture_size(data: bytes, source: object) -> tuple[int, int]:
-    """(width, height) that the header of a PNG or JPEG announces; nothing is decoded.
+    """(width, height) in the header of a PNG or JPEG; nothing is decoded.
 
     Raises:
-        RecordingError: neither PNG nor JPEG, or one without a size.
+        RecordingError: neither PNG nor JPEG, or without a size.
     """
     if data[:8] == _PNG_MAGIC:
         if len(data) >= 24 and data[12:16] == b"IHDR":
@@ -59,7 +59,7 @@ def picture_size(data: bytes, source: object) -> tuple[int, int]:
     at = 2
     while at + 9 <= len(data) and data[at] == 0xFF:
         mark = data[at + 1]
-        if mark == 0xFF:  # filling
+        if mark == 0xFF:  # padding
             at += 1
             continue
         if mark in _JPEG_FRAMES:
@@ -71,7 +71,7 @@ def picture_size(data: bytes, source: object) -> tuple[int, int]:
 
 
 def check_size(data: bytes, source: object, size: tuple[int, int]) -> None:
-    """Refuse a picture by the size in its header: a small file of 30,000 x 30,000 pixels would take gigabytes.
+    """Check the size in the header of an image: a small file with 30,000 x 30,000 pixels would need gigabytes of memory.
 
     Raises:
         RecordingError: another size than expected, (width, height).
@@ -89,7 +89,7 @@ def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.
 
     Args:
         data: the file's bytes.
-        source: what to name in errors.
+        source: name in errors.
         size: expected (width, height).
 
     Raises:
@@ -110,7 +110,7 @@ def decode_color(data: bytes, source: object, size: tuple[int, int]) -> npt.NDAr
 
     Args:
         data: the file's bytes.
-        source: what to name in errors.
+        source: name in errors.
         size: expected (width, height).
 
     Raises:

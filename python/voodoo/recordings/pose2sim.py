@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     Start,
     mean_rate,
     number_option,
-    reference_words,
 )
 
 SITES = {
@@ -41,7 +40,7 @@ class Pose2SimRecording(Recording):
     """A folder of Pose2Sim::
 
         Calib_*.toml                     cameras, see read_camera_toml; world Z up, meters; or in calibration/, ../calibration/
-        keypoints/cam01_json/*.json      OpenPose files, one an image, sorted by name; or pose/cam01_json as Pose2Sim has it
+        keypoints/cam01_json/*.json      OpenPose files, one per image, sorted by name; or pose/cam01_json as in Pose2Sim
         *.trc                            optional: triangulated joints, Y up
 
     Cameras and keypoint folders belong together in the order of their names. There is one frame for each image
@@ -52,13 +51,13 @@ class Pose2SimRecording(Recording):
     Args:
         path: the folder.
         layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
-        rate: images per second; nothing in the folder tells it (`voodoo track --option rate=30`).
+        rate: images per second; not in the folder (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
-        bare: no .trc is read.
-        left_out: counts files that cannot be read: their camera sees nobody then; None: they are refused.
+        bare: do not read the .trc.
+        left_out: counts unreadable files, whose camera then has no detections; None: they are errors.
 
     Raises:
-        RecordingError: a part is missing or not of that form.
+        RecordingError: a part is missing or has another format.
     """
 
     def __init__(
@@ -137,31 +136,21 @@ class Pose2SimRecording(Recording):
         """Summarize."""
         duration = (len(self) - 1) / self.rate
         rate = mean_rate(len(self), duration)
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="pose2sim",
-            frames=len(self),
-            start_stamp=0.0,
-            duration=duration,
-            rate_hz=rate,
-            root_frame=FRAME,
-            sensors=tuple(
-                SensorInfo(placed.name, "keypoints", placed.name, len(self), rate, f"{self.layout} keypoints")
-                for placed in self.cameras
-            ),
-            reference=reference_words(self.reference),
-            notes=("the reference is triangulated from the same keypoints: it tests consistency, not accuracy",),
+        words, notes = (
+            f"{self.layout} keypoints",
+            "triangulated from the same keypoints: it tests consistency, not accuracy",
         )
+        sensors = (SensorInfo(one.name, "keypoints", one.name, len(self), rate, words) for one in self.cameras)
+        return self._described("pose2sim", sensors, duration=duration, notes=(f"the reference is {notes}",))
 
 
 def keypoint_folders(path: Path) -> list[Path]:
-    """The folders of keypoint files in a folder of Pose2Sim, one a camera."""
+    """The folders of keypoint files in a Pose2Sim folder, one per camera."""
     return next((found for part in ("keypoints", "pose") if (found := sorted((path / part).glob("*_json")))), [])
 
 
 def calibrations(path: Path) -> list[Path]:
-    """The calibration files of a folder of Pose2Sim: in it, or in `calibration/` of it or of the one above."""
+    """The calibration files of a Pose2Sim folder: in it, or in `calibration/` of it or of its parent folder."""
     places = (path, *(folder / name for folder in (path, path.parent) for name in ("calibration", "Calibration")))
     return next((found for place in places if (found := sorted(place.glob("Calib*.toml")))), [])
 
@@ -178,10 +167,10 @@ translation = [0.0, 1.0, 3.0]               # camera from world, meters
 
 
 def calibration_of(path: Path, names: Sequence[str] = ()) -> Path:
-    """The one calibration file of a folder of Pose2Sim.
+    """The only calibration file of a Pose2Sim folder.
 
     Raises:
-        RecordingError: none, or several; it has a template of one for cameras of these names.
+        RecordingError: none, or several; the hint has a template for cameras with these names.
     """
     found = calibrations(path)
     if len(found) != 1:
@@ -195,7 +184,7 @@ def calibration_of(path: Path, names: Sequence[str] = ()) -> Path:
 
 
 def read_triangulation(path: Path, rate: float) -> Reference | None:
-    """The triangulated joints in a folder of Pose2Sim, of pictures k / rate; None without any.
+    """The triangulated joints of a Pose2Sim folder, at stamps k / rate; None without any.
 
     Raises:
         RecordingError: a .trc that cannot be read.

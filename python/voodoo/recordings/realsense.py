@@ -2,7 +2,7 @@
 
 After every image four bytes follow (float32, meters of a unit of depth); calibration lies on `.../Depth_0/info/camera_info`;
 frame ids are numbers, and the pose of a stream is on `.../Depth_0/tf/N`, where N numbers what the poses are relative to.
-The .db3 of later recorders is a bag like others, but for the lens models: their names stand in strings only.
+The .db3 of later recorders is an ordinary bag, except that the names of the lens models are only in string messages.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ _TRANSFORM = re.compile(r"^(/device_\d+/sensor_\d+/\w+_\d+)/tf/(\d+)$")
 
 
 def is_recorders(topics: Iterable[str]) -> bool:
-    """Whether the topics are those of a .bag of librealsense's recorder."""
+    """Whether the topics are those of a .bag written by librealsense's recorder."""
     names = set(topics)
     return "/file_version" in names and any(_TRANSFORM.match(name) for name in names)
 
 
 def frame_name(topic: str) -> str:
-    """A name for the frame of an image topic, e.g. "Depth_0"; with its device where that is not the first."""
+    """A name for the frame of an image topic, e.g. "Depth_0"; with its device if that is not the first."""
     found = _STREAM.match(topic)
     if found is None:
         return topic.strip("/")
@@ -53,7 +53,7 @@ def transform_of(topic: str) -> tuple[str, str] | None:
 
 
 def lens_topic(topic: str) -> str | None:
-    """Where a .db3 tells the lens model of an image topic in words; None of another topic."""
+    """Topic with the name of the lens model of an image topic in a .db3; None for other topics."""
     found = _STREAM.match(topic)
     return None if found is None else f"{found[1]}/{found[3]}/camera_info"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
@@ -52,8 +52,8 @@ class Reference:
 
 @dataclass(frozen=True)
 class SensorInfo:
-    """One source of measurements: topic or folder, kind ("depth", "points", "scan", "color", "keypoints", "markers"), frame
-    id, number of messages, mean rate [Hz] (NaN with less than two messages) and a word on the format."""
+    """A source of measurements: topic or folder, kind ("depth", "points", "scan", "color", "keypoints", "markers"), frame
+    id, number of messages, mean rate [Hz] (NaN with less than two messages) and a description of the format."""
 
     name: str
     kind: str
@@ -65,7 +65,7 @@ class SensorInfo:
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """Summary of a recording; str() of it is meant for people.
+    """Summary of a recording; str() gives readable text.
 
     Args:
         name: short name.
@@ -76,9 +76,9 @@ class RecordingInfo:
         duration: from the first to the last frame [s].
         rate_hz: mean frame rate, NaN with less than two frames.
         root_frame: frame of all `root_from_sensor` and of the reference.
-        sensors: what is yielded; the first one makes the frames.
-        unused: (topic, reason) of what was recognized but is not yielded.
-        reference: words on the reference, or "none".
+        sensors: sources that are yielded; the first one defines the frames.
+        unused: (topic, reason) of topics that were recognized but are not yielded.
+        reference: description of the reference, or "none".
         notes: remarks on this kind of recording.
     """
 
@@ -118,7 +118,7 @@ class Recording(ABC):
     """Base class of all recordings: sized, iterable any number of times, read while iterating.
 
     Attributes:
-        path: what was opened.
+        path: path that was opened.
         name: short name for reports.
         root_frame: frame all poses and the reference are in.
         start: pose of the body in the first frame, or None.
@@ -154,18 +154,44 @@ class Recording(ABC):
         """Read the frames in the order of their stamps.
 
         Raises:
-            RecordingError: as soon as damage is met; frames before it have been yielded by then.
+            RecordingError: damage; the frames before it have been yielded.
         """
 
     @abstractmethod
     def info(self) -> RecordingInfo:
         """Summarize without decoding the images."""
 
+    def _described(
+        self,
+        loader: str,
+        sensors: Iterable[SensorInfo],
+        *,
+        duration: float,
+        start: float = 0.0,
+        unused: tuple[tuple[str, str], ...] = (),
+        notes: tuple[str, ...] = (),
+    ) -> RecordingInfo:
+        """The summary, with the entries that follow from the recording itself."""
+        return RecordingInfo(
+            name=self.name,
+            path=self.path,
+            loader=loader,
+            frames=len(self),
+            start_stamp=start,
+            duration=duration,
+            rate_hz=mean_rate(len(self), duration),
+            root_frame=self.root_frame,
+            sensors=tuple(sensors),
+            unused=unused,
+            reference=reference_words(self.reference, self.people),
+            notes=notes,
+        )
+
     def root_from(self, frame: str, stamp: float) -> FloatArray:
-        """root_from_frame (4, 4) of a frame that the recording knows, at a time [s].
+        """root_from_frame (4, 4) of a frame of the recording at a time [s].
 
         Raises:
-            RecordingError: it does not know the frame.
+            RecordingError: the frame is unknown.
         """
         if frame != self.root_frame:
             raise RecordingError(f"{self.path}: expected the frame {self.root_frame!r}, found {short(frame)}")
@@ -177,7 +203,7 @@ class Recording(ABC):
 
 
 def reference_words(reference: Reference | None, people: PeopleTruth | None = None) -> str:
-    """The reference in words for RecordingInfo."""
+    """Describe the reference for RecordingInfo."""
     if reference is None and people is not None:
         return f"{len(people.persons)} persons, {len(people.names)} joints, {len(people.stamps)} stamps, exact"
     if reference is None:
@@ -201,7 +227,7 @@ def refuse_blank(item: DepthImage, where: object) -> None:
 
 
 def number_option(path: Path, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:
-    """A number that a loader was given, above zero (or zero, where that may be) and not above `most`.
+    """Check a number given to a loader: above zero (or zero, if allowed) and not above `most`.
 
     Raises:
         RecordingError: it is not; names the option and what was expected.

@@ -24,7 +24,6 @@ from voodoo.recordings.recording import (
     SensorInfo,
     mean_rate,
     number_option,
-    reference_words,
     refuse_blank,
 )
 from voodoo.recordings.ros_bag import Bag
@@ -45,39 +44,39 @@ from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_tru
 
 _MILLIMETER = 0.001
 STILL_FRAMES = ("odom", "map")
-"""Fixed frames of a moving robot (REP-105): the first is smooth, the second without drift but with jumps."""
+"""Fixed frames of a moving robot (REP-105): the first is smooth but drifts, the second has no drift but jumps."""
 _TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 class RosRecording(Recording):
     """A ROS bag: depth images, clouds, laser scans and color images in one root frame.
 
-    There is one frame for each depth image (without depth: for each cloud, else each scan, else each picture of the first
-    camera); it also holds what was recorded since the previous one. Where there is nothing but pictures, those of all cameras
-    are used, and a frame holds those taken within half an interval of the first camera's. What comes after the last frame is
-    not yielded. Stamps are header stamps in seconds; double precision keeps them to about 0.2 microseconds. Messages are read
-    while iterating and color is decoded on access. A bag that was cut off is refused (`ros2 bag reindex` or `mcap recover`
-    repair it), as is one whose index announces other messages than it holds.
+    There is one frame for each depth image (without depth: for each cloud, else each scan, else each image of the first
+    camera); it also holds the measurements recorded since the previous frame. If there are only color images, those of all
+    cameras are used, and a frame holds those within half an interval of the first camera's. Measurements after the last frame
+    are not yielded. Stamps are header stamps in seconds; double precision keeps them to about 0.2 microseconds. Messages are read
+    while iterating and color is decoded on access. A truncated bag is an error (`ros2 bag reindex` or `mcap recover`
+    repair it), as is one whose index differs from its messages.
 
     truth.csv, truth_people.csv and init.json in the bag's folder or the one above become `reference`, `people` and `start`,
-    unless `bare`. Their positions are in base_link, or else world, or else the first sensor's frame, or in the one that
-    init.json's key `frame` names. Pictures in `background/` in the bag's folder or the one above are the `empty_scene`.
+    unless `bare`. Their positions are in base_link, or else world, or else the first sensor's frame, or in the frame
+    named by the key `frame` of init.json. Images in `background/` in the bag's folder or the one above are the `empty_scene`.
 
-    A .bag of librealsense's recorder has no ROS frames: its streams are frames of their own ("Depth_0").
+    A .bag of librealsense's recorder has no ROS frames: each stream is a frame ("Depth_0").
 
     Args:
         path: see voodoo.recordings.ros_bag.Bag.
         use: kinds of measurements to yield.
-        depth_topic, points_topic, scan_topic, color_topic: a topic or several, instead of the one found by type and
-            name. The first one of the first kind makes the frames.
+        depth_topic, points_topic, scan_topic, color_topic: one topic or several, instead of the one selected by type
+            and name. The first one of the first kind defines the frames.
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
-        root_frame: by default odom, else map, where base_link moves in it; else base_link, or else world, if the bag's
-            transforms know it, else the frame of the first sensor.
-        meters_per_unit: of 16-bit depth images; None: what a bag of librealsense's recorder tells, else 0.001.
-        tf_max_age: how old a changing transform may be [s].
-        background: folder of pictures of the empty scene, instead of the one beside the bag.
+        root_frame: by default odom, else map, if base_link moves in it; else base_link, else world, if the transforms of
+            the bag have it; else the frame of the first sensor.
+        meters_per_unit: of 16-bit depth images; None: the value in a bag of librealsense's recorder, else 0.001.
+        tf_max_age: maximum age of a changing transform [s].
+        background: folder of images of the empty scene, instead of the one beside the bag.
         bare: read neither reference nor start.
-        left_out: counts what cannot be used, which is then left out; None: it is refused.
+        left_out: counts unusable measurements, which are then left out; None: they are errors.
 
     Raises:
         RecordingError: the bag is damaged, or calibration, transforms or usable topics are missing.
@@ -100,7 +99,7 @@ class RosRecording(Recording):
         bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
-        """Survey topics and transforms; see the class."""
+        """Read topics and transforms; see the class."""
         if isinstance(use, str) or not use or not set(use) <= set(TOPIC_KINDS):
             raise RecordingError(f"use: expected a tuple of some of {', '.join(TOPIC_KINDS)}, found {use!r}")
         self.path = path
@@ -137,7 +136,7 @@ class RosRecording(Recording):
             raise no_pictures(background, self._names_of_cameras())
 
     def __len__(self) -> int:
-        """Number of messages on the topic that makes the frames."""
+        """Number of messages on the topic that defines the frames."""
         return self._driver.messages
 
     def __iter__(self) -> Iterator[RecordedFrame]:
@@ -153,7 +152,7 @@ class RosRecording(Recording):
                 pending.clear()
 
     def _measurements(self) -> Iterator[Measurement]:
-        """All that is used, in the order in which it was recorded."""
+        """All used measurements, in the order of recording."""
         infos = {source.info_topic for source in self._sources.values() if source.info_topic is not None}
         last: dict[str, float] = {}
         numbers = dict.fromkeys(self._sources, -1)
@@ -211,18 +210,12 @@ class RosRecording(Recording):
                 duration = span
             rate = mean_rate(source.messages, span)
             sensors.append(SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail))
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader=self.loader,
-            frames=len(self),
-            start_stamp=self._driver.first_stamp,
+        return self._described(
+            self.loader,
+            sensors,
+            start=self._driver.first_stamp,
             duration=duration,
-            rate_hz=mean_rate(len(self), duration),
-            root_frame=self.root_frame,
-            sensors=tuple(sensors),
             unused=tuple(self._unused),
-            reference=reference_words(self.reference, self.people),
             notes=(*self.assumed, *scene_words(self._background, self._background_files())),
         )
 
@@ -237,7 +230,7 @@ class RosRecording(Recording):
             )
 
     def _read_beside(self, place: Path, *, bare: bool) -> None:
-        """Reference and start from the files beside the bag; where damage is left out, ones that do not fit are only noted."""
+        """Read reference and start from the files beside the bag; if damage is left out, files that do not fit are only noted."""
         self.reference, self.start, self.people = None, None, None
         for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
             file = find_beside(place, name)
@@ -254,7 +247,7 @@ class RosRecording(Recording):
                 self.assumed = (*self.assumed, f"{file} is not used: {error}")
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
-        """Fill the tree and choose the root frame."""
+        """Fill the transform tree and choose the root frame."""
         self._read_recorders_transforms()
         names = [t.name for t in self._bag.topics if t.type in _TF_TYPES and t.messages]
         static = [name for name in names if name.endswith("tf_static")]
@@ -285,7 +278,7 @@ class RosRecording(Recording):
             self._left_out.add("transforms that cannot be read", error)
 
     def _read_recorders_transforms(self) -> None:
-        """Those of librealsense's recorder: where each stream is seen from what all are relative to."""
+        """Read the transforms of librealsense's recorder: the pose of each stream relative to the common reference."""
         for topic in self._bag.topics if self._bag.realsense else ():
             frames = realsense.transform_of(topic.name)
             if frames is not None and topic.messages:
@@ -336,7 +329,7 @@ class RosRecording(Recording):
         return self._tree.lookup(self.root_frame, frame, stamp)
 
     def _root_from_own(self, stamp: float) -> FloatArray:
-        """root_from_FRAME, the frame that is the root unless another one is asked for."""
+        """root_from_frame; None: the frame of the truth."""
         return self._tree.lookup(self.root_frame, self._own_root, stamp)
 
     def _root_from_start(self, frame: str | None) -> FloatArray:

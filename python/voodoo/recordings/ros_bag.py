@@ -1,4 +1,4 @@
-"""Access to the messages of ROS 1 and ROS 2 bags through rosbags, with every failure made a RecordingError."""
+"""Access to the messages of ROS 1 and ROS 2 bags through rosbags, with every failure converted to a RecordingError."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from voodoo.recordings.stored import check_stored
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 _MOST_UNPACKED = 2**40
-"""Bytes of a bag: a terabyte."""
+"""Largest size of a bag [bytes]."""
 _LITTLE, _MOST_GAIN = 2**28, 200
-"""An archive unpacks to a quarter of a gigabyte, and 200 times its own size on top: bags shrink to a tenth at best, still
-scenes to a fiftieth, what was made to fill disks to a thousandth."""
+"""An archive may unpack to a quarter of a gigabyte plus 200 times its own size. Bags compress to a tenth at best, static scenes
+to a fiftieth, and archives made to fill disks to a thousandth."""
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
 _MCAP_FOOTER = 0x02
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag: its message type as ROS 2 writes it and how many messages the bag's index announces."""
+    """A topic of a bag: its message type in the notation of ROS 2, and the number of messages in the index of the bag."""
 
     name: str
     type: str
@@ -43,20 +43,20 @@ class Topic:
 
 
 class Bag:
-    """A bag on disk; every read opens it afresh, so reads may overlap.
+    """A bag on disk; every read opens it again, so reads may overlap.
 
     Args:
         path: a .bag, .mcap or .db3 file, a ROS 2 bag directory, a directory holding one of these (also as `bag/`),
-            or a .zip holding one, which is unpacked into a temporary directory for the life of this object.
+            or a .zip holding one, which is unpacked into a temporary directory for the lifetime of this object.
 
-        left_out: counts what cannot be used, which is then left out; None: it is refused.
+        left_out: counts unusable messages, which are then left out; None: they are errors.
 
     Raises:
-        RecordingError: no bag there, or its index is damaged.
+        RecordingError: there is no bag, or its index is damaged.
     """
 
     def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
-        """Unpack if need be, and read the index."""
+        """Unpack the archive if needed, and read the index."""
         self.path = path
         self._left_out = left_out
         folder = path
@@ -88,7 +88,7 @@ class Bag:
 
     @contextmanager
     def _naming(self) -> Iterator[None]:
-        """Errors within name the archive that was given, not the folder it was unpacked to."""
+        """Errors inside name the given archive, not the folder it was unpacked to."""
         try:
             yield
         except RecordingError as error:
@@ -100,7 +100,7 @@ class Bag:
         """Messages of `topics` in the order they were recorded, as (topic, message); None for one that was left out.
 
         Raises:
-            RecordingError: damage, or fewer messages than the bag's index announces.
+            RecordingError: damage, or fewer messages than in the index of the bag.
         """
         counts = dict.fromkeys(topics, 0)
         with self._open() as reader:
@@ -116,14 +116,14 @@ class Bag:
                 self._left_out.add("that are not in the file", f"{self.path}: {found}", abs(announced[name] - count))
 
     def first(self, topic: str, *, good: Callable[[Message], object] | None = None) -> Message:
-        """The first message of `topic`; where damage is left out, the first one that is `good`.
+        """The first message of `topic`; if damage is left out, the first one accepted by `good`.
 
         Args:
             topic: its name.
             good: raises a RecordingError for a message that cannot be used.
 
         Raises:
-            RecordingError: damage, or no message although the index announces some.
+            RecordingError: damage, or no message although the index has some.
         """
         problem: RecordingError | None = None
         with self._open() as reader:
@@ -142,7 +142,7 @@ class Bag:
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
     def last(self, topic: str) -> Message:
-        """The last message of `topic`; looks at the end of the bag first."""
+        """The last message of `topic`; reads the end of the bag first."""
         found = None
         with self._open() as reader:
             for seconds in (1, 10, None):
@@ -154,11 +154,11 @@ class Bag:
         raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
     def frame_of(self, topic: str, message: Message) -> str:
-        """The frame of a message: its header's, but for librealsense's bags, whose frame ids number the images."""
+        """The frame of a message: that of its header, except in bags of librealsense, whose frame ids are image numbers."""
         return realsense.frame_name(topic) if self.realsense else frame_of(message)
 
     def _check_metadata(self) -> None:
-        """Compare metadata.yaml with the storage files: what only one of them knows would be left out in silence."""
+        """Compare metadata.yaml with the storage files: topics in only one of them would be left out silently."""
         stored: dict[tuple[str, str], int] = {}
         for part in sorted(self.file.iterdir()):
             if part.suffix in (".mcap", ".db3"):
@@ -219,7 +219,7 @@ class Bag:
 
 
 def _typestore() -> Typestore:
-    """Bags of older ROS 2 releases carry no message definitions; those used here are the same in all releases."""
+    """Bags of older ROS 2 releases have no message definitions; those used here are the same in all releases."""
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
@@ -231,7 +231,7 @@ def find_bag(folder: Path) -> Path:
     """The bag in a folder: itself with metadata.yaml, else `bag/`, else the only .bag, .mcap or .db3 file in it.
 
     Raises:
-        RecordingError: none, or several files and no metadata.yaml that says how they belong together.
+        RecordingError: none, or several files without a metadata.yaml that orders them.
     """
     for candidate in (folder, folder / "bag"):
         if (candidate / "metadata.yaml").is_file():
@@ -281,13 +281,13 @@ def _unpack(path: Path, folder: Path) -> None:
 
 
 def check_mcap(path: Path) -> None:
-    """Check that the records of an MCAP file follow each other up to its footer and that the summary is sound.
+    """Check that the records of an MCAP file are consecutive up to its footer and that the summary is valid.
 
-    A reader that skips records by their length would step over a damaged length in silence.
+    A reader that skips records by their length would silently skip a damaged length.
     See the MCAP specification, "Records" and "Footer".
 
     Raises:
-        RecordingError: naming the offset.
+        RecordingError: names the offset.
     """
     size = path.stat().st_size
     with reading(path, "a readable file"), path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""ROS messages (as rosbags deserializes them) turned into images, points, ranges and cameras."""
+"""Converts ROS messages (as deserialized by rosbags) to images, points, ranges and cameras."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.rvl import decode_rvl
 
 Message: TypeAlias = Any
-"""A message as rosbags gives it; its class is generated from the definition in the bag."""
+"""A message of rosbags; its class is generated from the definition in the bag."""
 
 DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
     "16UC1": np.dtype(np.uint16),
     "mono16": np.dtype(np.uint16),
     "32FC1": np.dtype(np.float32),
 }
-"""16-bit depth counts millimeters (REP-118), 32-bit float depth meters."""
+"""16-bit depth is in millimeters (REP-118), 32-bit float depth in meters."""
 COLOR_CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "8UC3": 3, "8UC4": 4, "mono8": 1, "8UC1": 1}
 
 # sensor_msgs/PointField: INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64
@@ -57,10 +57,10 @@ def base_topic(topic: str) -> str:
 def camera_of(info: Message, topic: str, source: str) -> Camera:
     """Camera of a CameraInfo message, for the images on `topic`.
 
-    image_rect and the like are rectified images: there P counts, not K and D.
+    For rectified images (image_rect and similar) P is used instead of K and D.
 
     Raises:
-        RecordingError: uncalibrated, numbers that make no camera, or binning or a region of interest, which are not
+        RecordingError: uncalibrated, invalid numbers, or binning or a region of interest, which are not
             supported.
     """
     names = ("K", "D", "P") if hasattr(info, "K") else ("k", "d", "p")
@@ -102,7 +102,7 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
     """(H, W) uint16 or float32 of a sensor_msgs/CompressedImage written by compressed_depth_image_transport.
 
     The PNG, or columns, rows and RVL data, follow a header of 12 bytes (a format number and two floats A, B); 32FC1
-    images are stored as quantized inverse depth q with depth = A / (q - B), q = 0 meaning none.
+    images are stored as quantized inverse depth q with depth = A / (q - B); q = 0 means no depth.
 
     Raises:
         RecordingError: damaged, or of another size than the camera's.
@@ -146,7 +146,7 @@ def color_image(message: Message, camera: Camera, source: str, *, compressed: bo
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image, or of a JPEG or PNG sensor_msgs/CompressedImage.
 
     Raises:
-        RecordingError: it does not decode, or has another encoding or size.
+        RecordingError: it cannot be decoded, or has another encoding or size.
     """
     with reading(source, "a readable picture"):
         if compressed:
@@ -158,7 +158,7 @@ def cloud_points(message: Message, source: str) -> FloatArray:
     """(N, 3) of a sensor_msgs/PointCloud2 with any field layout; rows that are not finite are dropped.
 
     Raises:
-        RecordingError: no x, y, z, an unknown field type, or sizes that do not fit together.
+        RecordingError: no x, y, z, an unknown field type, or inconsistent sizes.
     """
     fields = {field.name: field for field in message.fields}
     missing = [name for name in "xyz" if name not in fields]

@@ -1,4 +1,4 @@
-"""Which topics of a bag are measurements, and how they are calibrated."""
+"""Selects the topics of a bag that are measurements, and their calibrations."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _TYPES: dict[TopicKind, tuple[str, ...]] = {
 @dataclass(frozen=True)
 class TopicSource:
     """A topic that is read: kind, message type, number of messages, and from its first message the frame id, the
-    stamp [s] and a word on the format. `camera` and the topic it came from are set for images."""
+    stamp [s] and a description of the format. `camera` and the topic it came from are set for images."""
 
     topic: str
     kind: TopicKind
@@ -50,20 +50,20 @@ class TopicSource:
 
 
 class TopicFinder:
-    """Chooses topics by type, name and encoding, or as told.
+    """Selects topics by type, name and encoding, or as set by the user.
 
-    A kind for which several topics qualify needs a choice; color beside other kinds, on which nothing depends, is left out
-    instead when it is ambiguous or not calibrated, and noted in `unused`. Where there is nothing but pictures, those of all
-    calibrated cameras are used: in color, or gray ones where none is.
+    If several topics of a kind qualify, the user must choose one. Color images beside other kinds are optional: if they are
+    ambiguous or not calibrated, they are left out and noted in `unused`. If there are only images, those of all calibrated
+    cameras are used: color images, or gray ones if there are no color images.
 
     Args:
         bag: the bag.
-        choices: topics asked for, by kind.
-        camera_info_topic: calibration of the depth image, if it isn't beside it.
+        choices: topics set by the user, by kind.
+        camera_info_topic: calibration of the depth image, if it is not beside the image.
     """
 
     def __init__(self, bag: Bag, *, choices: dict[TopicKind, TopicChoice], camera_info_topic: str | None) -> None:
-        """Look at nothing yet."""
+        """Store the choices."""
         self.bag = bag
         self.unused: list[tuple[str, str]] = []
         self._choices = choices
@@ -72,7 +72,7 @@ class TopicFinder:
         self._first: dict[str, Message] = {}
 
     def find(self, use: Sequence[TopicKind]) -> list[TopicSource]:
-        """Sources of the kinds in `use`, the first one making the frames.
+        """Sources of the kinds in `use`; the first one defines the frames.
 
         Raises:
             RecordingError: nothing usable, an ambiguous choice, a missing calibration or a wrong encoding.
@@ -119,7 +119,7 @@ class TopicFinder:
             names = self._depth_candidates(names)
         elif kind == "color":
             names = self._color_candidates(names)
-        # image_transport publishes the same picture several times; the raw one is the base
+        # image_transport publishes the same image several times; the raw one is used
         bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
         if len(bases) > 1:
             raise RecordingError(
@@ -149,7 +149,7 @@ class TopicFinder:
         return usable
 
     def _cameras(self) -> list[TopicSource]:
-        """Pictures of all cameras there are, one topic a camera."""
+        """Image topics of all cameras, one per camera."""
         names = [topic.name for topic in self.bag.topics if topic.type in _TYPES["color"] and topic.messages]
         names = self._pictures(names, channels=3) or self._pictures(names, channels=1)
         bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
@@ -167,7 +167,7 @@ class TopicFinder:
         return list(found.values())
 
     def _pictures(self, names: list[str], *, channels: int) -> list[str]:
-        """Topics with pictures of at least so many channels."""
+        """Topics with images of at least a number of channels."""
         usable = []
         for name in names:
             message = self._message(name)
@@ -184,7 +184,7 @@ class TopicFinder:
         return named or usable
 
     def _same_as_depth(self, source: TopicSource, sources: list[TopicSource]) -> bool:
-        """Whether a cloud is a depth image once more: counted twice, it would weigh twice."""
+        """Whether a cloud has the same data as a depth image, which would then have twice its weight."""
         same = source.kind == "points" and any(s.kind == "depth" and s.frame == source.frame for s in sources)
         if same:
             self.unused.append((source.topic, "same frame as the depth image, hence the same points (points_topic=)"))
@@ -207,7 +207,7 @@ class TopicFinder:
         return TopicSource(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
 
     def _calibration(self, name: str, kind: TopicKind, frame: str) -> tuple[str, Camera]:
-        """CameraInfo beside the image (its name with the last part replaced), or as chosen for depth."""
+        """CameraInfo beside the image (its name with the last part replaced), or the one chosen for depth."""
         expected = f"{base_topic(name).rsplit('/', 1)[0]}/camera_info"
         if self.bag.realsense:
             expected = realsense.info_topic(name)
@@ -239,5 +239,5 @@ class TopicFinder:
 
 
 def _natural(name: str) -> list[tuple[int, str]]:
-    """cam_2 comes before cam_10."""
+    """Sort key: cam_2 comes before cam_10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

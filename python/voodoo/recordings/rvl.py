@@ -1,8 +1,8 @@
-"""Depth images compressed by RVL, as compressed_depth_image_transport writes them.
+"""Depth images compressed by RVL, as written by compressed_depth_image_transport.
 
-A. Wilson, "Fast Lossless Depth Image Compression", ISS 2017: runs of zeros and of pixels in turn; pixels are differences to
-the one before. Numbers are groups of three bits, the lowest first, each in four bits of which the highest says that more
-follow; eight of these make a word of 32 bits, the first in the highest bits.
+A. Wilson, "Fast Lossless Depth Image Compression", ISS 2017: alternating runs of zeros and of pixels, which are differences
+to the previous pixel. A number is a sequence of groups of three bits, the lowest first; each group has a fourth, highest bit
+that is set if more groups follow. Eight groups are one 32-bit word, with the first group in the highest bits.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 
 _MOST_GROUPS = 6
-"""Groups of a number: a difference of 16-bit pixels takes 17 bits; a run may take 25 bits, of which images use 24."""
+"""Largest number of groups: a difference of 16-bit pixels has 17 bits; a run has up to 25 bits, of which images use 24."""
 _HEAD = 8
 
 
@@ -21,8 +21,8 @@ def decode_rvl(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArra
     """Decode columns, rows (uint32 each) and RVL data to (H, W) uint16.
 
     Args:
-        data: what follows the 12-byte header of compressed depth.
-        source: what to name in errors.
+        data: the data after the 12-byte header of compressed depth.
+        source: name in errors.
         size: expected (width, height).
 
     Raises:
@@ -60,7 +60,7 @@ def decode_rvl(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArra
 
 
 def _numbers(data: bytes) -> npt.NDArray[np.int64]:
-    """The numbers in RVL data; what is left of the last word after them may give zeros more."""
+    """The numbers in RVL data; the unused rest of the last word may add zeros."""
     words = np.frombuffer(data[: len(data) // 4 * 4], "<u4")
     nibbles = (words[:, None] >> np.arange(28, -4, -4, dtype=np.uint32)) & 0xF
     groups = nibbles.ravel().astype(np.int64)
@@ -70,6 +70,6 @@ def _numbers(data: bytes) -> npt.NDArray[np.int64]:
     groups = groups[: ends[-1] + 1]
     starts = np.concatenate([[0], ends[:-1] + 1])
     order = np.arange(groups.size) - np.repeat(starts, ends - starts + 1)
-    # What no number has so many groups of is damage; its value is refused as too large a run.
+    # A number with too many groups is damage; its value is rejected as too long a run.
     values = (groups & 7) << (3 * np.minimum(order, 2 * _MOST_GROUPS))
     return np.asarray(np.add.reduceat(values, starts), dtype=np.int64)

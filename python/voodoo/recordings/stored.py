@@ -8,19 +8,19 @@ from pathlib import Path
 from voodoo.errors import RecordingError, reading
 
 MOST_BYTES = 2**28
-"""Of a picture, table or list: no camera and no motion laboratory writes a quarter of a gigabyte into one of them."""
+"""Largest size of an image, table or list [bytes]: a quarter of a gigabyte, more than any sensor writes into one file."""
 
 
 def check_stored(path: Path, expected: str, *, most: int = MOST_BYTES) -> None:
-    """Reject files that are not regular (a FIFO blocks forever, a device never ends) or too large.
+    """Reject files that are not regular (a FIFO blocks, a device has no end) or too large.
 
     Args:
         path: the file.
         expected: what it should be, e.g. "a readable picture".
-        most: bytes.
+        most: largest size [bytes].
 
     Raises:
-        RecordingError: it names the file.
+        RecordingError: names the file.
     """
     with reading(path, expected):
         found = path.stat()

@@ -1,4 +1,4 @@
-"""Groups images of several cameras to frames: one for each image of the first camera, with those of the others at its time."""
+"""Groups images of several cameras into frames: one per image of the first camera, with the simultaneous images of the others."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _AHEAD = 2
 
 
 def together(items: Iterable[Measurement], first: str) -> Iterator[RecordedFrame]:
-    """Frames of the first camera's pictures; those of the others within half an interval belong to them.
+    """Frames of the images of the first camera; images of the others within half an interval belong to them.
 
     Args:
         items: in the order in which they were recorded; stamps of each camera rise.
-        first: sensor whose pictures make the frames.
+        first: sensor whose images define the frames.
 
     Yields:
-        Frames with one picture of each camera at most, that of the first camera last. The interval is the shortest to the
-        pictures before and after. A picture that arrives later than the second next one of the first camera is left out.
+        Frames with at most one image of each camera, that of the first camera last. The interval is the shorter one to the
+        previous and the next image. An image that arrives after the second next one of the first camera is left out.
     """
     waiting: deque[Measurement] = deque()
     others: dict[str, deque[Measurement]] = {}
@@ -49,7 +49,7 @@ def together(items: Iterable[Measurement], first: str) -> Iterator[RecordedFrame
 
 
 def _nearest(queue: deque[Measurement], stamp: float, half: float) -> Measurement | None:
-    """Take what is older than half an interval after a time; the nearest of it, if it is not older than as much before."""
+    """Remove the images older than half an interval after a time; returns the nearest one, if it is within half an interval."""
     taken = []
     while queue and queue[0].stamp < stamp + half:
         taken.append(queue.popleft())

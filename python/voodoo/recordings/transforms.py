@@ -1,4 +1,4 @@
-"""Rigid transforms of a recording: tf messages chained into root_from_sensor."""
+"""Rigid transforms of a recording: chains tf messages to root_from_sensor."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from voodoo.model.rotations import turned_between
 from voodoo.recordings.ros_messages import Message
 
 WAVERS_M, WAVERS_RAD = 0.05, math.radians(2.0)
-"""A robot whose odometry stays within these limits is standing: they cover the drift of wheels and gyroscopes in a recording."""
+"""A robot whose odometry stays within these limits is standing: they cover the drift of odometry in a recording."""
 
 
 def matrix(translation: Message, rotation: Message, source: object) -> FloatArray:
@@ -76,12 +76,12 @@ class _Edge:
 
     def keep(self, since: float, until: float) -> None:
         low, high = bisect_left(self.stamps, since), bisect_right(self.stamps, until)
-        # The newest transform, even if too old, is kept, because errors name its age.
+        # The newest transform is kept even if it is too old, because errors name its age.
         low = min(low, max(len(self.stamps) - 1, 0))
         self.stamps, self.transforms = self.stamps[low:high], self.transforms[low:high]
 
     def moves(self) -> bool:
-        """Whether any transform is farther from the first one than odometry wavers."""
+        """Whether a transform differs from the first one by more than the drift of odometry."""
         if self.constant:
             return False
         all_of_them = np.array(self.transforms)
@@ -91,15 +91,15 @@ class _Edge:
 
 
 class TransformTree:
-    """Frames joined by transforms.
+    """Frames connected by transforms.
 
-    A transform that never changes holds at all times, whichever topic it came on. One that changes is interpolated between
-    the stamps before and after the one asked for, if these are at most `2 max_age` apart. Else, and after its last stamp, the
-    latest one before counts, if it is at most `max_age` seconds old; before its first stamp the first one is taken, if it comes
-    at most `max_age` later.
+    A constant transform is valid at all times, on whichever topic it was published. A changing one is interpolated between
+    the stamps before and after the requested one, if these are at most `2 max_age` apart. Otherwise, and after its last stamp,
+    the previous one is used if it is at most `max_age` seconds old; before its first stamp the first one is used if it is at
+    most `max_age` later.
 
     Args:
-        source: recording to name in errors.
+        source: name of the recording in errors.
         max_age: [s].
     """
 
@@ -135,13 +135,13 @@ class TransformTree:
         self._edges[parent, child].add(stamp, transform, static=static)
 
     def keep(self, since: float, until: float) -> None:
-        """Forget what changing transforms were before and after these stamps [s]: a live source has no end."""
+        """Discard changing transforms outside these stamps [s], to limit the memory of a live source."""
         for edge in self._edges.values():
             if not edge.constant:
                 edge.keep(since, until)
 
     def covers(self, root: str, frame: str, stamp: float) -> bool:
-        """Whether every changing transform between two frames is known up to a stamp [s]; False where there is no chain."""
+        """Whether every changing transform between two frames is known up to a stamp [s]; False if there is no chain."""
         try:
             edges = [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
         except RecordingError:
@@ -182,12 +182,12 @@ class TransformTree:
         return result[::-1]
 
     def constant(self, root: str, frame: str) -> bool:
-        """Whether root_from_frame is the same at all times."""
+        """Whether root_from_frame is constant."""
         path = self.path(root, frame)
         return all(self._edge(a, b)[0].constant for a, b in pairwise(path))
 
     def moves(self, root: str, frame: str) -> bool:
-        """Whether a frame moves in another one, by more than odometry wavers while a robot stands; False if not connected."""
+        """Whether a frame moves in another one by more than the drift of a standing robot; False if not connected."""
         if not {root, frame} <= self._neighbors.keys():
             return False
         try:
@@ -200,7 +200,7 @@ class TransformTree:
         """root_from_frame (4, 4) at `stamp`.
 
         Raises:
-            RecordingError: not connected, or no transform near that stamp.
+            RecordingError: not connected, or no transform near the stamp.
         """
         result = np.eye(4)
         path = self.path(root, frame)

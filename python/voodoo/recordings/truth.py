@@ -1,4 +1,4 @@
-"""truth.csv and init.json beside a rendered recording: exact joint positions and where the body starts."""
+"""Reads truth.csv and init.json beside a recording: exact joint positions and the initial pose."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from voodoo.recordings.recording import Reference, Start
 from voodoo.recordings.stored import read_stored_text
 
 OWN_ROOTS = ("base_link", "world")
-"""A recording's own root frame is the first of these that its transforms know; both files are in it."""
+"""The default root frame of a recording is the first of these in its transforms; both files are in it."""
 
 RootFromTruth: TypeAlias = Callable[[float], FloatArray]
 """(4, 4) from the frame of truth.csv to the root frame at a stamp [s]."""
 RootFromStart: TypeAlias = Callable[[str | None], FloatArray]
-"""(4, 4) from the frame that init.json names, or the one of truth.csv, to the root frame."""
+"""(4, 4) from the frame named in init.json, or that of truth.csv, to the root frame."""
 
 
 def find_beside(bag: Path, name: str) -> Path | None:
@@ -39,7 +39,7 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
     """Read a truth.csv: stamp_s, then NAME_x,NAME_y,NAME_z [m] in the recording's own root frame; empty cells are missing joints.
 
     Raises:
-        RecordingError: another header, a short row, a cell that is no number, stamps that do not rise.
+        RecordingError: another header, a short row, a cell that is not a number, stamps that do not increase.
     """
     names, table = read_positions(path, ("stamp_s",))
     stamps = table[:, 0]
@@ -53,10 +53,10 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
 
 
 def read_start(path: Path, root_from: RootFromStart) -> Start:
-    """Read an init.json: {"height_m": stature, "frame": name, "joints": {name: [x, y, z]}}; height and frame may lack.
+    """Read an init.json: {"height_m": stature, "frame": name, "joints": {name: [x, y, z]}}; height and frame are optional.
 
     Raises:
-        RecordingError: not JSON, not of that form, or a frame without a transform.
+        RecordingError: not JSON, another format, or a frame without a transform.
     """
     with reading(path, "a JSON file"):
         content = json.loads(read_stored_text(path, "a JSON file"))
@@ -69,7 +69,7 @@ def read_start(path: Path, root_from: RootFromStart) -> Start:
     joints = {}
     for name, value in content["joints"].items():
         numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)
-        # A whole number of JSON may be larger than any float.
+        # An integer in JSON may be larger than any float.
         if not numbers or not all(abs(v) <= sys.float_info.max for v in value):
             raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in meters, found {short(value)}")
         x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value, dtype=np.float64) + root_from_base[:3, 3])

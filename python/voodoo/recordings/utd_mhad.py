@@ -24,17 +24,16 @@ from voodoo.recordings.recording import (
     SensorInfo,
     Start,
     mean_rate,
-    reference_words,
 )
 
 CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=160.5, cy=119.0)
 """Kinect v1 at 320x240, for the un-mirrored image. The nominal center of the mirrored one is (160, 120), hence
-(159, 120) after u -> 319 - u; the skeleton lies on the silhouettes best with (158.5, 119), hence (160.5, 119)."""
+(159, 120) after u -> 319 - u; the skeleton fits the silhouettes best with (158.5, 119), hence (160.5, 119)."""
 
 FRAME = "kinect_depth_optical_frame"
 RATE_HZ = 30.0
 
-# Kinect's order. Its spine (half way up the trunk) has no counterpart here; its foot is the front of the foot.
+# Kinect's order. Its spine (the middle of the trunk) has no counterpart here; its foot is the front of the foot.
 _JOINTS: tuple[str | None, ...] = (
     "head_center", "vc7", None, "humanoid_root",
     "l_shoulder", "l_elbow", "l_wrist", "l_hand", "r_shoulder", "r_elbow", "r_wrist", "r_hand",
@@ -46,22 +45,22 @@ NAMES = tuple(name for name in _JOINTS if name is not None)
 class UtdMhadRecording(Recording):
     """One UTD-MHAD sequence, un-mirrored: left is the person's own left.
 
-    The root frame is the camera's optical frame (x right, y down, z forward). The data set shows the person as in a
-    mirror, so columns are reversed and the skeleton's X and Y change sign (it is Y up). The person is already cut out;
-    the band of floor at the feet and the chair of the sitting actions are kept.
+    The root frame is the camera's optical frame (x right, y down, z forward). The images of the data set are
+    mirrored, so columns are reversed and the skeleton's X and Y change sign (it is Y up). The person is already segmented;
+    the band of floor at the feet and the chair of the sitting actions remain.
 
     Stamps are k / 30 s: the paper says 30 Hz, but the data itself suggests that the true rate may be near 19 Hz,
-    so speeds are uncertain by that factor. The skeleton LEADS the depth by one or two frames; compare at the best
-    constant lag. It is another tracker's estimate: `reference.exact` is False. Kinect's joints stand for ours
+    so speeds are uncertain by that factor. The skeleton leads the depth by one or two frames; compare at the best
+    constant lag. It is another tracker's estimate: `reference.exact` is False. Kinect's joints correspond to ours
     approximately: head -> head_center, shoulder_center -> vc7, hip_center (above the hip line) -> humanoid_root,
     foot -> toe; its spine is left out.
 
     Args:
         path: the *_depth.mat file; the skeleton is expected in ../Skeleton/*_skeleton.mat (no reference without it).
-        bare: the skeleton is not read.
+        bare: do not read the skeleton.
 
     Raises:
-        RecordingError: damaged, or not of the data set's form.
+        RecordingError: damaged, or not in the format of the data set.
     """
 
     def __init__(self, path: Path, *, bare: bool = False) -> None:
@@ -94,17 +93,10 @@ class UtdMhadRecording(Recording):
         """Summarize."""
         duration = (len(self) - 1) / RATE_HZ
         rate = mean_rate(len(self), duration)
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="utd-mhad",
-            frames=len(self),
-            start_stamp=0.0,
+        return self._described(
+            "utd-mhad",
+            [SensorInfo("depth", "depth", FRAME, len(self), rate, "320x240 16UC1, person cut out")],
             duration=duration,
-            rate_hz=rate,
-            root_frame=FRAME,
-            sensors=(SensorInfo("depth", "depth", FRAME, len(self), rate, "320x240 16UC1, person cut out"),),
-            reference=reference_words(self.reference),
             notes=(
                 "stamps are nominal (30 Hz); the true rate may be near 19 Hz",
                 "the reference leads the depth by one or two frames",
@@ -136,7 +128,7 @@ def _read_skeleton(path: Path, frames: int) -> Reference:
 
 
 def _start(reference: Reference) -> Start:
-    """First frame of the reference without the toes, which a body without feet cannot be fitted to."""
+    """First frame of the reference without the toes, which a body without feet does not have."""
     joints = {}
     for name, position in zip(reference.names, reference.positions[0], strict=True):
         if not name.endswith("_toe") and np.isfinite(position).all():

@@ -31,38 +31,37 @@ from voodoo.recordings.recording import (
     SensorInfo,
     mean_rate,
     number_option,
-    reference_words,
 )
 from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_start, read_truth
 
 _ROOMS = ("videos", "images", ".")
-"""Folders that are searched for videos or image folders; the first one that has some is used."""
+"""Folders that are searched for videos or image folders; the first one with any is used."""
 _OTHERS = (FOLDER, "keypoints", "pose", "calibration", "Calibration", "pose-3d", "kinematics")
 
 
 class VideosRecording(Recording):
-    """A folder with the pictures of several calibrated cameras::
+    """A folder with the images of several calibrated cameras::
 
         Calib_*.toml                 cameras, see read_camera_toml; world Z up, meters; or in calibration/, or ../calibration/
-        videos/cam01.mp4             a video a camera; or videos/cam01/, images/cam01/, of PNG or JPEG files, or beside the file
-        background/cam01_0.png       optional: pictures of the empty scene
+        videos/cam01.mp4             one video per camera; or folders of PNG or JPEG files: videos/cam01/, images/cam01/, cam01/
+        background/cam01_0.png       optional: images of the empty scene
         init.json, truth.csv, *.trc  optional: first pose, truth, triangulated joints to compare with
 
-    Videos and cameras belong together by their names (`cam01` is `cam_01`), else, if there are as many, in the order of
-    names. There is one frame for each picture of the first camera; pictures of the others within half an interval belong to
-    it. All begin at the same time: stamps of a video are k / rate.
+    Videos and cameras are paired by name (`cam01` is `cam_01`), else, if their numbers are equal, in the order of names.
+    There is one frame for each image of the first camera; images of the others within half an interval belong to it.
+    All videos start at the same time: stamps of a video are k / rate.
 
     Args:
         path: the folder.
-        rate: pictures a second; None: what each video says, 30 for pictures that are numbered.
-        color_topic: names of the cameras to use (`voodoo track --topic color=NAME`); None: all that have pictures.
-        background: folder of pictures of the empty scene, instead of `background/` in the folder or the one above.
-        bare: read none of init.json, truth.csv and *.trc.
-        left_out: counts pictures that cannot be read, which are left out then; None: they are refused.
+        rate: images per second; None: the rate of each video, 30 for numbered images.
+        color_topic: names of the cameras to use (`voodoo track --topic color=NAME`); None: all with images.
+        background: folder of images of the empty scene, instead of `background/` in the folder or its parent.
+        bare: do not read init.json, truth.csv and *.trc.
+        left_out: counts unreadable images, which are then left out; None: they are errors.
 
     Raises:
-        RecordingError: a part is missing or not of that form; it says which.
+        RecordingError: a part is missing or has another format; names it.
     """
 
     complete = True
@@ -77,7 +76,7 @@ class VideosRecording(Recording):
         bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
-        """Read calibration and the heads of the videos; see the class."""
+        """Read calibration and the headers of the videos; see the class."""
         self.path, self.name, self.root_frame = path, path.resolve().name, FRAME
         self._left_out = left_out
         rate = None if rate is None else number_option(path, "rate", rate, "pictures per second > 0", most=1e4)
@@ -118,11 +117,11 @@ class VideosRecording(Recording):
             self._notes = ("the reference is triangulated from keypoints: another tracker's opinion",)
 
     def __len__(self) -> int:
-        """Number of pictures of the first camera."""
+        """Number of images of the first camera."""
         return len(self._cameras[0].stamps)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
-        """Pictures of all cameras; see Recording."""
+        """Images of all cameras; see Recording."""
         pictures = heapq.merge(*self._cameras, key=lambda item: item.stamp)
         return together(pictures, self._cameras[0].sensor)
 
@@ -146,27 +145,16 @@ class VideosRecording(Recording):
             words = f"{one.camera.width}x{one.camera.height} pictures"
             each = mean_rate(len(one.stamps), one.stamps[-1] - one.stamps[0])
             sensors.append(SensorInfo(one.sensor, "color", one.placed.name, len(one.stamps), each, words))
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="videos",
-            frames=len(self),
-            start_stamp=float(stamps[0]),
-            duration=duration,
-            rate_hz=mean_rate(len(self), duration),
-            root_frame=FRAME,
-            sensors=tuple(sensors),
-            reference=reference_words(self.reference),
-            notes=(*self.assumed, *self._notes, *scene_words(self._background, self._background_files())),
-        )
+        notes = (*self.assumed, *self._notes, *scene_words(self._background, self._background_files()))
+        return self._described("videos", sensors, start=float(stamps[0]), duration=duration, notes=notes)
 
 
 def picture_sources(path: Path, *, anywhere: bool = True) -> list[Path]:
-    """Videos, or folders of pictures, one a camera; in the order of their names.
+    """Videos or image folders, one per camera, sorted by name.
 
     Args:
-        path: where to look: in its videos/ or images/, or among what lies in it.
-        anywhere: folders beside videos/ and images/ count, too.
+        path: folder to search, with its videos/ and images/.
+        anywhere: also use folders beside videos/ and images/.
     """
     for room in _ROOMS:
         folder = path / room
@@ -188,7 +176,7 @@ def _matched(path: Path, placed: Sequence[PlacedCamera], sources: Sequence[Path]
     """Each video with its camera, in the order of the calibration file.
 
     Raises:
-        RecordingError: neither names nor numbers agree.
+        RecordingError: neither the names nor the numbers match.
     """
     by_name = {_plain(source.stem): source for source in sources}
     pairs = [(camera, by_name[_plain(camera.name)]) for camera in placed if _plain(camera.name) in by_name]
@@ -205,10 +193,10 @@ def _matched(path: Path, placed: Sequence[PlacedCamera], sources: Sequence[Path]
 def _chosen(
     path: Path, pairs: list[tuple[PlacedCamera, Path]], names: str | Sequence[str] | None
 ) -> list[tuple[PlacedCamera, Path]]:
-    """Those that were asked for, by the name of the camera or of its video.
+    """The requested ones, by the name of the camera or of its video.
 
     Raises:
-        RecordingError: one that there is not.
+        RecordingError: one does not exist.
     """
     if names is None:
         return pairs
@@ -226,7 +214,7 @@ def _chosen(
 
 
 def _plain(name: str) -> str:
-    """cam01 and CAM_01 are the same."""
+    """Normalize a name: cam01 and CAM_01 are the same."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 

@@ -1,1 +1,1 @@
-"""Synthetic depth images of the body, with exact truth."""
+"""Synthetic images and recordings of the body with exact ground truth."""

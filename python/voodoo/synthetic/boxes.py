@@ -1,4 +1,4 @@
-"""Rooms of boxes, seen by a camera anywhere: exact depth, ray by ray."""
+"""Renders rooms made of boxes with exact depth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def room_depth(camera: Camera, world_from_sensor: FloatArray, boxes: Sequence[Bo
     in_camera = np.concatenate([rays[..., :2], np.ones((*rays.shape[:2], 1))], axis=-1)
     directions = in_camera @ world_from_sensor[:3, :3].T
     origin = world_from_sensor[:3, 3]
-    # A ray along a side of a box would divide by zero.
+    # A ray parallel to a side of a box would divide by zero.
     directions = np.where(np.abs(directions) < 1e-9, 1e-9, directions)
     depth = np.where(directions[..., 2] < 0.0, -origin[2] / directions[..., 2], np.inf)
     for low, high in boxes:

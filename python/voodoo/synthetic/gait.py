@@ -1,4 +1,4 @@
-"""How made-up people walk: from stop to stop, legs and arms swinging with the distance covered."""
+"""Gait of synthetic persons: legs and arms swing with the distance walked between stops."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from voodoo.model.body import Body
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _STRIDE_M = 1.4
-"""Two steps."""
+"""Length of two steps."""
 _TURN_S = 0.4
 """Duration of a turn when the walking direction changes."""
 _STANDS_M = 0.05
@@ -26,7 +26,7 @@ _STANDS_M = 0.05
 
 @dataclass(frozen=True)
 class Stop:
-    """Where the person is at a time: seconds, meters on the floor, direction it faces [rad], 0 away from the camera."""
+    """Position of a person at a time: seconds, meters on the floor, facing direction [rad], 0 is away from the camera."""
 
     time: float
     x: float
@@ -34,17 +34,16 @@ class Stop:
     facing: float
 
 
-def path(points: Sequence[tuple[float, float, float]], *, standing: float = math.pi) -> tuple[Stop, ...]:
-    """Stops of a person who goes through points and looks ahead.
+def path(points: Sequence[tuple[float, float, float]]) -> tuple[Stop, ...]:
+    """Stops of a person who walks through points, facing ahead, and while standing faces a camera that looks along x.
 
     Args:
         points: time [s], x and y [m], in the order of time, at least two of them.
-        standing: where who stands looks [rad]; pi is back at a camera that looks along x.
     """
     facings = []
     for (_, x, y), (_, next_x, next_y) in pairwise(points):
         away = math.hypot(next_x - x, next_y - y)
-        facings.append(standing if away < _STANDS_M else math.atan2(next_y - y, next_x - x))
+        facings.append(math.pi if away < _STANDS_M else math.atan2(next_y - y, next_x - x))
     facings = [float(value) for value in np.unwrap(facings)]
     stops = [Stop(*points[0], facings[0])]
     for index, point in enumerate(points[1:-1], start=1):
@@ -58,7 +57,7 @@ def path(points: Sequence[tuple[float, float, float]], *, standing: float = math
 def pose_at(
     body: Body, stops: Sequence[Stop], time: float
 ) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray]]:
-    """Poses of the limbs and positions of the sites of a walking body at a time [s]; its joints are those of the human."""
+    """Poses of the limbs and positions of the sites of a walking body at a time [s]; it needs the joints of the human."""
     times = [stop.time for stop in stops]
     place = np.array([[stop.x, stop.y] for stop in stops])
     x, y = (float(np.interp(time, times, place[:, axis])) for axis in (0, 1))

@@ -1,4 +1,4 @@
-"""Bodies that are not quite the true one."""
+"""Bodies with wrong sizes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from voodoo.model.body import Body
 
 
 def grown(body: Body, *, thicker: float = 1.0, longer: float = 1.0, joints: bool = True) -> Body:
-    """The same body with thicker and longer limbs: what a tracker gets whose model is wrong.
+    """The body with thicker and longer limbs, to test a tracker with a wrong model.
 
     Args:
         body: the true one.
         thicker: factor of all semi-axes.
         longer: factor of all lengths.
-        joints: joints and sites move along with the limbs' ends; else only the surfaces grow.
+        joints: move joints and sites with the ends of limbs; else only the surfaces change.
 
     Raises:
-        BodyError: the result is no body.
+        BodyError: the result is not a valid body.
     """
     name, limbs, sites = body.core.parts()
     reach = longer if joints else 1.0

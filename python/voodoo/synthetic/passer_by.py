@@ -27,21 +27,21 @@ _ROOT = "humanoid_root"
 
 
 class WithPasserBy(Recording):
-    """A recording of one person with exact truth, in front of whom somebody walks by; `people` is the truth of both.
+    """A recording of one person with exact truth, and a second person who walks by in front; `people` is the truth of both.
 
-    The passer-by, person 2, covers depth and color of what is behind. How much of person 1 is in view is the share of their
-    joints that are not covered. Lasers and clouds are left out, as they would not see the passer-by.
+    The passer-by, person 2, occludes depth and color. The visible fraction of person 1 is the fraction of joints that are not
+    occluded. Lasers and clouds are left out, because they do not observe the passer-by.
 
     Args:
-        recording: with a reference that is exact, in a root frame whose z = 0 is the floor.
-        at: when the passer-by is right in front [s], from the first frame; None: in the middle of the recording.
-        nearer: by how much it is nearer to the first depth camera [m].
-        speed: of its walk [m/s].
+        recording: with an exact reference, in a root frame whose plane z = 0 is the floor.
+        at: time from the first frame at which the passer-by is directly in front [s]; None: the middle of the recording.
+        nearer: distance by which the passer-by is nearer to the first depth camera [m].
+        speed: walking speed [m/s].
         body: of the passer-by.
         seed: of the noise.
 
     Raises:
-        RecordingError: no exact truth, or no depth images.
+        RecordingError: without exact truth or depth images.
     """
 
     def __init__(
@@ -70,11 +70,11 @@ class WithPasserBy(Recording):
 
     @property
     def passes(self) -> tuple[float, float]:
-        """From when to when the passer-by is in the scene [s]."""
+        """Times at which the passer-by enters and leaves the scene [s]."""
         return self._walker.stops[0].time, self._walker.stops[-1].time
 
     def _truth(self, camera: DepthImage) -> PeopleTruth:
-        """Both of them, at the stamps of the reference."""
+        """The truth of both persons at the stamps of the reference."""
         reference = self.reference
         assert reference is not None
         stamps, names = reference.stamps, reference.names
@@ -104,7 +104,7 @@ class WithPasserBy(Recording):
         return len(self._recording)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
-        """The frames with the passer-by in their pictures."""
+        """The frames with the passer-by in the images."""
         chance = np.random.default_rng(self._seed)
         for recorded in self._recording:
             kept = [item for item in recorded.measurements if isinstance(item, (DepthImage, ColorImage))]
@@ -118,7 +118,7 @@ class WithPasserBy(Recording):
         observed = self._rendered(item.stamp, item.camera, item.root_from_sensor).depth
         own = self._noise.image(np.where(observed > 0.0, observed, np.inf), chance)
         units = np.rint(own * 0.001 / item.meters_per_unit).astype(item.image.dtype)
-        # Behind what stands nearer still the passer-by is not seen.
+        # Nearer objects occlude the passer-by.
         nearer = (own > 0) & ((item.image == 0) | (units < item.image))
         return replace(item, image=np.where(nearer, units, item.image))
 
@@ -131,14 +131,14 @@ class WithPasserBy(Recording):
         return picture
 
     def info(self) -> RecordingInfo:
-        """That of the recording."""
+        """The summary of the recording."""
         about = self._recording.info()
         sensors = tuple(sensor for sensor in about.sensors if sensor.kind in ("depth", "color"))
         return replace(about, sensors=sensors, notes=(*about.notes, "with a made-up passer-by"))
 
 
 def _walk(reference: Reference, camera: DepthImage, middle: float, how: tuple[float, float], body: Body) -> Walker:
-    """Across the view, right in front of the person at a time; so much nearer [m], at a speed [m/s]."""
+    """A walk across the view, directly in front of the person at a time; `how` is the distance [m] and speed [m/s]."""
     nearer, speed = how
     index = int(np.abs(reference.stamps - middle).argmin())
     place = reference.positions[index, reference.names.index(_ROOT), :2]
@@ -154,12 +154,12 @@ def _walk(reference: Reference, camera: DepthImage, middle: float, how: tuple[fl
 
 
 def _uncovered(joints: FloatArray, item: DepthImage, nearer: npt.NDArray[np.float32]) -> float:
-    """Share of the joints (J, 3) [m] that the passer-by's depths (H, W) [m] do not cover."""
+    """Fraction of the joints (J, 3) [m] that the passer-by's depths (H, W) [m] do not occlude."""
     known = joints[np.isfinite(joints).all(axis=1)]
     sensor_from_root = np.linalg.inv(item.root_from_sensor)
     places = known @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
     camera = item.camera
-    # NaN, where the camera does not see a place, is in no pixel.
+    # NaN, for positions outside the view, is in no pixel.
     columns, rows = np.rint(camera.project(places)).T
     inside = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
     there = nearer[rows[inside].astype(int), columns[inside].astype(int)]

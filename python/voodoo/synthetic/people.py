@@ -1,4 +1,4 @@
-"""Recordings in memory of several made-up people in a furnished room, with exact truth."""
+"""Synthetic recordings in memory of several persons in a furnished room, with exact truth."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ TRUTH_SITES = (
     *(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")),
 )  # fmt: skip
 _EDGE = (0.06, 0.04)
-"""A pixel at a step in depth of more than these, meters and share of the depth, may return a mixture."""
+"""Depth steps, in meters and as a fraction of the depth, above which a pixel may return a mixture."""
 WIDER = 2
-"""Who is partly out of the picture is counted in one so much wider, and as much coarser."""
+"""Factor of the field of view in which all pixels of a person are counted, at a resolution reduced by the same factor."""
 _SKIN: Color = (120, 150, 200)
 _ROOM: Color = (150, 155, 150)
 _BARE = ("head", "neck", "l_hand", "r_hand")
@@ -44,11 +44,11 @@ _BARE = ("head", "neck", "l_hand", "r_hand")
 
 @dataclass(frozen=True, kw_only=True)
 class Walker:
-    """A person of a made-up recording.
+    """A person of a synthetic recording.
 
     Args:
         body: the true body.
-        stops: where it is, in the order of time; it is in the scene from the first to the last of them.
+        stops: positions in the order of time; the person is in the scene from the first to the last of them.
         shirt, trousers: colors of the clothes.
     """
 
@@ -68,9 +68,9 @@ class Noise:
 
     Args:
         sigma_m, sigma_square: standard deviation `sigma_m + sigma_square z^2` [m] at z meters.
-        flying: share of the pixels at an edge that return something between both surfaces.
-        lost: share of pixels without return.
-        reach_m: nothing farther returns.
+        flying: fraction of the pixels at an edge that return a depth between both surfaces.
+        lost: fraction of pixels without a return.
+        reach_m: largest depth with a return.
     """
 
     sigma_m: float = 0.003
@@ -80,7 +80,7 @@ class Noise:
     reach_m: float = 6.0
 
     def image(self, depth: FloatArray, chance: np.random.Generator) -> npt.NDArray[np.uint16]:
-        """What is measured of exact depths (H, W) [m], in METERS_PER_UNIT."""
+        """Measured depths for exact depths (H, W) [m], in METERS_PER_UNIT."""
         observed = np.where(np.isfinite(depth), depth, 2.0 * self.reach_m)
         beside = np.roll(observed, 1, axis=1)
         edge = np.abs(observed - beside) > np.maximum(_EDGE[0], _EDGE[1] * observed)
@@ -101,7 +101,7 @@ class Scene:
         people: persons 1, 2, ... of the truth.
         seconds: duration.
         furniture: boxes that stand on the floor z = 0, walls among them.
-        root_from_sensor: pose (4, 4) of the camera's optical frame at a time [s]; of a robot that moves it changes.
+        root_from_sensor: pose (4, 4) of the camera's optical frame at a time [s]; it changes if the robot moves.
         root_frame: its name.
         noise: of the camera.
         rate_hz: of the images.
@@ -125,7 +125,7 @@ class MadeUpRecording(Recording):
     """A recording in memory: depth and color images of a scene, and `people`, the truth.
 
     Args:
-        scene: what is rendered, once.
+        scene: is rendered once.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -151,7 +151,7 @@ class MadeUpRecording(Recording):
         yield from zip(self._stamps.tolist(), self._poses, strict=True)
 
     def _render(self, time: float, pose: FloatArray, chance: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-        """Keep a frame's images; share in view (P,) and sites (P, J, 3) of everybody."""
+        """Store the images of a frame; returns visible fractions (P,) and sites (P, J, 3) of all persons."""
         scene, count = self.scene, len(self.scene.people)
         depth = room_depth(CAMERA, pose, scene.furniture)
         owner = np.full(depth.shape, -1)
@@ -180,7 +180,7 @@ class MadeUpRecording(Recording):
         return len(self._stamps)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
-        """The frames: a color image, if there are any, and a depth image of one camera."""
+        """The frames: a color image, if the scene has color, and a depth image."""
         for index, (stamp, pose) in enumerate(self._frames()):
             depth = DepthImage(DEPTH, stamp, self._depths[index], METERS_PER_UNIT, CAMERA, pose)
             if not self.scene.color:
@@ -194,7 +194,7 @@ class MadeUpRecording(Recording):
         return paint(self._labels[index], self.scene.people, (self.scene.seed, index))
 
     def info(self) -> RecordingInfo:
-        """What is in it."""
+        """The summary."""
         size, rate = f"{CAMERA.width}x{CAMERA.height}", self.scene.rate_hz
         kinds = [(DEPTH, "depth", "16UC1"), *([(COLOR, "color", "bgr8")] if self.scene.color else [])]
         sensors = tuple(
@@ -230,6 +230,6 @@ def labels_of(limbs: Sequence[str], number: int) -> npt.NDArray[np.uint8]:
 
 
 def wider(camera: Camera) -> Camera:
-    """A camera with WIDER times the view and as many pixels."""
+    """A camera with WIDER times the field of view and the same number of pixels."""
     width, height = camera.width, camera.height
     return Camera(width, height, camera.fx / WIDER, camera.fy / WIDER, (width - 1) / 2.0, (height - 1) / 2.0)

@@ -1,4 +1,4 @@
-"""What a depth camera should see of a posed body."""
+"""Renders the depth image of a posed body."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class RenderedDepth:
     """A predicted depth image.
 
     Attributes:
-        depth: (height, width) float32, along the optical axis [m]; 0 where no limb is seen.
-        limb: (height, width) int16, index into `limb_names` of the limb that is seen; -1 where none is.
+        depth: (height, width) float32, along the optical axis [m]; 0 without a limb.
+        limb: (height, width) int16, index into `limb_names` of the visible limb; -1 without one.
         limb_names: names of the body's limbs.
     """
 
@@ -29,7 +29,7 @@ class RenderedDepth:
     limb_names: tuple[str, ...]
 
     def __repr__(self) -> str:
-        """Size, pixels that show the body, and limbs seen."""
+        """Size, number of pixels of the body, and of visible limbs."""
         observed = self.limb[self.limb >= 0]
         height, width = self.depth.shape
         return f"RenderedDepth({width}x{height}, {observed.size} pixels of {len(np.unique(observed))} limbs)"
@@ -42,12 +42,12 @@ def render_depth(
     camera: Camera,
     world_from_sensor: npt.ArrayLike | None = None,
 ) -> RenderedDepth:
-    """The depth image that a camera should see of a body: for every pixel the nearest limb on its ray.
+    """Render the depth image of a body: for every pixel the nearest limb on its ray.
 
     Args:
         body: its shapes; `tracker.body` has the current sizes.
         world_from_limb: pose of every limb, rigid (4, 4), as in `Estimate.world_from_limb`.
-        camera: where pixels look; lens distortion is honored.
+        camera: calibration; lens distortion is taken into account.
         world_from_sensor: pose of the camera's optical frame, rigid (4, 4); identity by default.
 
     Raises:

@@ -1,7 +1,7 @@
-"""Depth sequences of our own body model: exact truth, known noise, every freedom moving at a chosen speed.
+"""Depth sequences of a moving body model with exact ground truth and known noise.
 
-What a tracker does on them is its own doing: model, start and calibration are perfect. `disturbed` adds what R07 section 5.2
-did to its images: uncorrelated noise, random rectangles, and frames that are corrupted, blank, repeated or late.
+Model, start and calibration are exact, so errors of a tracker on them are its own.
+All degrees of freedom move, at a chosen speed.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from voodoo.synthetic.render import render_depth
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 CAMERA = Camera(640, 480, 550.0, 550.0, 319.5, 239.5)
-"""A depth camera like that of the recordings of its time: 60 degrees wide."""
+"""A depth camera with a field of view of 60 degrees."""
 METERS_PER_UNIT = 0.001
 
 _WALL_M = 3.6
 _NOISE_AT_M = 2.4
 _RATE_HZ = 30.0
-# The camera stands 1 m above the floor and looks along the world's x axis at a person who looks back at it.
+# The camera is 1 m above the floor and looks along the world's x axis at a person who faces it.
 _WORLD_FROM_SENSOR = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]]
 )
@@ -38,7 +38,7 @@ _WORLD_FROM_STANDING = np.array(
 )
 
 # Angle (without side): center and amplitude, radians or meters, of the left side; the shoulder's and hip's second and third
-# angles are mirrored on the right. Arms stay off the body, so that nothing but the noise is ambiguous.
+# angles are mirrored on the right. Arms stay away from the trunk, so that the pose is not ambiguous.
 _MOTION: Mapping[str, tuple[float, float]] = {
     "root_x": (0.0, 0.10), "root_y": (0.0, 0.15), "root_z": (0.0, 0.04),
     "root_rx": (0.0, 0.10), "root_ry": (0.0, 0.12), "root_rz": (0.0, 0.45),
@@ -59,7 +59,7 @@ class VirtualFrame:
 
     Attributes:
         stamp: time [s].
-        image: (height, width) uint16 [mm], 0 where nothing returned.
+        image: (height, width) uint16 [mm], 0 without a return.
         joints: true site positions, name -> (3,) [m], world frame.
         angles: (n,) true root pose and joint angles, in the order of `VirtualSequence.angle_names`.
         world_from_limb: true poses, name -> (4, 4).
@@ -74,7 +74,7 @@ class VirtualFrame:
 
 @dataclass(frozen=True, kw_only=True)
 class VirtualSequence:
-    """A person of whom every freedom swings, each with its own frequency and phase, before a wall. Iterating renders it.
+    """A person in front of a wall, whose degrees of freedom swing with different frequencies and phases. Iterating renders it.
 
     Args:
         body: the true body; its joints' names are those of the default human.
@@ -82,7 +82,7 @@ class VirtualSequence:
         frames: how many, at 30 Hz.
         noise_m: standard deviation of the depth at 2.4 m [m]; it grows with the square of the depth.
         seed: of phases and noise.
-        camera: through which the person is seen, with its lens; nothing returns where that shows nothing.
+        camera: with its lens; pixels without a ray have no return.
     """
 
     body: Body
@@ -112,7 +112,7 @@ class VirtualSequence:
 
     @property
     def angle_names(self) -> tuple[str, ...]:
-        """Names of the freedoms: the root's six and the joint angles."""
+        """Names of the degrees of freedom: six of the root, and the joint angles."""
         return Chain(self.body).angle_names
 
     def __len__(self) -> int:
@@ -151,7 +151,7 @@ class VirtualSequence:
             yield VirtualFrame(time, image, sites, self.angles(time), poses)
 
     def measurement(self, frame: VirtualFrame) -> _core.Frame:
-        """The frame as a tracker takes it."""
+        """A tracker's frame with the depth image."""
         found = _core.Frame(frame.stamp)
         found.add_depth(
             frame.image, camera=self.camera, meters_per_unit=METERS_PER_UNIT, world_from_sensor=_WORLD_FROM_SENSOR

@@ -1,4 +1,4 @@
-"""Made-up recordings by seed: people who come back, cross, pass by, walk about in four, and a robot that moves past one."""
+"""Synthetic recordings by seed: persons who return, cross, pass by, four persons, and a person before a moving robot."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Points: TypeAlias = Sequence[tuple[float, float, float]]
 
 CAMERA_HEIGHT_M = 1.1
 AWAY_S = 5.0
-"""How long a person is out of view in `returning`."""
+"""Time that a person is out of view in `returning`."""
 MOVES_M, TURNS_RAD = 1.5, math.radians(30.0)
-"""How far the camera of `robot` moves and turns."""
+"""Translation and rotation of the camera in `robot`."""
 _CLOTHES: tuple[tuple[Color, Color], ...] = (
     ((40, 40, 190), (60, 50, 40)),
     ((170, 90, 40), (70, 70, 75)),
@@ -33,17 +33,17 @@ _CLOTHES: tuple[tuple[Color, Color], ...] = (
 
 
 def returning(seed: int) -> MadeUpRecording:
-    """Somebody comes, stands, is gone for AWAY_S seconds and comes back; meanwhile somebody else may come, and stays.
+    """A person enters, stands, leaves for AWAY_S seconds and returns; meanwhile another person may enter and stay.
 
-    Persons are of another stature, girth and clothes. Every other seed has one person only; sides, places and furniture are the
-    seed's.
+    The persons differ in stature, girth and clothes. Every other seed has only one person; sides, positions and furniture depend
+    on the seed.
     """
     chance = np.random.default_rng((seed, 1))
     side, back = (float(chance.choice((-1.0, 1.0))) for _ in range(2))
     depth, x = float(chance.uniform(2.6, 3.2)), float(chance.uniform(-0.4, 0.4))
     out = _outside(depth)
     first = [(1.0, depth, side * out), (1.0 + 2.0, depth, x), (4.5, depth, x), (6.5, depth, back * out)]
-    # Between the last point in view and the first one again lie AWAY_S seconds.
+    # AWAY_S seconds pass between the last point in view and the next one.
     again = 6.5 + AWAY_S - 0.5
     first += [(again, depth, back * out), (again + 2.0, depth, x), (again + 3.5, depth, x)]
     people = [_walker(first, 0, chance)]
@@ -57,7 +57,7 @@ def returning(seed: int) -> MadeUpRecording:
 
 
 def crossing(seed: int) -> MadeUpRecording:
-    """Two people come from both sides, cross, turn, and cross again."""
+    """Two persons enter from both sides, cross, turn, and cross again."""
     chance = np.random.default_rng((seed, 2))
     near, far = float(chance.uniform(2.2, 2.6)), float(chance.uniform(3.0, 3.5))
     paths = []
@@ -72,7 +72,7 @@ def crossing(seed: int) -> MadeUpRecording:
 
 
 def passing(seed: int) -> MadeUpRecording:
-    """Somebody stands; somebody else passes by, 0.8 m nearer to the camera, and back again."""
+    """A person stands; another one passes by, 0.8 m nearer to the camera, and returns."""
     chance = np.random.default_rng((seed, 3))
     depth, x = float(chance.uniform(2.7, 3.2)), float(chance.uniform(-0.3, 0.3))
     side = float(chance.choice((-1.0, 1.0)))
@@ -84,7 +84,7 @@ def passing(seed: int) -> MadeUpRecording:
 
 
 def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
-    """Four people come one after the other and walk about, to and fro, at four depths."""
+    """Four persons enter one after the other and walk to and fro at four depths."""
     chance = np.random.default_rng((seed, 4))
     people = []
     for number, depth in enumerate(chance.permutation((1.9, 2.5, 3.1, 3.7))):
@@ -101,9 +101,9 @@ def four(seed: int, *, seconds: float = 12.0) -> MadeUpRecording:
 
 
 def robot(seed: int, *, moving: bool = True) -> MadeUpRecording:
-    """Somebody walks before a robot that drives MOVES_M forwards and aside and turns by TURNS_RAD; root frame `odom`.
+    """A person walks in front of a robot that moves by MOVES_M forward and sideways and turns by TURNS_RAD; root frame `odom`.
 
-    With `moving` False the same walk is seen by the same robot standing still.
+    With `moving` False the robot stands still during the same walk.
     """
     chance = np.random.default_rng((seed, 5))
     side = float(chance.choice((-1.0, 1.0)))
@@ -136,19 +136,19 @@ def robot(seed: int, *, moving: bool = True) -> MadeUpRecording:
 
 
 def base_from_camera() -> FloatArray:
-    """Pose (4, 4) of the optical frame on the robot: CAMERA_HEIGHT_M above the floor, looking ahead."""
+    """Pose (4, 4) of the optical frame on the robot: CAMERA_HEIGHT_M above the floor, facing forward."""
     return np.array(
         [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, CAMERA_HEIGHT_M], [0.0, 0.0, 0.0, 1.0]]
     )
 
 
 def _outside(depth: float) -> float:
-    """How far aside [m] somebody at a depth is well out of the picture."""
+    """Lateral position [m] at a depth that is well outside the image."""
     return float(depth * math.tan(math.radians(30.0)) + 0.7)
 
 
 def _walker(points: Points, number: int, chance: np.random.Generator) -> Walker:
-    """A person of a stature and girth of their own; those with other numbers differ."""
+    """A person whose stature and girth depend on the number."""
     stature = (1.62, 1.82, 1.72, 1.90)[number % 4] + float(chance.uniform(-0.03, 0.03))
     body = grown(Body.human(stature), thicker=(1.0, 1.12, 1.06, 0.97)[number % 4])
     shirt, trousers = _CLOTHES[(number + int(chance.integers(2)) * 4) % len(_CLOTHES)]
@@ -182,8 +182,8 @@ def _recorded(
 
 
 def _furniture(chance: np.random.Generator) -> tuple[Box, ...]:
-    """A wall, a cupboard as high as a person, a table and a chair."""
-    # Persons stay within 4.2 m: the furniture begins behind that.
+    """A wall, a cupboard of the height of a person, a table and a chair."""
+    # Persons stay within 4.2 m; the furniture is behind that.
     wall = float(chance.uniform(5.4, 5.9))
     side = float(chance.choice((-1.0, 1.0)))
 

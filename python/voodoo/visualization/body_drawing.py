@@ -1,4 +1,4 @@
-"""The body drawn into a picture: shaded limbs, joints and sites."""
+"""Draws the body into an image: shaded limbs, joints and sites."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Pi
 _OPACITY = 0.62
 _FACETS = 64
 _DEVIATIONS = 2.0
-"""Ellipses reach so many standard deviations."""
+"""Semi-axes of the ellipses in standard deviations."""
 _STEP_M = 1e-4
 
 
 def draw_body(picture: Picture, body: Body, estimate: Estimate, view: View, *, color: Color | None = None) -> None:
-    """Draw limbs as shaded, half transparent solids with outlines, far ones first, then joints and sites, and about them the
-    ellipses within which they are to two standard deviations.
+    """Draw limbs as shaded, semitransparent solids with silhouettes, the farthest first, then joints and sites with their
+    ellipses of two standard deviations.
 
-    Nothing is drawn while nobody is tracked.
+    Nothing is drawn while no person is tracked.
 
     Args:
-        picture: drawn into.
-        body: with its sizes.
+        picture: image to draw into.
+        body: body with its current sizes.
         estimate: the pose.
-        view: where places are in the picture.
-        color: of everything; None: by side, see `side_color`.
+        view: projection into the image.
+        color: color of all parts; None: by side, see `side_color`.
     """
     if not estimate.joints:
         return
@@ -62,7 +62,7 @@ def _draw_solid(
     view: View,
     color: tuple[int, int, int],
 ) -> None:
-    """Fill the facets of a limb that face the viewer, brighter the more they do."""
+    """Fill the facets of a limb that face the viewer; the brightness grows with the cosine of the angle to the view."""
     rings = transform(root_from_limb, limb_rings(shape, samples=_FACETS))
     pixels, depths = view.project(rings.reshape(-1, 3))
     points = np.column_stack([pixels, depths]).reshape(2, _FACETS, 3)
@@ -75,30 +75,30 @@ def _draw_solid(
     normals = corners.mean(axis=0) - middle
     normals -= np.outer(normals @ (axis[1] - axis[0]), axis[1] - axis[0]) / max(shape.length**2, 1e-12)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    # A light at the viewer: how far a normal points to the viewer is how far a small step along it reduces the depth.
+    # The light is at the viewer: the cosine is the decrease of the depth for a small step along the normal.
     step = 1e-3
     towards = (view.project(middle[None])[1] - view.project(middle + step * normals)[1]) / step
     lights = 0.35 + 0.65 * np.clip(towards, 0.0, 1.0)
     for facets, shades in ((sides, lights), (caps, np.full(2, 0.8))):
-        # The others are seen from behind.
+        # The other facets are back faces.
         for facet, light in zip(fixed(facets[_ahead(facets)]), shades[_ahead(facets)].tolist(), strict=True):
             cv2.fillConvexPoly(layer, facet, tuple(light * channel for channel in color), cv2.LINE_8, SUBPIXEL)
 
 
 def _ahead(facets: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which polygons (K, N, 2) in pixels run clockwise, and so face the viewer."""
+    """Which polygons (K, N, 2) in pixels are clockwise, and hence face the viewer."""
     x, y = facets[..., 0], facets[..., 1]
     return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) > 0.0)
 
 
 def _draw_spread(picture: Picture, estimate: Estimate, view: View, color: Color | None) -> None:
-    """Draw where every joint and site may be: ellipses of two standard deviations, where they are known."""
+    """Draw the uncertainty of every joint and site as an ellipse of two standard deviations, if it is known."""
     covariances = estimate.joint_covariances
     if len(covariances) != len(estimate.joints) or not np.isfinite(covariances).all():
         return
     places = np.array(list(estimate.joints.values()), dtype=np.float64)
     pixels, depths = view.project(places)
-    # How pixels move with a place.
+    # Jacobian of the pixel by the position.
     moved = np.stack([view.project(places + _STEP_M * axis)[0] for axis in np.eye(3)], axis=2)
     jacobians = (moved - pixels[:, :, None]) / _STEP_M
     layer = picture.copy()

@@ -1,4 +1,4 @@
-"""The body as meshes, colors and bands for a 3-D viewer."""
+"""Meshes, colors and elastic bands of the body for a 3-D viewer."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def limb_mesh(
     low = ring * (shape.a0, shape.b0, 0.0)
     high = ring * (shape.a1, shape.b1, 0.0) + (0.0, 0.0, shape.length)
     middles = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, shape.length]])
-    # The rims twice: once with the normals of the side, once with those of the caps.
+    # The rims are doubled: with the normals of the side, and with those of the caps.
     outward = np.vstack([ring * (shape.b0, shape.a0, 0.0), ring * (shape.b1, shape.a1, 0.0)])
-    side = outward + 1e-9 * np.vstack([ring, ring])  # a pointed end has a direction all the same
+    side = outward + 1e-9 * np.vstack([ring, ring])  # so that the normals of a pointed end are defined
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     down, up = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 1.0])
     vertices = np.vstack([low, high, low, high, middles])
@@ -47,7 +47,7 @@ def limb_mesh(
 
 
 def limb_colors(body: Body) -> dict[str, tuple[int, int, int]]:
-    """A color for each limb: hues evenly spread."""
+    """A color for each limb, with evenly spaced hues."""
     count = len(body.limbs)
     colors = {}
     for index, limb in enumerate(body.limbs):

@@ -22,14 +22,14 @@ _RAY_HALF_M = 0.20
 class OverlayCanvas:
     """See `voodoo.sensors.adapters.Canvas`.
 
-    What lies in space is drawn at once; what belongs to the picture (rings, regions) waits for `finish`, so that rays do not
-    hide it.
+    Objects in space are drawn immediately; image features (rings, regions) are drawn by `finish`, so that rays do not cover
+    them.
 
     Args:
-        picture: is drawn on.
-        view: projects the root frame into it.
-        camera: the measurement whose picture this is; None: a view from above.
-        scale: enlargement of the picture over the camera's image.
+        picture: image to draw into.
+        view: projection of the root frame into the image.
+        camera: the measurement of this image; None: a view from above.
+        scale: scale factor from the camera's image to the drawn image.
     """
 
     picture: Picture
@@ -70,7 +70,7 @@ class OverlayCanvas:
             self._regions[item.sensor] = (mask, places, {name: np.array(pixel) for name, pixel in names.items()}, color)
 
     def rays(self, rays: Sequence[SiteRay], estimate: Estimate) -> None:
-        """Draw the part of each ray that passes its site, 20 cm to either side, with a cross where it is nearest."""
+        """Draw 40 cm of each ray around the point nearest to its site, with a cross at that point."""
         for ray in rays:
             reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
             along = ray.origin + np.outer((reach - _RAY_HALF_M, reach, reach + _RAY_HALF_M), ray.direction)
@@ -83,7 +83,7 @@ class OverlayCanvas:
             cv2.drawMarker(self.picture, (center[0], center[1]), RAY, cv2.MARKER_TILTED_CROSS, 11, 1, cv2.LINE_AA)
 
     def finish(self) -> None:
-        """Draw what belongs to the picture itself."""
+        """Draw the image features."""
         for pixels, strengths, color in self._rings:
             for pixel, confidence in zip(pixels, strengths, strict=True):
                 strength = 0.3 + 0.7 * min(float(confidence), 1.0)
@@ -108,5 +108,5 @@ class OverlayCanvas:
 
 
 def same_place(item: Pictured, other: Pictured) -> bool:
-    """Whether two measurements are of the same camera, or of two alike at one place."""
+    """Whether two measurements have the same camera model and pose."""
     return item.camera == other.camera and np.allclose(item.root_from_sensor, other.root_from_sensor)

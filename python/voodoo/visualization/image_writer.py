@@ -1,4 +1,4 @@
-"""Where overlay pictures go: a folder of PNG files or an .mp4."""
+"""Writes overlay images to a folder of PNG files or a video."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from voodoo.visualization.ink import Picture
 
 
 class PictureWriter:
-    """Writes pictures of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
+    """Writes images of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
 
     Args:
-        path: ends in .mp4 for a film; otherwise a folder, made when it is missing.
-        rate_hz: frames a second of the film.
+        path: ends in .mp4 for a video; otherwise a folder, which is created if missing.
+        rate_hz: frame rate of the video.
 
     Raises:
-        VoodooError: another suffix that names a film or picture, a name that is not UTF-8, or a file that cannot be written.
+        VoodooError: a suffix of another video or image format, a name that is not UTF-8, or a file that cannot be written.
     """
 
     def __init__(self, path: Path, *, rate_hz: float) -> None:
-        """Refuse names that cannot be meant, make the folder."""
+        """Check the name and create the folder."""
         if path.suffix.lower() in (".avi", ".mkv", ".mov", ".webm", ".gif", ".png", ".jpg"):
             raise VoodooError(f"{path}: expected a folder or a name that ends in .mp4, found {path.suffix!r}")
         utf8_name(path)
@@ -38,7 +38,7 @@ class PictureWriter:
         folder.mkdir(parents=True, exist_ok=True)
 
     def write(self, picture: Picture) -> None:
-        """Add a picture.
+        """Add an image.
 
         Raises:
             VoodooError: it could not be written.
@@ -53,13 +53,13 @@ class PictureWriter:
         self._count += 1
 
     def __enter__(self) -> PictureWriter:
-        """Nothing is opened before the first picture."""
+        """Enter the context; files are opened with the first image."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the film and, when all went well, check that it can be read back."""
+        """Close the video and, without an error, check that it can be read."""
         if self._film is not None:
             self._film.release()
             if error is None:
@@ -84,7 +84,7 @@ class PictureWriter:
 
 
 def save_picture(path: Path, picture: Picture) -> None:
-    """Write one picture in the format its name says.
+    """Write one image in the format of its suffix.
 
     Raises:
         VoodooError: it could not be written.

@@ -18,7 +18,7 @@ LEFT, RIGHT, MIDDLE = (235, 170, 60), (60, 140, 250), (190, 205, 190)
 """Blue, orange, gray."""
 RAY = (120, 255, 60)
 SUBPIXEL = 4
-"""Bits of a pixel's fraction in OpenCV's fixed-point numbers."""
+"""Fractional bits of OpenCV's fixed-point pixel coordinates."""
 
 
 def fixed(pixels: npt.NDArray[np.floating]) -> npt.NDArray[np.int32]:
@@ -33,7 +33,7 @@ def point(pixel: npt.NDArray[np.floating]) -> tuple[int, int]:
 
 
 def side_color(name: str) -> Color:
-    """Blue for the person's left, orange for the right, gray for the middle."""
+    """Color by side: blue for the person's left, orange for the right, gray for the middle."""
     return LEFT if name.startswith("l_") else RIGHT if name.startswith("r_") else MIDDLE
 
 
@@ -44,5 +44,5 @@ _PERSONS: tuple[Color, ...] = (
 
 
 def person_color(person: int) -> Color:
-    """The color of a person, from 1; the same in all pictures."""
+    """The color of a person by number, from 1; the same in all images."""
     return _PERSONS[(person - 1) % len(_PERSONS)]

@@ -29,20 +29,20 @@ from voodoo.visualization.sheet import contact_sheet, in_rows
 __all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
 
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
-_LOOK_AHEAD, _MOST_PANELS = 5, 4
+_AHEAD_FRAMES, _MOST_PANELS = 5, 4
 _TARGET_HEIGHT, _TARGET_HEIGHT_OF_FOUR = 640, 480
 _TOP_SIZE, _TOP_METERS = 720, 6.0
 
 
 class Overlay:
-    """Draws the frames of one recording, all of them with the same colors for the same depth.
+    """Draws the frames of one recording, with the same mapping of depth to color in all frames.
 
     Args:
-        recording: gives the number of frames and the root frame.
+        recording: provides the number of frames and the root frame.
     """
 
     def __init__(self, recording: Recording) -> None:
-        """Look at the first frames for the cameras: every picture of a film has the same size."""
+        """Find the cameras in the first frames, because every image of a video has the same size."""
         self._frames = len(recording)
         self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
         self._range: tuple[float, float] | None = None
@@ -50,13 +50,13 @@ class Overlay:
         # Center of the view from above until a person is found.
         self._center = (0.0, 0.0, 0.0)
         found: dict[str, Pictured] = {}
-        for recorded in islice(paired(recording), _LOOK_AHEAD):
+        for recorded in islice(paired(recording), _AHEAD_FRAMES):
             for item in _pictured(recorded):
                 own = adapter_of(item).panel_of_its_own
                 if item.sensor not in found and (own or not any(same_place(item, other) for other in found.values())):
                     found[item.sensor] = item
         self._panels = dict(sorted(found.items(), key=lambda pair: adapter_of(pair[1]).panel or 0)[:_MOST_PANELS])
-        # Four in a row would be a ribbon, unless they are upright.
+        # Four landscape images are arranged two by two.
         four = len(self._panels) == 4 and all(i.camera.width > i.camera.height for i in self._panels.values())
         self._columns = 2 if four else max(len(self._panels), 1)
         self._height = _TARGET_HEIGHT_OF_FOUR if four else _TARGET_HEIGHT
@@ -70,14 +70,14 @@ class Overlay:
         index: int,
         front_end: FrontEnd | None = None,
     ) -> Picture:
-        """Draw one frame over the picture of each camera, side by side or two by two, else as seen from above.
+        """Draw one frame over the image of each camera, side by side or two by two; without images, as a view from above.
 
         Args:
             recorded: the measurements.
             body: with the sizes it had in this frame.
             estimate: the pose.
             index: number of the frame, from 0, for the caption.
-            front_end: gives the rays and skin regions of the frame.
+            front_end: provides the rays and skin regions of the frame.
         """
         pictures = [_drawn(canvas, recorded, body, estimate, front_end) for canvas in self._canvases(recorded)]
         if not pictures:
@@ -96,9 +96,9 @@ class Overlay:
         """Draw all persons in a frame, each with a separate color and number.
 
         Args:
-            recorded: the measurements; needs the picture of a camera.
-            estimate: who is there.
-            bodies: of all of them, with the sizes they had in this frame.
+            recorded: the measurements; a camera image is needed.
+            estimate: the persons.
+            bodies: of all persons, with their sizes in this frame.
             index: number of the frame, from 0, for the caption.
         """
         pictures = []
@@ -112,7 +112,7 @@ class Overlay:
         return picture
 
     def _canvases(self, recorded: RecordedFrame) -> Iterator[OverlayCanvas]:
-        """The picture of each camera."""
+        """The canvas of each camera."""
         current = {item.sensor: item for item in _pictured(recorded)}
         for sensor, first in self._panels.items():
             scale = _scale(first, self._height)
@@ -123,19 +123,19 @@ class Overlay:
             yield OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
 
     def _when(self, index: int, stamp: float) -> str:
-        """Number and time of a frame, from the first one on."""
+        """Number of a frame, and its time since the first one."""
         self._origin = stamp if self._origin is None else self._origin
         return f"{index + 1}/{self._frames}   {stamp - self._origin:.2f} s"
 
     def _background(self, item: Pictured | None, first: Pictured) -> Picture:
-        """What the camera saw; dark paper when it saw nothing new, or only its keypoints are known."""
+        """The image of the camera; a dark background if there is no new one, or only keypoints."""
         observed = None if item is None else adapter_of(item).picture(item)
         if observed is None:
             return np.full((first.camera.height, first.camera.width, 3), PAPER, dtype=np.uint8)
         return np.array(observed) if observed.ndim == 3 else self._depth_picture(observed)
 
     def _depth_picture(self, meters: npt.NDArray[np.float32]) -> Picture:
-        """Depth as color: near is bright; nothing measured is dark."""
+        """Depth as color: near is bright; pixels without a return are dark."""
         observed = np.isfinite(meters) & (meters > 0.0)
         if self._range is None and observed.any():
             near, far = np.percentile(meters[observed], [1.0, 97.0])
@@ -176,24 +176,24 @@ def caption(picture: Picture, text: str, estimate: Estimate) -> None:
 
 
 def write_parts(picture: Picture, parts: Sequence[tuple[str, Color]]) -> None:
-    """Write words of several colors into the top left corner."""
+    """Write text in several colors into the top left corner."""
     size = picture.shape[0] / 1100.0
     x, y = round(22 * size), round(42 * size)
     for part, color in parts:
-        for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):  # a dark rim keeps it legible over bright depth
+        for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):  # a dark rim keeps the text legible over bright depth
             cv2.putText(picture, part, (x + dx, y + dy), cv2.FONT_HERSHEY_DUPLEX, size, PAPER, 1, cv2.LINE_AA)
         cv2.putText(picture, part, (x, y), cv2.FONT_HERSHEY_DUPLEX, size, color, 1, cv2.LINE_AA)
         x += cv2.getTextSize(part, cv2.FONT_HERSHEY_DUPLEX, size, 1)[0][0] + round(28 * size)
 
 
 def _scale(item: Pictured, target: int) -> float:
-    """Small pictures are enlarged by a whole number, large ones reduced to the same height."""
+    """Scale factor: small images are enlarged by an integer, large ones are reduced to the target height."""
     height = item.camera.height
     return float(-(-target // height)) if height <= target else target / height
 
 
 def _grid(view: TopView) -> Picture:
-    """Dark paper with a line every meter."""
+    """Dark background with a grid of one meter."""
     picture = np.full((view.size, view.size, 3), PAPER, dtype=np.uint8)
     half = view.size * view.meters_per_pixel / 2.0
     center = np.array(view.center)

@@ -14,17 +14,17 @@ from voodoo.visualization.body_drawing import draw_body
 from voodoo.visualization.ink import PAPER, FloatArray, Picture, person_color
 
 _ABOVE_M = 0.2
-"""The number is written so far above the head [m]."""
+"""Height of the number above the head [m]."""
 
 
 def draw_people(picture: Picture, estimate: PeopleEstimate, bodies: Mapping[int, Body], view: View) -> None:
     """Draw all persons with a pose, the farthest first.
 
     Args:
-        picture: drawn into.
-        estimate: who is there.
-        bodies: of them, with their sizes.
-        view: where places are in the picture.
+        picture: image to draw into.
+        estimate: the persons.
+        bodies: their bodies, with current sizes.
+        view: projection into the image.
     """
     posed = [person for person in estimate if person.estimate.joints]
     away = {person.id: float(view.project(_middle(person)[None])[1][0]) for person in posed}
@@ -39,7 +39,7 @@ def _middle(person: Person) -> FloatArray:
 
 
 def _number(picture: Picture, person: Person, view: View) -> None:
-    """The number above the head."""
+    """Draw the number above the head."""
     places = np.array(list(person.estimate.joints.values()), dtype=np.float64)
     pixels = view.project(places)[0]
     pixels = pixels[np.isfinite(pixels).all(axis=1) & (np.abs(pixels) < 1e5).all(axis=1)]

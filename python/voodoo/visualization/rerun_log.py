@@ -18,17 +18,17 @@ from voodoo.sensors.adapters.drawing import Pictured, every, grown
 from voodoo.visualization.body_geometry import limb_colors, nearest_limb
 
 _BODY_POINTS = 400
-"""Points of a depth image that are shown on the body: enough to see on which limbs they lie."""
+"""Number of points of a depth image that are shown on the body, enough to recognize their limbs."""
 _BACKGROUND = (90, 90, 90)
 _DEPTH_STEP = 0.005
-"""Depths are rounded to steps of this share of themselves, below the noise of the cameras there are: it halves the images."""
+"""Depths are rounded to steps of this fraction, below the noise of depth cameras; this halves the size of the images."""
 _NEAREST_M = 0.05
 _POINT_FILL = 0.3
-"""In space a pixel of a depth image fills this share of its place: between them the model shows."""
+"""Fraction of its pixel that a point of a depth image fills, so that the model is visible between the points."""
 _SILHOUETTE_PX = 0.3
-"""Outlines are drawn with as few corners as keep them within this."""
+"""Tolerance of simplified silhouettes."""
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 6]
-if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # of few different depths whole ones repeat, their differences do not
+if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # few distinct depths compress better without differences
     _PNG += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 
 
@@ -38,11 +38,11 @@ class StepLog:
 
     Args:
         rr: the module `rerun`.
-        stream: what is written to, at the step's time.
+        stream: recording stream, at the time of the step.
         estimate: of the step.
-        body: with its sizes in the step.
-        most_points: of larger clouds and images only a part is shown.
-        whole: depth images are shown pixel by pixel all the same, as a viewer does; they would be most of a file.
+        body: body with its sizes in the step.
+        most_points: larger clouds and images are subsampled.
+        whole: depth images are shown at full resolution, as in a viewer; in a file they would need most of the space.
     """
 
     rr: Any
@@ -54,7 +54,7 @@ class StepLog:
 
     @property
     def limbs(self) -> int:
-        """How many limbs the body has."""
+        """Number of limbs of the body."""
         return len(self.body.limbs)
 
     def send(self, path: str, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own
@@ -115,14 +115,14 @@ class StepLog:
         displayed = np.arange(len(limbs)) if background else np.flatnonzero(limbs < self.limbs)
         if not background:
             displayed = displayed[:: max(math.ceil(len(displayed) / _BODY_POINTS), 1)]
-            displayed = displayed[np.argsort(limbs[displayed], kind="stable")]  # equal colors in a row take no room
+            displayed = displayed[np.argsort(limbs[displayed], kind="stable")]  # runs of equal colors compress well
         positions = world[displayed].astype(np.float32)
         self.send(path, self.rr.Points3D(positions, radii=0.006, colors=colors[limbs[displayed]]))
         return limbs
 
 
 def rounded_millimeters(image: npt.NDArray[Any], meters_per_unit: float) -> npt.NDArray[np.uint16]:
-    """Depths [mm] in steps of their own size, up to 65 m; 0 where nothing was seen, or nearer than any camera sees."""
+    """Depths [mm] quantized in relative steps, up to 65 m; 0 without a return, or nearer than any camera measures."""
     meters = image.astype(np.float64) * meters_per_unit
     observed = np.isfinite(meters) & (meters >= _NEAREST_M)
     steps = np.round(np.log(meters, where=observed, out=np.zeros_like(meters)) / _DEPTH_STEP)

@@ -1,4 +1,4 @@
-"""Rerun's web viewer for browsers: a process of its own, on this machine only unless another address is named."""
+"""Serves Rerun's web viewer to browsers from a separate process, only on this machine unless another address is given."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from voodoo.errors import VoodooError
 
 LOOPBACK = "127.0.0.1"
 _MEMORY = "256MB"
-"""What browsers that come late are shown of the past."""
+"""Amount of past data for browsers that connect late."""
 _PATIENCE_S = 20.0
 
 
 class Server:
-    """Serves a page at a port, and takes data at the next one.
+    """Serves a page at a port, and receives data at the next one.
 
     Args:
         where: "PORT", or "HOST:PORT" with the address to listen on.
 
     Attributes:
-        address: of the page.
-        data: where the data goes to.
+        address: address of the page.
+        data: address for the data.
 
     Raises:
-        VoodooError: no such port, one that is taken, or a server that does not start.
+        VoodooError: an invalid port, one that is in use, or a server that does not start.
     """
 
     def __init__(self, where: str) -> None:
-        """Start it."""
+        """Start the server."""
         host, _, port = where.rpartition(":")
         if not port.isdecimal() or not 0 < int(port) < 65535:
             raise VoodooError(f"serve: expected PORT or HOST:PORT with a port from 1 to 65534, found {where!r}")
@@ -59,7 +59,7 @@ class Server:
             time.sleep(0.05)
 
     def close(self) -> None:
-        """End it, and what it started."""
+        """Stop the server and its child processes."""
         for number in (signal.SIGTERM, signal.SIGKILL):
             try:
                 os.killpg(self._process.pid, number)
@@ -72,7 +72,7 @@ class Server:
 
 
 def _reached(host: str) -> str:
-    """An address by which this machine reaches what listens on `host`."""
+    """An address at which this machine reaches a server that listens on `host`."""
     everywhere = {"0.0.0.0": LOOPBACK, "::": "[::1]"}
     return everywhere.get(host, f"[{host}]" if ":" in host else host)
 

@@ -1,4 +1,4 @@
-"""Shows measurements, limbs, rays, images and curves on one timeline, in Rerun.
+"""Shows measurements, limbs, rays, images and curves on one timeline in Rerun.
 
 Rerun is an optional extra: `pip install 'voodoo-tracker[view]'`.
 """
@@ -36,22 +36,22 @@ _VISIBLE_M = 0.002
 
 
 class Viewer:
-    """Writes what happens in a step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
+    """Writes the data of each step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
     Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
     deviation of each joint), `world/body/bands`, `world/points/<source>` (colored by
-    the limb they lie on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
-    (pictures with the outlines of the projected limbs, skin candidates and keypoints; in depth images the person's
-    silhouette, limb by limb), `plots/...`; the timeline is `time`.
+    the limb they are on), `world/laser/<source>`, `world/markers/<source>`, `world/rays`, `world/cameras/<source>`
+    (images with the silhouettes of the projected limbs, skin candidates and keypoints; in depth images the
+    silhouette of each limb), `plots/...`; the timeline is `time`.
 
     Args:
-        save: .rrd file to write; None opens the viewer. In a file depth is rounded to a quarter of a percent, and of large
-            depth images a part of the pixels is kept.
+        save: .rrd file to write; None opens the viewer. In a file depth is rounded to a quarter of a percent, and large
+            depth images are subsampled.
         name: of the recording, shown in the viewer.
-        serve: PORT, or HOST:PORT: show it to browsers there instead, see `voodoo.visualization.rerun_server`.
+        serve: PORT, or HOST:PORT: serve it to browsers there instead, see `voodoo.visualization.rerun_server`.
 
     Attributes:
-        address: where a browser finds it; "" where it is not served.
+        address: address for browsers; "" if it is not served.
 
     Raises:
         VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
@@ -82,7 +82,7 @@ class Viewer:
         self._people: set[int] = set()
 
     def _open(self) -> None:
-        """Start the viewer; without a screen it would end unseen."""
+        """Start the viewer; without a screen it would end without a message."""
         if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
             raise VoodooError(
                 "view: expected a screen to open the viewer on, found none; --save FILE.rrd writes a file"
@@ -94,7 +94,7 @@ class Viewer:
             raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
 
     def __enter__(self) -> Viewer:
-        """The viewer itself."""
+        """Enter the context."""
         return self
 
     def __exit__(
@@ -104,7 +104,7 @@ class Viewer:
         self.close()
 
     def close(self) -> None:
-        """Write what is still held back, and close the file."""
+        """Flush buffered data, and close the file."""
         self._stream.flush()
         self._stream.disconnect()
         if self._server is not None:
@@ -130,7 +130,7 @@ class Viewer:
             estimate: of the step.
             body: with its current sizes (`Tracker.body`).
             recorded: the measurements.
-            front_end: gives the rays and skin candidates of the step.
+            front_end: provides the rays and skin candidates of the step.
             seconds: time the step took.
         """
         self._set_time(estimate.stamp)
@@ -154,11 +154,11 @@ class Viewer:
         recorded: RecordedFrame | None = None,
         seconds: float | None = None,
     ) -> None:
-        """Show a step of several people: `world/people/<id>/...`, each in a color of their own and with their number.
+        """Show a step of several persons: `world/people/<id>/...`, each with a separate color and number.
 
         Args:
-            estimate: who is there.
-            bodies: of them, with their current sizes.
+            estimate: the persons.
+            bodies: their bodies, with current sizes.
             recorded: the measurements.
             seconds: time the step took.
         """
@@ -189,7 +189,7 @@ class Viewer:
             self._stream.log("plots/step_ms", rr.Scalars(1e3 * seconds))
 
     def _set_time(self, stamp: float) -> None:
-        # Stamps of a robot count from 1970, those of other recordings from their start.
+        # Stamps of a robot are Unix times, those of other recordings start at zero.
         clock = "timestamp" if stamp > _EPOCH_S else "duration"
         self._stream.set_time("time", **{clock: stamp})
 
@@ -199,7 +199,7 @@ class Viewer:
         self._shapes = {name: shape for name, shape in self._shapes.items() if not name.startswith(f"{path}/")}
 
     def _log_classes(self, body: Body, colors: Mapping[str, tuple[int, int, int]]) -> None:
-        """Names and colors of the silhouette's values; 0 is the background."""
+        """Log names and colors of the silhouette's values; 0 is the background."""
         if self._classes != body.limb_names:
             self._classes = body.limb_names
             rows = [(0, "background", (0, 0, 0, 0))]
@@ -227,7 +227,7 @@ class Viewer:
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
     def _mesh(self, shape: TaperedEllipticCylinder, color: tuple[int, int, int], *, known: bool) -> object:
-        """A limb's surface; of one that is `known` only where its corners are now."""
+        """Log the surface of a limb; for a `known` mesh only the vertices."""
         vertices, triangles, normals = limb_mesh(shape)
         if known and hasattr(self._rr.Mesh3D, "from_fields"):
             return self._rr.Mesh3D.from_fields(vertex_positions=vertices)
@@ -236,7 +236,7 @@ class Viewer:
         )
 
     def _log_spread(self, path: str, estimate: Estimate) -> None:
-        """Ellipsoids within which joints are to one standard deviation."""
+        """Ellipsoids of one standard deviation of the joints."""
         covariances = estimate.joint_covariances
         if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances):
             return
@@ -280,13 +280,13 @@ class Viewer:
 
 
 def _alike(one: TaperedEllipticCylinder | None, other: TaperedEllipticCylinder) -> bool:
-    """Whether the difference is invisible: sizes are refined in every frame, and a mesh takes kilobytes."""
+    """Whether the difference is invisible: sizes are refined in every frame, and a mesh needs kilobytes."""
     sizes = ("length", "a0", "b0", "a1", "b1")
     return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _VISIBLE_M for name in sizes)
 
 
 def _large_chunks(rr: ModuleType) -> dict[str, Any]:
-    """How a file is written: every chunk costs about two kilobytes, and nobody waits for it."""
+    """Batching of a file: every chunk has an overhead of two kilobytes, and latency does not matter."""
     if not hasattr(rr, "ChunkBatcherConfig"):
         return {}
     config = rr.ChunkBatcherConfig.DEFAULT()

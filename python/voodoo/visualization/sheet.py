@@ -1,4 +1,4 @@
-"""Several pictures in one."""
+"""Arranges several images in one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from voodoo.visualization.ink import INK, Picture
 
 
 def side_by_side(pictures: Sequence[Picture]) -> Picture:
-    """Pictures in a row, all as high as the first one."""
+    """Images in a row, scaled to the height of the first one."""
     height = pictures[0].shape[0]
     row = [
         picture
@@ -27,7 +27,7 @@ def side_by_side(pictures: Sequence[Picture]) -> Picture:
 
 
 def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
-    """Pictures in rows of so many, all rows as wide as the first one."""
+    """Images in rows of `columns`, all rows scaled to the width of the first one."""
     rows = [side_by_side(pictures[start : start + columns]) for start in range(0, len(pictures), columns)]
     width = rows[0].shape[1]
     fitted = [
@@ -40,13 +40,13 @@ def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
 
 
 def contact_sheet(pictures: Sequence[Picture], *, columns: int, width: int = 1600, gap: int = 6) -> Picture:
-    """Pictures of one size side by side, row by row.
+    """Images of one size in a grid.
 
     Args:
         pictures: at least one.
-        columns: how many in a row.
+        columns: number per row.
         width: of the sheet [px].
-        gap: between the pictures [px].
+        gap: gap between the images [px].
     """
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)

@@ -41,15 +41,19 @@ pub(crate) struct Fit {
     threads: Option<ThreadPool>,
 }
 
+/// Starts the threads of a configuration; `None` for a single one.
+pub(crate) fn thread_pool(config: &Config) -> Result<Option<ThreadPool>, TrackError> {
+    match config.threads {
+        1 => Ok(None),
+        count => rayon::ThreadPoolBuilder::new().num_threads(count).build().map(Some).map_err(|error| {
+            TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
+        }),
+    }
+}
+
 impl Fit {
     /// Creates the solver and the threads of a configuration.
     pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
-        let threads = match config.threads {
-            1 => None,
-            count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
-                TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
-            })?),
-        };
         Ok(Self {
             solver: solver(config.solver),
             assignment: Assignment::default(),
@@ -59,7 +63,7 @@ impl Fit {
             regions: regions::ColorRegions::default(),
             far: false,
             band_weights: Vec::new(),
-            threads,
+            threads: thread_pool(config)?,
         })
     }
 

@@ -16,6 +16,7 @@ use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::detect::{BoundDetector, Detect, DetectError, Detected, DetectionQuery, Surroundings, fit_body};
 use crate::error::TrackError;
+use crate::fit::thread_pool;
 use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
@@ -76,12 +77,7 @@ pub struct People {
 impl People {
     /// Returns a tracker of no persons. Every new person gets a copy of `prototype`.
     pub fn new(prototype: Body, config: Config, options: PeopleOptions) -> Result<Self, TrackError> {
-        let threads = match config.threads {
-            1 => None,
-            count => Some(rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(|error| {
-                TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
-            })?),
-        };
+        let threads = thread_pool(&config)?;
         Ok(Self {
             prototype,
             config: Config { threads: 1, ..config },
@@ -210,17 +206,17 @@ impl People {
     /// Prunes tracks: duplicates (the one that explains fewer pixels, or the newer), and tracks outside the region or not
     /// requested.
     fn prune_tracks(&mut self) {
-        for younger in 0..self.persons.len() {
-            let place = self.persons[younger].place;
-            for older in 0..younger {
-                let [a, b] = [older, younger].map(|number| &self.persons[number]);
+        for newer in 0..self.persons.len() {
+            let place = self.persons[newer].place;
+            for older in 0..newer {
+                let [a, b] = [older, newer].map(|number| &self.persons[number]);
                 if a.is_tracked() && b.is_tracked() && a.place.distance(place) < ONE_BODY {
-                    let more = self.assignment.count(younger) > self.assignment.count(older);
-                    self.persons[if more { older } else { younger }].present = false;
+                    let more = self.assignment.count(newer) > self.assignment.count(older);
+                    self.persons[if more { older } else { newer }].present = false;
                 }
             }
-            let is_followed = self.options.allows(place) && self.options.includes(self.persons[younger].id);
-            self.persons[younger].present &= is_followed;
+            let is_followed = self.options.allows(place) && self.options.includes(self.persons[newer].id);
+            self.persons[newer].present &= is_followed;
         }
     }
 

@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_found_itself_is_gone_when_it_is_lost_for_long_and_any_that_is_no_person() {
+    fn a_lost_auto_initialized_body_is_given_up_and_any_body_that_is_no_person() {
         let mut check = DetectionCheck::default();
         assert!(
             !(0..100).any(|frame| check.person_gone(f64::from(frame) / 30.0, true, None)),

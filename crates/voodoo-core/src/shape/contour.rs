@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn who_looks_along_a_limb_or_stands_in_it_sees_no_sides_but_a_rim() {
+    fn a_camera_along_a_limb_or_inside_it_has_no_side_lines_but_a_rim() {
         let shape = TaperedEllipticCylinder::new(0.4, 0.06, 0.05, 0.05, 0.04).unwrap();
         assert_eq!(shape.contour(0.5, Vec3::new(0.01, 0.0, 3.0)), None);
         assert_eq!(shape.contour(0.5, Vec3::new(0.0, 0.0, 0.2)), None);

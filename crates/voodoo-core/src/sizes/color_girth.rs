@@ -45,17 +45,18 @@ fn weight(pair: &RegionPair) -> f64 {
     kernel(pair.distance) * pair.information / LINES_ALIKE
 }
 
-/// Normal equations for shift and girth of a limb, from its edges.
+/// Normal equations for shift and girth of a limb.
 struct GirthSystem {
     h: SMatrix<f64, 5, 5>,
     g: SVector<f64, 5>,
 }
 
+/// Returns the normal equations of a limb's edges; `None` without edges.
 fn girth_system<'a>(
     shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     pairs: impl Iterator<Item = &'a RegionPair>,
-) -> GirthSystem {
+) -> Option<GirthSystem> {
     let (mut h, mut g) = (SMatrix::zeros(), SVector::zeros());
     for pair in pairs {
         let foot = working_from_limb.inverse_transform_point(pair.x);
@@ -66,22 +67,13 @@ fn girth_system<'a>(
         h += weight * row * row.transpose();
         g += weight * pair.distance * row;
     }
-    GirthSystem { h, g }
+    (h.trace() > 0.0).then_some(GirthSystem { h, g })
 }
 
 impl ColorGirth {
     /// Fits the surface of a limb whose pose is known to its edges in the first frame: one Gauss-Newton step, with a prior that
     /// pulls the changes made so far towards zero.
-    fn start<'a>(
-        &mut self,
-        shape: &TaperedEllipticCylinder,
-        working_from_limb: &Pose,
-        pairs: impl Iterator<Item = &'a RegionPair>,
-    ) -> Option<GirthFit> {
-        let GirthSystem { h, g } = girth_system(shape, working_from_limb, pairs);
-        if h.trace() <= 0.0 {
-            return None;
-        }
+    fn start(&mut self, GirthSystem { h, g }: &GirthSystem) -> Option<GirthFit> {
         let [e0, e1, e2] = self.total.factors.map(|factor| factor - 1.0);
         let so_far = SVector::from([self.total.shift.x, self.total.shift.y, e0, e1, e2]);
         self.take((h + self.information).cholesky()?.solve(&(g - self.information * so_far)))
@@ -110,16 +102,7 @@ impl ColorGirth {
 
     /// Updates the girth of a tracked limb. The lateral offset of its axis in this frame is eliminated, and the shift of the
     /// surface relative to the joints is kept.
-    fn follow<'a>(
-        &mut self,
-        shape: &TaperedEllipticCylinder,
-        working_from_limb: &Pose,
-        pairs: impl Iterator<Item = &'a RegionPair>,
-    ) -> Option<GirthFit> {
-        let GirthSystem { h, g } = girth_system(shape, working_from_limb, pairs);
-        if h.trace() <= 0.0 {
-            return None;
-        }
+    fn follow(&mut self, GirthSystem { h, g }: &GirthSystem) -> Option<GirthFit> {
         let alike = ALIKE / f64::from(GIRTHS_EVERY);
         let (h, g) = (h / alike, g / alike);
         let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * alike);
@@ -175,7 +158,8 @@ impl ColorGirths {
                     let longer = color_girth.tip(&part.shape, &poses[limb], pairs.clone());
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
-                let Some(step) = color_girth.start(&model.body.limbs()[limb].shape, &poses[limb], pairs) else {
+                let system = girth_system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
+                let Some(step) = system.and_then(|system| color_girth.start(&system)) else {
                     continue;
                 };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
@@ -195,7 +179,8 @@ impl ColorGirths {
         fit.match_single_edges(setting.with_model(model), poses);
         for (limb, color_girth) in self.limbs.iter_mut().enumerate() {
             let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-            if let Some(step) = color_girth.follow(&model.body.limbs()[limb].shape, &poses[limb], pairs) {
+            let system = girth_system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
+            if let Some(step) = system.and_then(|system| color_girth.follow(&system)) {
                 model.body.change_girth(limb, step.shift, step.axes());
             }
         }

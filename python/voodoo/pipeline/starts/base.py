@@ -103,11 +103,18 @@ def without_impossible(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray
     For an implausible bone of an arm or leg the distal end is removed. If a bone of the trunk is implausible, the result is
     empty.
     """
+    return _with_bones(joints, BONES_M)
+
+
+def _with_bones(
+    joints: Mapping[str, FloatArray], limits: Mapping[tuple[str, str], tuple[float, float]], unit: float = 1.0
+) -> dict[str, FloatArray]:
+    """See `without_impossible`; lengths are compared in multiples of `unit` [m]."""
     kept = dict(joints)
-    for (near, far), (least, most) in BONES_M.items():
+    for (near, far), (least, most) in limits.items():
         if near not in kept or far not in kept:
             continue
-        if least <= float(np.linalg.norm(kept[near] - kept[far])) <= most:
+        if least <= float(np.linalg.norm(kept[near] - kept[far])) / unit <= most:
             continue
         if near in TRUNK and far in TRUNK:
             return {}
@@ -129,19 +136,8 @@ def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     ]
     if not trunk:
         return {}
-    stature = float(np.mean(trunk)) / _OF_STATURE["l_shoulder", "l_hip"]
-    kept = dict(joints)
-    for (near, far), fraction in _OF_STATURE.items():
-        if near not in kept or far not in kept:
-            continue
-        length = float(np.linalg.norm(kept[near] - kept[far])) / stature
-        if _SHORTER * fraction <= length <= _LONGER * fraction:
-            continue
-        if near in TRUNK and far in TRUNK:
-            return {}
-        for name in _BEYOND.get(far, (far,)):
-            kept.pop(name, None)
-    return kept
+    limits = {bone: (_SHORTER * fraction, _LONGER * fraction) for bone, fraction in _OF_STATURE.items()}
+    return _with_bones(joints, limits, unit=float(np.mean(trunk)) / _OF_STATURE["l_shoulder", "l_hip"])
 
 
 _SHORTER, _LONGER = 0.6, 1.6

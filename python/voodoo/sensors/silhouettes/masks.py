@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 Mask: TypeAlias = npt.NDArray[np.bool_]
 """(height, width)."""
+_HOLE_PX = 40
 
 
 def without_specks(mask: Mask, *, smallest: int) -> Mask:
@@ -20,10 +21,10 @@ def without_specks(mask: Mask, *, smallest: int) -> Mask:
     return np.asarray(large[labels], dtype=bool)
 
 
-def filled(mask: Mask, *, hole: int = 40) -> Mask:
-    """Closes cracks and holes of up to `hole` pixels in a mask. Sensors miss single pixels, which a distance transform would
+def filled(mask: Mask) -> Mask:
+    """Closes cracks and holes of up to 40 pixels in a mask. Sensors miss single pixels, which a distance transform would
     treat as background."""
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), dtype=np.uint8))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - closed, connectivity=4)
-    small = stats[:, cv2.CC_STAT_AREA] <= hole
+    small = stats[:, cv2.CC_STAT_AREA] <= _HOLE_PX
     return np.asarray((closed != 0) | small[labels], dtype=bool)

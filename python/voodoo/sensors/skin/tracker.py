@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,26 +31,6 @@ ByteImage = npt.NDArray[np.uint8]
 
 
 _NOWHERE = np.full(3, np.nan)
-
-
-class FollowedRegion(NamedTuple):
-    """A tracked skin region.
-
-    Args:
-        label: the site that it is assigned to.
-        pictures: number of images in which it was detected.
-        stamp: time of its last detection [s].
-        velocity: (3,) [m/s].
-        far: for each site the running mean of the squared distance, in units of the gate.
-        mismatch_s: for each site, how long the region has contradicted it [s].
-    """
-
-    label: str | None
-    pictures: int
-    stamp: float
-    velocity: tuple[float, ...]
-    far: tuple[float, ...]
-    mismatch_s: tuple[float, ...]
 
 
 class SkinTracker:
@@ -106,14 +85,6 @@ class SkinTracker:
         """Site -> the candidate that is assigned to it."""
         found = self.candidates
         return {self._sites[site]: found[number] for site, number in self._cue.assigned}
-
-    @property
-    def followed(self) -> list[FollowedRegion]:
-        """All tracked regions."""
-        return [
-            FollowedRegion(None if site is None else self._sites[site], count, stamp, *map(tuple, rest))
-            for site, count, stamp, *rest in self._cue.followed
-        ]
 
     def observe(
         self,

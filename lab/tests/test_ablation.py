@@ -2,18 +2,17 @@
 
 import csv
 from itertools import islice
-from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 import voodoo
-from voodoo import cli
-from voodoo.evaluation import ablation as module
+from lab_scripts import load_experiment
 from voodoo.evaluation import evaluate as evaluate_module
-from voodoo.evaluation.ablation import UNCHANGED, Variant, ablate, table, variants, write_tables
 from voodoo.recordings import open_recording, sample_path
 
+module = load_experiment("ablation")
+UNCHANGED, Variant = module.UNCHANGED, module.Variant
+ablate, table, variants, write_tables = module.ablate, module.table, module.variants, module.write_tables
 FEW = 4
 
 
@@ -86,14 +85,13 @@ def test_rows_are_the_evaluations_of_the_variants(short, tmp_path):
     assert float(written[0]["error_m"]) == pytest.approx(errors[UNCHANGED], abs=1e-6)
 
 
-def test_a_recording_that_fails_is_counted_and_ends_the_command_with_an_error(short, monkeypatch, tmp_path):
+def test_a_recording_that_fails_is_counted_and_ends_the_script_with_an_error(short, monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(module, "variants", lambda config: variants(config)[:2])
-    monkeypatch.chdir(tmp_path)
     broken = tmp_path / "broken_depth.mat"
     broken.write_bytes(b"nothing")
-    arguments = ["eval", str(sample_path()), str(broken), "--ablate", "--jobs", "1", "--out", "report"]
-    result = CliRunner().invoke(cli.app, arguments, env={"COLUMNS": "200"})
-    assert result.exit_code == 1
-    assert "2 recordings failed" in result.stderr
-    assert f"| {UNCHANGED} |" in result.stdout and "against" in result.stdout.lower()
-    assert {path.name for path in Path("report").iterdir()} == {"ablation.md", "ablation.csv"}
+    monkeypatch.setattr("sys.argv", ["ablation", str(sample_path()), str(broken), "--out", str(tmp_path / "report")])
+    with pytest.raises(SystemExit, match="2 recordings failed"):
+        module.main()
+    printed = capsys.readouterr().out
+    assert f"| {UNCHANGED} |" in printed and "against" in printed.lower()
+    assert {path.name for path in (tmp_path / "report").iterdir()} == {"ablation.md", "ablation.csv"}

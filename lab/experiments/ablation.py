@@ -1,9 +1,17 @@
-"""Ablation: repeats the evaluation once for every single change of the configuration."""
+"""Ablation: repeats the evaluation of recordings once for every single change of the configuration.
+
+    python lab/experiments/ablation.py ../shared/data/rendered --only '*_cmu' --use depth --out target/ablation
+
+Runs once as configured, and once for each switch inverted, each other solver, and each term of a certain strength switched
+off. Prints a row each; --out gets ablation.md and ablation.csv.
+"""
 
 from __future__ import annotations
 
+import argparse
 import csv
 import math
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,9 +21,8 @@ from typing import Any
 from voodoo.config import Config
 from voodoo.evaluation.evaluate import evaluate_all
 from voodoo.evaluation.score import Score
+from voodoo.evaluation.search import find_recordings
 from voodoo.evaluation.summary import Summary, summarize
-from voodoo.names import HumanModel
-from voodoo.pipeline.start import Automatic
 
 UNCHANGED = "as configured"
 # Values that switch a term off: point-to-plane alone, no prediction, motion so free that its penalty has no effect.
@@ -62,8 +69,7 @@ class Ablation:
 
 
 def variants(base: Config) -> list[Variant]:
-    """`base` itself, then every change of one entry: each switch turned over, each other solver, and each
-    influence of a certain strength at none."""
+    """`base` itself, then every change of one entry: each switch inverted, each other solver, and each term of _OFF."""
     values: dict[str, Any] = dict(base.values())
     changes: list[tuple[str, bool | str | float]] = [
         (key, not value) for key, value in values.items() if isinstance(value, bool)
@@ -78,10 +84,7 @@ def ablate(
     paths: Sequence[Path],
     *,
     config: Config | None = None,
-    loader: str | None = None,
-    model: HumanModel | None = None,
     use: Sequence[str] | None = None,
-    init: Automatic | None = None,
     jobs: int = 1,
 ) -> Iterator[Ablation]:
     """Evaluate `paths` with every variant of `config`, one after another; each is yielded when it is done.
@@ -93,7 +96,7 @@ def ablate(
             # The worker processes read their configuration from a file.
             file = Path(folder) / f"{index}.toml"
             file.write_text(variant.config.to_toml(), encoding="utf-8")
-            done = evaluate_all(paths, config_file=file, loader=loader, model=model, use=use, init=init, jobs=jobs)
+            done = evaluate_all(paths, config_file=file, use=use, jobs=jobs)
             yield Ablation(variant.name, tuple(score for _, score, _ in sorted(done, key=lambda item: item[0])))
 
 
@@ -151,3 +154,28 @@ def _number(value: float, factor: float, unit: str, digits: int) -> str:
 
 def _toml(value: float | bool | str) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value).lower()
+
+
+def main() -> None:
+    """Evaluate the recordings with every variant."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recordings", nargs="+", type=Path, help="recordings, or folders of recordings")
+    parser.add_argument("--only", nargs="*", default=(), help="patterns of names")
+    parser.add_argument("--config", type=Path, help="configuration that is changed; the defaults without it")
+    parser.add_argument("--use", nargs="*", help="kinds of inputs; all without it")
+    parser.add_argument("--jobs", type=int, default=1, help="recordings at the same time (default 1)")
+    parser.add_argument("--out", type=Path, help="folder for ablation.md and ablation.csv")
+    options = parser.parse_args()
+    config = None if options.config is None else Config.load(options.config)
+    paths = find_recordings(options.recordings, only=options.only)
+    ablations = list(ablate(paths, config=config, use=options.use, jobs=options.jobs))
+    print(table(ablations))
+    if options.out is not None:
+        write_tables(options.out, ablations)
+    failed = [score for item in ablations for score in item.failures]
+    if failed:
+        sys.exit(f"{len(failed)} recordings failed, the first: {failed[0].failure}")
+
+
+if __name__ == "__main__":
+    main()

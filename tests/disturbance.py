@@ -1,34 +1,30 @@
 """Image disturbances of R07 section 5.2."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.synthetic.sequence import (
-    VirtualFrame,
-)
+from voodoo.synthetic.sequence import VirtualFrame
 
 
 @dataclass(frozen=True, kw_only=True)
 class Disturbance:
-    """How R07 section 5.2 disturbs a sequence.
+    """Kinds and rates of the disturbances of R07 section 5.2.
 
     Args:
-        noise: share of pixels that show a random depth, R07: 0.15.
+        noise: fraction of pixels with a random depth, R07: 0.15.
         rectangles: random rectangles of random depth in every frame.
-        rectangle_share: their largest width and height, as a share of the image's.
-        corrupted, blank, repeated, late: probability that a frame shows nothing but garbage, shows nothing, shows the image
-            of the frame before, or comes with a stamp that is not after the last one's.
-        seed: of all of it.
+        rectangle_fraction: their largest width and height, as a fraction of the image's.
+        corrupted, blank, repeated, late: probability that a frame has random pixels only, no returns, the previous image, or
+            a stamp that is not later than the previous one.
+        seed: of the random numbers.
     """
 
     noise: float = 0.15
     rectangles: int = 4
-    rectangle_share: float = 0.125
+    rectangle_fraction: float = 0.125
     corrupted: float = 0.02
     blank: float = 0.02
     repeated: float = 0.02
@@ -45,14 +41,14 @@ def disturbed_image(
     hit = rng.random(image.shape) < how.noise
     found[hit] = rng.integers(500, 4500, int(hit.sum()))
     for _ in range(how.rectangles):
-        rows, columns = (int(size * how.rectangle_share * rng.uniform(0.2, 1.0)) for size in (height, width))
+        rows, columns = (int(size * how.rectangle_fraction * rng.uniform(0.2, 1.0)) for size in (height, width))
         top, left = rng.integers(0, height - rows), rng.integers(0, width - columns)
         found[top : top + rows, left : left + columns] = rng.integers(500, 4500)
     return found
 
 
 def disturbed(frames: Iterable[VirtualFrame], how: Disturbance) -> Iterator[VirtualFrame]:
-    """The frames of a sequence, disturbed; a late frame comes beside its own, with the stamp and image of an earlier one."""
+    """The disturbed frames of a sequence; a late frame is an additional one that repeats the previous stamp and image."""
     rng = np.random.default_rng(how.seed)
     last: VirtualFrame | None = None
     for frame in frames:
