@@ -74,7 +74,7 @@ def keypoints(recording: Recording, sites: Sequence[str]) -> Keypoints:
             there = found.pixels.setdefault(item.sensor, {s: np.full((len(recording), 2), np.nan) for s in sites})
             for part in LAYOUTS[item.layout].parts:
                 u, v, sure = np.sum(
-                    [fraction * item.people[0][index] for index, fraction in part.shares.items()], axis=0
+                    [fraction * item.people[0][index] for index, fraction in part.weights.items()], axis=0
                 )
                 if part.site in there and sure > SURE:
                     there[part.site][frame] = u, v

@@ -6,7 +6,7 @@
 use super::{Limb, Site};
 use crate::error::BodyError;
 
-/// Side of the body, as the person's own left or right.
+/// Side of the body, as the person's own left or right; see [`Roles`] for an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Names that begin with `l_`.
@@ -25,7 +25,7 @@ impl Side {
     }
 }
 
-/// A limb of the human.
+/// A limb of the human; see [`Roles`] for an example.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimbRole {
     /// `pelvis`
@@ -169,6 +169,16 @@ impl JointRole {
 }
 
 /// The roles of the limbs, joints and sites of a body on a human. They follow from names and do not depend on sizes.
+///
+/// ```
+/// use voodoo_core::{Body, HumanModel, LimbRole, Side};
+///
+/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let forearm = body.limb_index("l_forearm")?;
+/// assert_eq!(body.roles().limb(forearm), Some(LimbRole::Forearm(Side::Left)));
+/// assert_eq!(Side::of("r_wrist"), Some(Side::Right));
+/// # Ok::<(), voodoo_core::BodyError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Roles {
     human: bool,
