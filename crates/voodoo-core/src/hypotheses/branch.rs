@@ -1,8 +1,9 @@
-//! A second opinion: the body followed by the same pictures, and held less to what is expected.
+//! A second branch: the body fitted to the same color images with weaker priors.
 //!
-//! What two cameras do not see is as the prior has it, or where a small chance led it. Somebody who believes less of the prior goes
-//! elsewhere there, and to the same place wherever the pictures tell. Where an arm or leg of the two is not in one place, the one
-//! that explains clearly more of the pictures is taken; how far they lie apart tells how little the pictures do.
+//! Priors and small disturbances determine the limbs that one or two cameras do not observe well. There, a branch with weaker
+//! priors converges to other poses; where the images are informative, it converges to the same ones. Where an arm or leg differs
+//! between the two, the one that explains the images clearly better is used for both. Otherwise, their distance is a measure of
+//! uncertainty.
 
 use super::landmark_cost::APART;
 use super::refined::{REFINE, Refined};
@@ -11,17 +12,18 @@ use crate::config::Config;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, Vec3, shifted};
 
-/// With more cameras than this there is hardly anything that none of them sees.
+/// Maximum number of cameras with a second branch. More cameras leave little of the body unobserved.
 const FEW_CAMERAS: usize = 2;
-/// The second body may move so many times as far as is expected of the first, and be held so much less to a usual posture.
+/// Factor on the motion scale of the second branch, which weakens the priors of motion and of posture.
 const LOOSER: f64 = 3.0;
 
-/// The other body.
+/// The second branch of the body.
 #[derive(Debug, Default)]
 pub(super) struct Branch {
-    /// World frame; without poses there is none.
+    /// Its poses and their prediction, world frame. Without poses there is no second branch.
     motion: Motion,
-    /// In this frame, working frame: its poses, those expected and those before, and the first body with one of its arms or legs.
+    /// Its poses in this frame, their prediction and the previous ones, and the body with one arm or leg of the branch; working
+    /// frame.
     poses: Vec<Pose>,
     predicted: Vec<Pose>,
     previous: Vec<Pose>,
@@ -29,7 +31,7 @@ pub(super) struct Branch {
 }
 
 impl Branch {
-    /// There is none until the next frame has been followed; room for so many limbs.
+    /// Removes the branch until the next frame has been fitted, and reserves memory for `limbs` limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
         let Self { motion, poses, predicted, previous, tried } = self;
         for poses in [&mut motion.poses, &mut motion.previous, poses, predicted, previous, tried] {
@@ -38,7 +40,8 @@ impl Branch {
         }
     }
 
-    /// Follows the second body in a frame, before the first one is: `fit` holds its matches afterwards. Returns the ICP steps.
+    /// Fits the second branch to a frame, before the body itself is fitted. Afterwards, `fit` holds its correspondences. Returns
+    /// the number of ICP steps.
     pub(super) fn follow(&mut self, context: Context, fit: &mut Fit) -> usize {
         let Self { motion, poses, predicted, previous, .. } = self;
         if !is_enabled(context) || motion.poses.len() != context.model.body.limbs().len() {
@@ -58,8 +61,9 @@ impl Branch {
         steps
     }
 
-    /// Where an arm or leg of the two bodies is not in one place, the one that explains clearly more is that of both; `predicted`
-    /// is what is expected of the first one. `fit` holds its matches, before and afterwards. Returns the ICP steps.
+    /// Compares the arms and legs of the body and the branch. Where one differs, the one that explains the frame clearly better
+    /// replaces the other. `predicted` is the prediction of the body, and `fit` holds the correspondences of `poses` before and
+    /// afterwards. Returns the number of ICP steps.
     pub(super) fn compare(
         &mut self,
         context: Context,
@@ -72,7 +76,7 @@ impl Branch {
         let mut steps = 0;
         if self.motion.poses.len() != poses.len() {
             if is_enabled(context) {
-                // From here on they go their own ways.
+                // The branch starts at the current poses.
                 self.motion.restart(poses.iter().map(|pose| shifted(pose, -origin)).collect());
                 self.motion.commit(context.observation.frame().stamp);
             }
@@ -80,7 +84,7 @@ impl Branch {
         }
         set_shifted(&mut self.poses, &self.motion.poses, origin);
         for chain in &context.model.extremities {
-            // Nearer ones are hardly told by what they explain.
+            // The costs of nearer ones hardly differ.
             if chain.end(poses).distance(chain.end(&self.poses)) < APART {
                 continue;
             }
@@ -103,14 +107,15 @@ impl Branch {
         steps
     }
 
-    /// How far from the first body's limb, world frame, the second one's ends, meters; none where there is no second body.
+    /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the branch, meters; `None`
+    /// without a branch.
     pub(super) fn end_distance(&self, limb: usize, length: f64, world_from_limb: &Pose) -> Option<f64> {
         let end = length * Vec3::Z;
         self.motion.poses.get(limb).map(|own| (*own * end).distance(*world_from_limb * end))
     }
 }
 
-/// Few pictures are all that is seen.
+/// Whether color images of few cameras are the only observation.
 fn is_enabled(context: Context) -> bool {
     context.pictures_alone() && context.observation.frame().colors.len() <= FEW_CAMERAS
 }
@@ -127,13 +132,13 @@ mod tests {
     use crate::testing::{before_wall, first_arm, moved, raised, standing, with_context, without_background};
 
     #[test]
-    fn where_depth_is_visible_there_is_no_second_opinion() {
+    fn there_is_no_second_branch_with_depth_images() {
         let (model, mut poses) = standing();
         let (pixels, config) = (before_wall(&model.body, &poses), without_background());
         with_context(&pixels, &config, &model, &poses.clone(), |context| {
             let (mut branch, mut fit) = (Branch::default(), Fit::new(&config).unwrap());
             let mut predicted = poses.clone();
-            // One that was is given up.
+            // An existing branch is removed.
             branch.motion.restart(poses.clone());
             assert_eq!(branch.follow(context, &mut fit), 0);
             let steps = branch.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
@@ -141,8 +146,8 @@ mod tests {
         });
     }
 
-    /// What becomes of two bodies that stand so before an image of the standing body: the first one's arm and the second one's, as
-    /// distances of their ends from where the arm is seen, and the ICP steps.
+    /// Compares two branches in an image of the standing body. Returns the distances of the ends of their first arms from the
+    /// observed one, and the number of ICP steps.
     fn compared(first: &[Pose], other: &[Pose]) -> ([f64; 2], usize) {
         let (model, truth) = standing();
         let (pixels, config) = (before_wall(&model.body, &truth), without_background());
@@ -153,24 +158,28 @@ mod tests {
             let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
             let steps = branch.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
             let arm = &model.extremities[first_arm(&model)];
-            assert_eq!(poses == first, predicted == first, "what is taken is what is expected");
+            assert_eq!(poses == first, predicted == first, "poses and prediction change together");
             ([&poses, &branch.motion.poses].map(|poses| arm.end(poses).distance(arm.end(&truth))), steps)
         })
     }
 
     #[test]
-    fn the_arm_that_explains_clearly_more_is_that_of_both_bodies() {
+    fn the_arm_that_explains_clearly_more_is_used_in_both_branches() {
         let (model, right) = standing();
         let (wrong, _) = raised(&model, &right, 0.2);
         let (taken, steps) = compared(&wrong, &right);
         assert!(taken[0] < 0.02 && taken[1] < 0.02 && steps == REFINE, "{taken:?} after {steps}");
         let (kept, steps) = compared(&right, &wrong);
         assert!(kept[0] < 1e-9 && kept[1] < 0.02 && steps == REFINE, "{kept:?} after {steps}");
-        assert_eq!(compared(&right, &moved(&right, 0.02 * Vec3::X)).1, 0, "they are in one place");
+        assert_eq!(
+            compared(&right, &moved(&right, 0.02 * Vec3::X)).1,
+            0,
+            "arms at nearly the same position are not compared"
+        );
     }
 
     #[test]
-    fn a_limb_differs_by_how_far_apart_its_ends_are() {
+    fn the_distance_of_a_limb_is_that_between_its_distal_ends() {
         let (model, poses) = standing();
         let (other, _) = raised(&model, &poses, 0.2);
         let arm = &model.extremities[first_arm(&model)];

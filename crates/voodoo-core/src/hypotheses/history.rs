@@ -1,31 +1,31 @@
-//! What is remembered of each arm and leg from frame to frame.
+//! History of each arm and leg over frames.
 
 use super::persistence::Persistence;
 use crate::math::{Pose, Vec3};
 
-/// What a proposal rests on.
+/// Evidence that a proposal is based on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Basis {
-    /// Unexplained points have drawn the arm or leg there.
+    /// The rough cost of the arm or leg alone, from unexplained points or colors.
     #[default]
     Points,
-    /// It ended there when all was well.
-    Rest,
-    /// The body leans: not the arm or leg alone is judged by it.
+    /// A position of the end that an earlier frame confirmed or a detector reports.
+    End,
+    /// A lean of the trunk. It may be accepted although the arm or leg remains suspect.
     Lean,
-    /// A detector sees the body there: as above.
+    /// Detections of the whole body. It may be accepted although the arm or leg remains suspect.
     Body,
 }
 
-/// The past of one arm or leg.
+/// History of one arm or leg.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
-    /// What past frames said against it.
+    /// How long frames have contradicted it.
     pub(super) persistence: Persistence,
-    /// Where it ended when the frame last proved it right, world.
+    /// Position of its end in the last frame that confirmed it, world frame.
     pub(super) last_good_end: Option<Vec3>,
-    /// The body as the frame before wanted it, when that asked for a change, world; else empty.
+    /// Poses of all limbs that the last frame requested, world frame; empty if it requested no change.
     pub(super) last_proposal: Vec<Pose>,
-    /// What that rests on.
+    /// Basis of `last_proposal`.
     pub(super) last_basis: Basis,
 }

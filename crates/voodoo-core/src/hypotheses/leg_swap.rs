@@ -1,8 +1,10 @@
-//! The two legs exchanged: clothed alike, each lies on the colors of the other, and only both together can come right.
+//! Left-right swap of the legs. Legs of the same color can each explain the pixels of the other, and only a change of both
+//! corrects this.
 //!
-//! By then sizes have followed the wrong ones: exchanged legs that explain as much are followed beside the body for some frames.
+//! The sizes may have adapted to the wrong legs before they are corrected. Legs that have a similar cost when swapped are
+//! therefore tracked in parallel for some frames.
 
-use super::persistence::REST;
+use super::persistence::RETRY_PERIOD;
 use super::refined::{REFINE, Refined};
 use super::score::{Cost, SURE_GAIN};
 use super::unexplained::CLUTTER;
@@ -11,21 +13,22 @@ use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3, shifted};
 
-/// When one looks, and where the legs would be.
+/// The swapped legs, and the evidence for them.
 #[derive(Debug, Default)]
 pub(super) struct LegSwap {
-    /// The body with exchanged legs, working frame.
+    /// The body with swapped legs, working frame.
     poses: Vec<Pose>,
-    /// The same as it was found in the frame before, world, and for how many frames; empty if it is not followed.
+    /// Its refined poses in the last frame, world frame, and the number of frames for which it was tracked; empty if it is not
+    /// tracked.
     followed: Vec<Pose>,
     age: usize,
-    /// What it has gained since it was looked at first, patches.
+    /// Decrease of cost by the swap, accumulated over these frames, patches.
     gained: f64,
     frames: usize,
 }
 
 impl LegSwap {
-    /// Forgets what was, and makes room for a body of so many limbs.
+    /// Clears the state and reserves memory for a body of `limbs` limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
         (self.frames, self.age, self.gained) = (0, 0, 0.0);
         for poses in [&mut self.poses, &mut self.followed] {
@@ -34,7 +37,8 @@ impl LegSwap {
         }
     }
 
-    /// Tries the legs where the other one is, if a leg is `is_suspect` or it is time to look. Returns the number of ICP steps.
+    /// Tests the swap if one of the legs is suspect (`is_suspect`), while the swap is tracked, and otherwise once in every
+    /// `RETRY_PERIOD` frames. Returns the number of ICP steps.
     pub(super) fn attempt(
         &mut self,
         context: Context,
@@ -52,7 +56,7 @@ impl LegSwap {
         }
         let (origin, now) = (context.observation.origin(), refined.cost(context, fit, poses));
         self.swap_legs(&context.model.body, [&chains[one], &chains[other]], poses, origin);
-        // Legs that stand right lose more when they are exchanged, before they are refined.
+        // A swap of correct legs explains clearly less of the images, even before it is refined.
         if !self.is_ongoing() && refined.cost(context, fit, &self.poses).evidence > (1.0 - CLUTTER) * now.evidence {
             return 0;
         }
@@ -67,18 +71,18 @@ impl LegSwap {
         REFINE
     }
 
-    /// Whether to look in this frame; to be called in every one.
+    /// Whether to test the swap in this frame. To be called in every frame.
     fn is_due(&mut self, is_suspect: bool) -> bool {
-        self.frames = (self.frames + 1) % REST;
+        self.frames = (self.frames + 1) % RETRY_PERIOD;
         self.frames == 0 || is_suspect || self.is_ongoing()
     }
 
-    /// It is followed from the frame before.
+    /// Whether the swap was tracked in the last frame.
     fn is_ongoing(&self) -> bool {
         !self.followed.is_empty()
     }
 
-    /// Puts each of two legs where the other one is, or where it was found to be in the frame before.
+    /// Sets the poses with each of two legs at the position of the other, or those of the last frame if the swap is tracked.
     fn swap_legs(&mut self, body: &Body, legs: [&TwoBone; 2], poses: &[Pose], origin: Vec3) {
         self.poses.clear();
         if self.is_ongoing() {
@@ -91,20 +95,20 @@ impl LegSwap {
         }
     }
 
-    /// Takes note of what a frame says of it; true when it is to be taken.
+    /// Accumulates the evidence of a frame. Returns whether to accept the swap.
     fn accumulate(&mut self, now: Cost, swapped: Cost) -> bool {
-        // No frame counts for more than half: it may be disturbed.
+        // No frame contributes more than half of the required gain, because a single frame may be disturbed.
         self.gained = (self.gained + (now.total - swapped.total).min(0.5 * SURE_GAIN)).max(0.0);
         self.age += 1;
         let close = swapped.evidence < now.evidence + SURE_GAIN;
         let taken = close && self.gained > SURE_GAIN;
-        if taken || !close || self.age > REST {
+        if taken || !close || self.age > RETRY_PERIOD {
             (self.age, self.gained) = (0, 0.0);
         }
         taken
     }
 
-    /// Keeps what was found of it, if it is followed.
+    /// Stores the poses for the next frame if the swap is tracked.
     fn keep(&mut self, poses: &[Pose], origin: Vec3) {
         self.followed.clear();
         if self.age > 0 {
@@ -124,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn each_leg_ends_where_the_other_one_did_and_nothing_else_moves() {
+    fn each_leg_ends_where_the_other_one_did_and_no_other_limb_moves() {
         let (model, poses) = standing();
         let legs: Vec<&TwoBone> = model.extremities.iter().filter(|chain| chain.leg).collect();
         let mut leg_swap = LegSwap::default();
@@ -140,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn it_is_taken_when_several_frames_report_so_and_dropped_when_they_do_not() {
+    fn the_swap_is_accepted_after_several_better_frames_and_dropped_otherwise() {
         let (now, better, far) = (cost(2000.0), cost(2090.0), cost(1500.0));
         let mut leg_swap = LegSwap::default();
         let decisions: Vec<bool> = (0..4).map(|_| leg_swap.accumulate(now, better)).collect();
-        assert_eq!(decisions, [false, false, true, false], "no frame counts for more than half");
+        assert_eq!(decisions, [false, false, true, false], "no frame contributes more than half");
         let mut leg_swap = LegSwap::default();
         assert!([better, better, far, better, better].iter().all(|cost| !leg_swap.accumulate(now, *cost)));
-        // What is as good is followed for some frames.
+        // A swap of the same cost is tracked for some frames.
         let (_, poses) = standing();
         let followed: Vec<bool> = (0..10)
             .map(|_| {
@@ -156,14 +160,14 @@ mod tests {
                 leg_swap.is_ongoing()
             })
             .collect();
-        assert_eq!(followed.iter().filter(|goes_on| !**goes_on).count(), 10 / (REST + 1), "{followed:?}");
+        assert_eq!(followed.iter().filter(|tracked| !**tracked).count(), 10 / (RETRY_PERIOD + 1), "{followed:?}");
     }
 
     #[test]
-    fn one_looks_every_so_often_and_at_once_where_a_leg_is_uncertain() {
+    fn the_swap_is_tested_periodically_and_at_once_for_a_suspect_leg() {
         let mut leg_swap = LegSwap::default();
         let due: Vec<bool> = (0..8).map(|_| leg_swap.is_due(false)).collect();
-        assert_eq!(due.iter().filter(|due| **due).count(), 8 / REST);
+        assert_eq!(due.iter().filter(|due| **due).count(), 8 / RETRY_PERIOD);
         assert!(leg_swap.is_due(true));
     }
 }

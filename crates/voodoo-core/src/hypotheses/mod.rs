@@ -1,5 +1,5 @@
-//! Trying other configurations of arms and legs where the frame speaks against the current ones, and keeping the best by one
-//! score.
+//! Alternative configurations of arms and legs: proposed where the frame contradicts the current ones, refined, and compared by
+//! one cost.
 
 mod branch;
 mod history;
@@ -40,7 +40,7 @@ use score::CLEAR_GAIN;
 use suspicion::Suspicion;
 use unexplained::Unexplained;
 
-/// Looks at every arm and leg in every frame. Remembers what past frames said of each.
+/// Tests every arm and leg in every frame, and keeps a history of each.
 #[derive(Debug, Default)]
 pub(crate) struct Hypotheses {
     history: Vec<History>,
@@ -54,12 +54,12 @@ pub(crate) struct Hypotheses {
     pool: Pool,
     refined: Refined,
     branch: Branch,
-    /// Time of the last frame, seconds; none after a restart.
+    /// Stamp of the last frame, seconds; `None` after a restart.
     stamp: Option<f64>,
 }
 
 impl Hypotheses {
-    /// Forgets everything and makes room for another body.
+    /// Clears the history and reserves memory for another body.
     pub(crate) fn restart(&mut self, model: &Model) {
         let limbs = model.body.limbs().len();
         self.history.clear();
@@ -68,7 +68,7 @@ impl Hypotheses {
             ..History::default()
         });
         self.stamp = None;
-        // Room at once, not when the first hard frame comes.
+        // Reserved now, so that later steps do not allocate.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
         self.leg_swap.prepare(limbs);
@@ -78,19 +78,20 @@ impl Hypotheses {
         self.refined.poses.reserve(limbs);
     }
 
-    /// Follows a second body in what few cameras see, before the first one is. Returns the number of ICP steps.
+    /// Fits the second branch to a frame of few color images, before the body itself is fitted. Returns the number of ICP steps.
     pub(crate) fn follow_branch(&mut self, context: Context, fit: &mut Fit) -> usize {
         self.branch.follow(context, fit)
     }
 
-    /// How far from the far end of the body's limb, world frame, that of a second body lies, meters; none without a second body.
+    /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;
+    /// `None` without a second branch.
     pub(crate) fn branch_distance(&self, body: &Body, limb: usize, world_from_limb: &Pose) -> Option<f64> {
         self.branch.end_distance(limb, body.limbs()[limb].shape.length(), world_from_limb)
     }
 
-    /// Looks at every arm and leg; where the frame speaks against it, tries others, and takes what explains the frame better.
-    /// `detection` is what a detector says of this frame, and `detected` the poses there, world frame. Returns the number of ICP
-    /// steps.
+    /// Tests every arm and leg. Where the frame contradicts one, proposes and refines alternatives, and accepts one that explains
+    /// the frame better. `detection` holds the detections in this frame, and `detected` the poses of all limbs that were fitted
+    /// to them, world frame; empty without detections. Returns the number of ICP steps.
     pub(crate) fn improve(
         &mut self,
         context: Context,
@@ -130,13 +131,14 @@ impl Hypotheses {
             steps += self.branch.compare(context, &mut self.refined, fit, poses, predicted);
         }
         if pictures && steps > 0 {
-            // What was looked at last was tried.
+            // The last evaluated poses may be those of a rejected hypothesis.
             fit.match_last(context, poses);
         }
         steps
     }
 
-    /// Remembers where the arms and legs end that this frame proves right; a lost body has been anywhere.
+    /// Stores the end position of every arm and leg that this frame does not contradict and whose limbs are all `measured`. If
+    /// the body is `lost`, first clears all stored positions.
     pub(crate) fn remember(&mut self, model: &Model, motion: &Motion, lost: bool, measured: impl Fn(usize) -> bool) {
         if lost {
             self.history.iter_mut().for_each(|own| own.last_good_end = None);
@@ -148,14 +150,14 @@ impl Hypotheses {
         }
     }
 
-    /// The body, world, as this frame wants it where the next one has to ask for it as well.
+    /// Poses of all limbs, world frame, for each change that this frame requested and the next frame has to confirm.
     pub(crate) fn alternatives(&self) -> impl Iterator<Item = &[Pose]> {
-        let asking =
+        let requesting =
             self.history.iter().filter(|own| own.persistence.requests_change() && !own.last_proposal.is_empty());
-        asking.map(|own| &own.last_proposal[..])
+        requesting.map(|own| &own.last_proposal[..])
     }
 
-    /// Room for the worst case at once, not when the first hard frame comes.
+    /// Reserves memory for all candidates of the frame, so that later steps do not allocate.
     fn make_room(&mut self, context: Context, fit: &Fit) {
         let most = context.observation.candidates.len();
         self.suspicion.make_room(most);
@@ -172,8 +174,8 @@ impl Hypotheses {
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
-    /// Whether the frame, and those before it, speak against an arm or leg for long enough to try others; where a detector
-    /// `detector_ran`, there are new ones.
+    /// Whether the frame and the preceding ones have contradicted an arm or leg for long enough to test alternatives now.
+    /// `detector_ran` is whether there are new detections.
     fn is_suspect(&mut self, at: Extremity, detector_ran: bool, times: Times) -> bool {
         let chain = at.chain();
         if at.regions.is_some() {
@@ -187,21 +189,21 @@ impl Hypotheses {
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), chain.stretched_length(), near);
         let unexplained = near.total();
-        // Nothing else than the arm is expected about an arm, but furniture stays open beside legs.
+        // Unexplained points near an arm most likely belong to it; near a leg, they may be furniture.
         let striking = !chain.leg && !self.unexplained.cluttered && unexplained >= CLEAR_GAIN;
         let suspect = unexplained >= GAIN && self.suspicion.assess(at.context, at.matched, chain, false) != [false; 2];
         let patience = if suspect { Some(PATIENCE) } else { striking.then_some(2 * PATIENCE) };
-        // Of a leg that was refused for long a detector may tell something new.
+        // Detections are new evidence for a leg whose changes were refused for long.
         self.history[at.index].persistence.observe(patience, detector_ran && chain.leg, times)
     }
 
-    /// Fills the pool with other configurations of one arm or leg.
+    /// Fills the pool with alternative configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
         let Self { history, suspicion, rough, clusters, lean, color_directions, pool, .. } = self;
         rough.score.begin(at, &suspicion.own);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current - GAIN);
-        // The kinds of proposals: one more is a file and a line here.
+        // All kinds of proposals. To add one, add a file in `proposals` and an element here.
         let kinds: [&mut dyn Propose; 8] = [
             clusters,
             &mut LastGoodEnd,
@@ -217,8 +219,8 @@ impl Hypotheses {
         }
     }
 
-    /// Refines what was proposed until one explains the frame better. Two frames in a row have to ask for a change before it is
-    /// made: a single frame may be disturbed.
+    /// Refines the proposals until one explains the frame better. A change is made only when two consecutive frames request it,
+    /// because a single frame may be disturbed. Returns the number of ICP steps.
     fn try_proposals(
         &mut self,
         context: Context,
@@ -245,7 +247,7 @@ impl Hypotheses {
             }
             if own.persistence.vote() {
                 poses.clone_from(&refined.poses);
-                // The prediction spoke for the old configuration; the new one is what is expected now.
+                // The prediction belongs to the old configuration; the proposal replaces it.
                 predicted.clone_from(&proposal.poses);
             } else {
                 own.last_basis = proposal.basis;
@@ -272,7 +274,8 @@ mod tests {
     use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
 
-    /// Shows what is seen in `frames` to hypotheses that start with the arms hanging; the poses after every frame, and the steps.
+    /// Runs hypotheses that start with hanging arms on rendered images of the poses in `frames`. Returns the poses and the number
+    /// of ICP steps of every frame.
     fn improved(frames: &[&Vec<Pose>]) -> Vec<(Vec<Pose>, usize)> {
         let (model, mut poses) = standing();
         let config = without_background();
@@ -285,7 +288,7 @@ mod tests {
             with_context(&pixels, &config, &model, &previous, |context| {
                 fit.match_last(context, &poses);
                 let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None, &[]);
-                assert_eq!(poses == previous, predicted == previous, "what is taken is what is expected");
+                assert_eq!(poses == previous, predicted == previous, "poses and prediction change together");
                 found.push((poses.clone(), steps));
             });
         }
@@ -293,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_right_pose_is_left_alone_bit_by_bit() {
+    fn a_correct_pose_stays_the_same_to_the_bit() {
         let (_, poses) = standing();
         for (found, steps) in improved(&[&poses; 4]) {
             assert_eq!((found, steps), (poses.clone(), 0));
@@ -301,18 +304,18 @@ mod tests {
     }
 
     #[test]
-    fn a_raised_arm_is_found_when_two_frames_in_a_row_ask_for_it() {
+    fn a_raised_arm_is_found_when_two_consecutive_frames_request_it() {
         let (model, poses) = standing();
         let (truth, _) = raised(&model, &poses, 0.2);
         let found = improved(&[&truth; 5]);
         let steps: Vec<usize> = found.iter().map(|(_, steps)| *steps).collect();
-        assert_eq!(steps, [0, REFINE, REFINE, 0, 0], "one frame is waited for, two ask, and then all is well");
+        assert_eq!(steps, [0, REFINE, REFINE, 0, 0], "one frame of patience, two requests, then no test");
         assert!(found[..2].iter().all(|(found, _)| *found == poses));
         assert!(farthest(&found[2].0, &truth) < 0.01, "{}", farthest(&found[2].0, &truth));
     }
 
     #[test]
-    fn two_disturbed_frames_before_one_in_order_change_nothing() {
+    fn two_disturbed_frames_before_an_undisturbed_one_change_nothing() {
         let (model, poses) = standing();
         let (truth, _) = raised(&model, &poses, 0.2);
         for (found, _) in improved(&[&truth, &truth, &poses, &truth, &truth, &poses]) {
@@ -321,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_explain_the_frame_better_is_refused_and_leaves_no_trace() {
+    fn a_hypothesis_without_a_lower_cost_is_refused_and_restores_the_matches() {
         let (model, poses) = standing();
         let (pixels, config) = (before_wall(&model.body, &poses), without_background());
         with_context(&pixels, &config, &model, &poses, |context| {
@@ -330,12 +333,12 @@ mod tests {
             fit.match_last(context, &poses);
             let before = format!("{:?}", fit.correspondences());
             let (wrong, _) = raised(&model, &poses, 0.2);
-            // The others are as good as the current one, and no better.
+            // The second and third hypotheses equal the current poses.
             let present = Present { cost: refined.cost(context, &fit, &poses), poses: &poses };
             for (tried, basis, ended) in [
-                (&wrong, Basis::Rest, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
+                (&wrong, Basis::End, |steps, outcome| steps < REFINE && outcome == Outcome::Hopeless),
                 (&poses, Basis::Body, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
-                (&poses, Basis::Rest, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
+                (&poses, Basis::End, |steps, outcome| (steps, outcome) == (REFINE, Outcome::Refused)),
             ] as [(_, _, fn(usize, Outcome) -> bool); 3]
             {
                 let tried = Proposal { found: true, basis, poses: tried.clone() };
@@ -348,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_remembered_of_arms_that_a_frame_proves_right_until_the_body_is_lost() {
+    fn ends_of_confirmed_extremities_are_kept_until_the_body_is_lost() {
         let (model, poses) = standing();
         let mut hypotheses = Hypotheses::default();
         hypotheses.restart(&model);
@@ -359,18 +362,18 @@ mod tests {
         let known =
             |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
         assert_eq!(legs, 2);
-        // One arm is not measured, and something spoke against one that is.
+        // One arm is not measured, and the frame contradicts the other.
         let times = Times { before: 0.0, now: 0.1 };
         hypotheses.history[arm + 1].persistence.observe(Some(PATIENCE), false, times);
         hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
-        assert_eq!(known(&hypotheses), 2, "the legs");
+        assert_eq!(known(&hypotheses), 2, "only the legs are confirmed");
         hypotheses.history[arm + 1].persistence.observe(None, false, times);
         hypotheses.remember(&model, &motion, false, |_| true);
         for (own, chain) in hypotheses.history.iter().zip(&model.extremities) {
             assert_eq!(own.last_good_end, Some(chain.end(&motion.poses) + origin));
         }
         hypotheses.remember(&model, &motion, false, |_| false);
-        assert_eq!(known(&hypotheses), 4, "who is not measured now has been");
+        assert_eq!(known(&hypotheses), 4, "unmeasured limbs keep their ends");
         hypotheses.remember(&model, &motion, true, |_| false);
         assert_eq!(known(&hypotheses), 0);
     }

@@ -1,4 +1,4 @@
-//! A hypothesis after its ICP steps, and what it costs beside the current poses.
+//! Refinement of hypotheses by ICP, and comparison of their cost with that of the current poses.
 
 use super::history::Basis;
 use super::proposals::Proposal;
@@ -10,28 +10,30 @@ use crate::fit::{Context, Fit, Matched};
 use crate::math::Pose;
 use crate::regions::{self, Backdrop, Posed};
 
-/// ICP steps that refine a hypothesis: more than a frame has, since it comes from farther.
+/// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
-/// After so many of them a hypothesis is given up that costs clearly more than the current pose: of 63 that were taken in the
-/// rendered recordings none was behind at all. Looked at earlier, right ones that came from far were lost.
+/// Step at which a hypothesis is rejected if it costs clearly more than the current poses. Of 63 accepted hypotheses in the
+/// rendered recordings, none had a higher cost at this step. A test in an earlier step rejected correct ones that started far
+/// away.
 const GIVE_UP_AFTER: usize = 6;
-/// Steps with few points: they need not be exact. The hypothesis is judged by all of them.
+/// Number of first steps that use a subsample of the points. The final cost uses all points.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
-/// A pose that is nearer to the usual one by this, in squared standard deviations, is twenty times as likely before anything is seen.
+/// Decrease of the squared Mahalanobis distance from the usual posture that makes a suspect hypothesis acceptable. The prior
+/// probability of the pose is then twenty times as large.
 const MORE_USUAL: f64 = 6.0;
 
-/// How the look at a hypothesis ended.
+/// Result of the test of a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
     /// It explains the frame better.
     Better,
-    /// It does not, or is as suspect as the current pose.
+    /// It does not explain the frame better, or the arm or leg is suspect in it as well.
     Refused,
-    /// It is so much worse that the next frame will hardly think otherwise.
+    /// Its cost is so high that the next frames are unlikely to accept it.
     Hopeless,
 }
 
-/// The current poses, and what they cost.
+/// The current poses and their cost.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Present<'a> {
     pub(super) cost: Cost,
@@ -42,15 +44,16 @@ pub(super) struct Present<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Refined {
     pub(super) poses: Vec<Pose>,
-    /// Its correspondences while it is tried; those of the current poses while it is.
+    /// Correspondences that are exchanged with those of the fit: those of the current poses while the fit holds those of the
+    /// hypothesis, and vice versa.
     pub(super) matched: Correspondences,
-    /// The whole body before what pictures show.
+    /// Label images of the whole body.
     pub(super) backdrop: Backdrop,
 }
 
 impl Refined {
-    /// Refines a hypothesis of one arm or leg, with the whole body. Returns the ICP steps that took, and whether
-    /// it explains the frame better as a whole than `present`: then `fit` holds its matches, else it is as before.
+    /// Refines a hypothesis of one arm or leg together with the whole body, and compares it with `present`. Returns the number of
+    /// ICP steps and the outcome. If the hypothesis is better, `fit` holds its correspondences; otherwise `fit` is unchanged.
     pub(super) fn improves(
         &mut self,
         context: Context,
@@ -62,18 +65,18 @@ impl Refined {
     ) -> (usize, Outcome) {
         let chain = &context.model.extremities[index];
         let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
-        // What colors alone tell on the way says little.
+        // With color images alone, the cost of intermediate steps is not informative.
         let most = if pictures { f64::INFINITY } else { present.cost.total + REFUTED_GAIN };
         let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
         let hopeless = cost.total > most;
         if steps == REFINE && !hopeless && cost.is_better_than(&present.cost) {
             let matched = fit.matched(&self.poses);
-            // What is as suspect as before is not worth a jump, unless people rather move that way.
-            let mut sure =
+            // The arm or leg must no longer be suspect, unless the new posture is clearly more usual.
+            let mut is_unsuspicious =
                 |matched: Matched| pictures || !suspicion.assess(context, matched, chain, basis == Basis::Points)[0];
             let [tried, now] =
                 [&self.poses, present.poses].map(|poses| squared_mahalanobis(&context.model.body, poses));
-            if matches!(basis, Basis::Lean | Basis::Body) || sure(matched) || tried < now - MORE_USUAL {
+            if matches!(basis, Basis::Lean | Basis::Body) || is_unsuspicious(matched) || tried < now - MORE_USUAL {
                 return (steps, Outcome::Better);
             }
         }
@@ -81,12 +84,13 @@ impl Refined {
         (steps, if hopeless { Outcome::Hopeless } else { Outcome::Refused })
     }
 
-    /// Refines a hypothesis with the whole body; `fit` then holds its matches, and `matched` those of before.
+    /// Refines a hypothesis together with the whole body and returns its cost. Afterwards, `fit` holds its correspondences and
+    /// `matched` the previous ones.
     pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
         self.refine_up_to(context, fit, hypothesis, f64::INFINITY).1
     }
 
-    /// The same; it is given up on the way when it costs more than `most`. With the number of ICP steps.
+    /// Like [`Self::refine`], but stops early when the cost exceeds `most`. Returns the number of ICP steps and the cost.
     fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, Cost) {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
@@ -95,13 +99,13 @@ impl Refined {
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
-            // As in a frame's own steps, points mostly stay with the limbs they have, once it has come near.
+            // After the first half of the steps, every second step keeps the assignment of points to limbs where possible.
             if step.is_multiple_of(2) || 2 * step < REFINE {
                 fit.match_all(here, &self.poses, at);
             } else {
                 fit.match_again(here, &self.poses, at);
             }
-            // Half way, only what is far behind: of 178 that explained the frame better in the end one was.
+            // Halfway, only a much higher cost stops the refinement: this was so for one of 178 finally better hypotheses.
             let worst = match step {
                 GIVE_UP_AFTER => most,
                 _ if 2 * step == REFINE => most + SURE_GAIN,
@@ -119,7 +123,7 @@ impl Refined {
         (REFINE, self.own_cost(context, fit))
     }
 
-    /// What its own poses cost.
+    /// Cost of `self.poses`.
     fn own_cost(&mut self, context: Context, fit: &Fit) -> Cost {
         let poses = std::mem::take(&mut self.poses);
         let cost = self.cost(context, fit, &poses);
@@ -127,7 +131,8 @@ impl Refined {
         cost
     }
 
-    /// Tries to find a body that may have moved far by edges that are looked for far away. Returns the number of ICP steps.
+    /// Fits a body that may have moved far by a color-edge search over a larger distance, and accepts the result if it is better.
+    /// Returns the number of ICP steps.
     pub(super) fn try_far(
         &mut self,
         context: Context,
@@ -151,7 +156,7 @@ impl Refined {
         steps
     }
 
-    /// What matched poses cost, by pictures as well where these are all there is.
+    /// Cost of matched poses. Where color images are the only observation, it includes how well the poses explain them.
     pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
         let mut cost = overall_cost(context, fit.matched(poses));
         if context.pictures_alone() {

@@ -1,4 +1,4 @@
-//! Rough looks at other configurations of one arm or leg: cheap, so that many can be tried before one is refined.
+//! Rough cost of configurations of one arm or leg, cheap enough to compare many of them before one is refined.
 
 use std::f64::consts::TAU;
 
@@ -10,15 +10,15 @@ use crate::math::{Pose, Vec3, WeightedPoints};
 use crate::regions::{Backdrop, ColorRegions, PixelGain, Posed};
 use crate::visibility::evidence::{Visibility, limb_visibility};
 
-/// The arm or leg that is looked at, and where everything else is.
+/// The arm or leg under test, and the current poses of the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extremity<'a> {
     pub(super) context: Context<'a>,
-    /// The current poses, and what was matched there.
+    /// The current poses and their correspondences.
     pub(super) matched: Matched<'a>,
-    /// What colors tell, where nothing but pictures shows the body.
+    /// Color regions; `None` unless color images are the only observation of the body.
     pub(super) regions: Option<&'a ColorRegions>,
-    /// Its number among the extremities.
+    /// Index among the extremities of the model.
     pub(super) index: usize,
 }
 
@@ -33,22 +33,23 @@ impl<'a> Extremity<'a> {
     }
 }
 
-/// Points about one arm or leg by which rough configurations are compared, and working memory.
+/// Points near one arm or leg for the rough cost, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct RoughScore {
-    /// Those that nothing explains.
+    /// Points that no limb explains.
     pub(super) unexplained: WeightedPoints,
-    /// Those, and the ones that the arm or leg explains now: they must stay explained. Not too many.
+    /// A subsample of these, and of the points that the arm or leg explains now and has to keep explaining.
     sample: WeightedPoints,
-    /// Distances of the sample to the nearest limb that does not belong to it: what that explains is no merit of this one.
+    /// Distances of the sample to the nearest limb outside the arm or leg. Points near such a limb are explained by every
+    /// configuration.
     others: Vec<f32>,
     nearest: Vec<f32>,
     distances: Vec<f32>,
-    /// What pictures show of everything else.
+    /// Label images of the limbs outside the arm or leg.
     pub(super) backdrop: Backdrop,
 }
 
-/// Rough looks at places where an arm or leg may end.
+/// Search for the configuration of an arm or leg with the lowest rough cost.
 #[derive(Debug, Default)]
 pub(super) struct RoughSearch {
     pub(super) score: RoughScore,
@@ -56,7 +57,7 @@ pub(super) struct RoughSearch {
 }
 
 impl RoughScore {
-    /// Room for a frame of so many candidates.
+    /// Reserves memory for a frame of `count` candidates.
     pub(super) fn make_room(&mut self, count: usize) {
         for (points, count) in [(&mut self.unexplained, count), (&mut self.sample, 2 * count)] {
             points.clear();
@@ -68,7 +69,7 @@ impl RoughScore {
         }
     }
 
-    /// Draws everything else before what pictures show.
+    /// Draws the limbs outside the arm or leg into the backdrop.
     fn draw_others(&mut self, at: Extremity) {
         let Some(regions) = at.regions else { return };
         let (chain, frame, poses) = (at.chain(), at.context.observation.frame(), at.matched.poses);
@@ -77,7 +78,7 @@ impl RoughScore {
         regions.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut self.backdrop);
     }
 
-    /// What pictures say of some of its limbs at `poses`.
+    /// Pixel gain of some of its limbs at `poses`; zero without color regions.
     pub(super) fn pixel_gain(&self, at: Extremity, poses: &[Pose], limbs: impl Iterator<Item = usize>) -> PixelGain {
         let mut gain = PixelGain::default();
         let Some(regions) = at.regions else { return gain };
@@ -87,7 +88,7 @@ impl RoughScore {
         gain
     }
 
-    /// Takes the points that count: what is unexplained near by, and what it explains itself.
+    /// Sets the sample: unexplained points nearby, and the points that the arm or leg explains (`own`).
     pub(super) fn begin(&mut self, at: Extremity, own: &WeightedPoints) {
         self.draw_others(at);
         let Self { unexplained, sample, others, distances, .. } = self;
@@ -98,8 +99,8 @@ impl RoughScore {
         distances_to_others(at.context, at.matched.poses, at.chain(), &sample.points, others, distances);
     }
 
-    /// Cost of the arm or leg at `poses`, in unexplained patches. No part of it is negative: what cannot fall below `least` any
-    /// more is not looked at further.
+    /// Rough cost of the arm or leg at `poses`, in unexplained patches. The evaluation stops when the cost reaches `least`,
+    /// because the remaining terms are not negative.
     pub(super) fn cost(&mut self, at: Extremity, poses: &[Pose], least: f64) -> f64 {
         let Self { sample, others, nearest, distances, .. } = self;
         let (context, chain) = (at.context, at.chain());
@@ -108,7 +109,7 @@ impl RoughScore {
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
         let points = rough_cost(nearest, &sample.weights);
         if at.regions.is_some() {
-            // What colors explain is the only part that may be negative.
+            // The gain from colors is the only term that lowers the cost, so there is no early stop.
             return strain(context, at.matched, chain, poses) - self.pixel_gain(at, poses, chain.limbs()).gained;
         }
         if points >= least {
@@ -124,14 +125,14 @@ impl RoughScore {
 }
 
 impl RoughSearch {
-    /// Room for a body of so many limbs.
+    /// Reserves memory for a body of `limbs` limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
         self.trial.clear();
         self.trial.reserve(limbs);
     }
 
-    /// The best way to end at a place that costs less than `least`, into `best`; returns its cost. `swivels` bends about the line
-    /// from the root to the place are tried.
+    /// Finds the configuration of lowest cost that ends at `place`, among `swivels` bends about the line from the root to it. If
+    /// it costs less than `least`, writes it to `best` and returns its cost; otherwise returns `least`.
     pub(super) fn end_at(
         &mut self,
         at: Extremity,
@@ -154,8 +155,8 @@ impl RoughSearch {
         least
     }
 
-    /// Takes the configuration that `change` makes of the current one, if it costs less than `least`, into `best`; returns the
-    /// lower cost.
+    /// Applies `change` to the current poses. If the result costs less than `least`, writes it to `best` and returns its cost;
+    /// otherwise returns `least`.
     pub(super) fn changed(
         &mut self,
         at: Extremity,
@@ -185,7 +186,7 @@ mod tests {
     use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
 
     #[test]
-    fn an_arm_is_bent_the_way_it_is_visible() {
+    fn the_observed_bend_of_an_arm_has_the_lowest_cost() {
         let (model, poses) = standing();
         let (stretched, end) = raised(&model, &poses, 0.2);
         let (config, index) = (without_background(), first_arm(&model));
@@ -206,13 +207,13 @@ mod tests {
                 let mut best = Vec::new();
                 rough.end_at(at, place, 6, f64::INFINITY, &mut best);
                 let elbow = best[arm.lower].translation.distance(raised_pose[arm.lower].translation);
-                assert!(elbow < 1e-6, "bend {bend}: the elbow is {elbow} m off");
+                assert!(elbow < 1e-6, "bend {bend}: the elbow has an error of {elbow} m");
             });
         }
     }
 
     #[test]
-    fn the_raised_hand_is_where_an_arm_ends_at_least_cost() {
+    fn an_arm_that_ends_at_the_observed_hand_has_the_lowest_cost() {
         let (model, poses) = standing();
         let (raised_pose, end) = raised(&model, &poses, 0.2);
         let (pixels, config) = (before_wall(&model.body, &raised_pose), without_background());
@@ -230,13 +231,13 @@ mod tests {
             let mut best = Vec::new();
             let least = rough.end_at(at, end, 6, hanging, &mut best);
             assert!(truth < 0.3 * hanging && least < 0.5 * hanging, "{truth} and {least} of {hanging}");
-            assert!(at.chain().end(&best).distance(end) < 0.02, "the best ends there");
-            // Nothing is found that costs no less than asked for, and the best stays.
+            assert!(at.chain().end(&best).distance(end) < 0.02, "the best configuration ends at the hand");
+            // Without a lower cost, the best configuration is unchanged.
             let before = best.clone();
             let mirrored = at.root() - (end - at.root());
             assert_eq!(rough.end_at(at, mirrored, 6, least, &mut best), least);
             assert_eq!(best, before);
-            // Another change is taken only where it costs less.
+            // A change is accepted only if it costs less.
             assert_eq!(rough.changed(at, |_| (), least, &mut best), least);
             assert_eq!(best, before);
             assert_eq!(rough.changed(at, |trial| trial.copy_from_slice(&raised_pose), hanging, &mut best), truth);

@@ -1,4 +1,4 @@
-//! What the poses of a frame cost: one score by which hypotheses are compared, in unexplained patches.
+//! Cost of the poses of a frame, by which hypotheses are compared, in unexplained patches.
 
 use super::landmark_cost::extremity_landmark_cost;
 use crate::body::Body;
@@ -12,40 +12,41 @@ use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility, unexplained};
 use crate::visibility::{ALONG_LIMB, OVERLAP};
 
-/// A joint limit broken by this, or a joint turned by this since the last frame, costs one unexplained patch; radians. Limits
-/// are soft; a joint may turn by a third of a right angle between two frames.
+/// Violation of a joint limit, and rotation of a joint since the last frame, that cost one unexplained patch each; radians.
+/// Limits are soft; a joint may rotate by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// A hypothesis must cost so many patches less than the current pose: an area of six by six centimeters. As many unexplained ones
-/// near an arm or leg make it suspect, and as many it has to show of itself where unexplained points have drawn it.
+/// Minimum decrease of the total cost by a hypothesis, patches: an area of six by six centimeters. An arm or leg is suspect only
+/// with as many unexplained patches nearby, and one that was proposed from unexplained points must have as many visible patches.
 pub(crate) const GAIN: f64 = 25.0;
-/// So many of them it must gain by what cameras see: to come out of hiding, or out of another limb, is no reason to jump. Fewer
-/// flicker: so many more than the current pose a hypothesis may cost on its way.
+/// Minimum decrease of the evidence in the cost by a hypothesis, patches: less occlusion or overlap alone does not justify a
+/// change. Smaller differences fluctuate, so a hypothesis may cost this much more than the current pose while it is refined.
 pub(super) const REFUTED_GAIN: f64 = 10.0;
-/// An area of eight by eight centimeters makes an arm suspect whatever else speaks for it.
+/// Unexplained patches near an arm that make it suspect whatever other evidence supports it: an area of eight by eight
+/// centimeters.
 pub(super) const CLEAR_GAIN: f64 = 40.0;
-/// Of one direction over the opposite one so many are asked.
+/// Minimum decrease of the cost for a change to the opposite direction, patches.
 pub(crate) const SURE_GAIN: f64 = 100.0;
-/// Points looked at when rough poses are compared, at most: costs time in proportion.
+/// Maximum number of points for the rough cost; the time is proportional to it.
 pub(crate) const ROUGH_SAMPLE: usize = 400;
 
 /// Cost of a pose in unexplained patches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cost {
-    /// What cameras say against it: points that no limb explains, and surface that they see past.
+    /// Evidence against the pose: points that no limb explains, and surface that violates free space.
     pub evidence: f64,
-    /// That, what hides, and the strain of all arms and legs.
+    /// Evidence, occluded surface, and the strain of all arms and legs.
     pub total: f64,
 }
 
 impl Cost {
-    /// Whether a hypothesis that costs so much is worth a jump.
+    /// Whether a hypothesis of this cost may replace the current pose.
     pub(crate) fn is_better_than(&self, current: &Self) -> bool {
         self.total < current.total - GAIN && self.evidence < current.evidence - REFUTED_GAIN
     }
 }
 
-/// What the matched poses cost.
+/// Cost of matched poses.
 pub(crate) fn overall_cost(context: Context, matched: Matched) -> Cost {
     let Context { model, observation, .. } = context;
     let mut visible = Visibility::default();
@@ -58,8 +59,8 @@ pub(crate) fn overall_cost(context: Context, matched: Matched) -> Cost {
     Cost { evidence: points + visible.image.free_space, total: points + visible.cost() + strain }
 }
 
-/// Cost of broken joint limits, of axes inside other limbs, of missed sites and of motion since the last frame, of one arm or
-/// leg at `poses`, in unexplained patches.
+/// Cost of one arm or leg at `poses` due to joint limits, overlap with other limbs, distances from measured sites, and motion
+/// since the last frame, in unexplained patches.
 pub(super) fn strain(context: Context, matched: Matched, chain: &TwoBone, poses: &[Pose]) -> f64 {
     let (body, previous) = (&context.model.body, context.previous);
     let mut cost = 0.0;
@@ -77,13 +78,13 @@ pub(super) fn strain(context: Context, matched: Matched, chain: &TwoBone, poses:
         + extremity_landmark_cost(matched, chain, poses)
 }
 
-/// Patches of an arm or leg whose axis lies inside another limb or below the floor: there is no room for it.
+/// Patches of an arm or leg where its axis lies inside another limb or below the floor.
 fn overlap_cost(body: &Body, floor: Option<Ground>, chain: &TwoBone, poses: &[Pose]) -> f64 {
     let mut cost = 0.0;
     for limb in chain.limbs() {
         let shape = &body.limbs()[limb].shape;
         let patches = 2.0 * shape.length() * shape.b0().max(shape.b1()) / REFERENCE_PATCH;
-        // The joint of the upper limb lies inside its parent.
+        // The proximal end of the upper limb always lies inside its parent.
         let first = if limb == chain.upper { 2 } else { 0 };
         for place in &ALONG_LIMB[first..] {
             let point = poses[limb] * Vec3::new(0.0, 0.0, place * shape.length());
@@ -91,7 +92,7 @@ fn overlap_cost(body: &Body, floor: Option<Ground>, chain: &TwoBone, poses: &[Po
             let within = below
                 || (0..poses.len()).filter(|other| !chain.limbs().any(|own| own == *other)).any(|other| {
                     let shape = &body.limbs()[other].shape;
-                    // Most limbs are too far away to hold it.
+                    // Most limbs are too far away to contain the point.
                     let reach = shape.length() + shape.a0().max(shape.b0()).max(shape.a1()).max(shape.b1());
                     (point - poses[other].translation).length_squared() < reach * reach
                         && shape.approximate_distance(poses[other].inverse_transform_point(point)) < -OVERLAP
@@ -102,7 +103,7 @@ fn overlap_cost(body: &Body, floor: Option<Ground>, chain: &TwoBone, poses: &[Po
     cost
 }
 
-/// Cost of the broken limits of the joint of a limb, in unexplained patches.
+/// Cost of violated limits of the joint between a limb and its parent, in unexplained patches.
 pub(crate) fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
     let Some((parent, joint)) = &body.limbs()[limb].parent else { return 0.0 };
     let Some(limits) = &joint.limits else { return 0.0 };
@@ -113,7 +114,7 @@ pub(crate) fn limit_strain(body: &Body, poses: &[Pose], limb: usize) -> f64 {
     limits.iter().enumerate().map(excess).sum()
 }
 
-/// Lowers the least distances of points to the limbs of a pose by those to one more limb; `distances` is working memory.
+/// Updates the distances `least` of points to the nearest of several limbs with one more limb. `distances` is working memory.
 pub(crate) fn explain(
     body: &Body,
     limb: usize,
@@ -128,7 +129,7 @@ pub(crate) fn explain(
     }
 }
 
-/// Lowest and highest coordinates of points.
+/// Bounding box of points: its lowest and highest corner.
 pub(super) fn bounds(points: &Points) -> [Vec3; 2] {
     let least =
         |values: &[f32]| values.iter().fold(f32::INFINITY, |least, value| if *value < least { *value } else { least });
@@ -138,17 +139,17 @@ pub(super) fn bounds(points: &Points) -> [Vec3; 2] {
     [[least(x), least(y), least(z)], [most(x), most(y), most(z)]].map(|corner| Vec3::from_array(corner.map(f64::from)))
 }
 
-/// Whether a limb can explain any point within such bounds, however roughly.
+/// Whether a limb may explain a point within a bounding box, with the tolerance of the rough cost.
 pub(super) fn may_explain(shape: &TaperedEllipticCylinder, pose: &Pose, [low, high]: [Vec3; 2]) -> bool {
     let (middle, radius) = shape.sphere(pose);
     let gap = (middle - middle.max(low).min(high)).length() - radius;
-    // The approximate distance falls below the true one where a slice is flat.
+    // The approximate distance is smaller than the true one where a cross-section is flat.
     let flatness = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
     gap * flatness(shape.a0(), shape.b0()).min(flatness(shape.a1(), shape.b1())) <= 2.0 * EXPLAINED
 }
 
-/// Cost of points at these distances from the nearest limb of a rough pose, which explains what the camera does not see past: it is
-/// drawn in when the pose is refined.
+/// Cost of points at these distances from the nearest limb of a rough pose. The tolerance is twice that of a refined pose,
+/// because refinement pulls nearby points and limbs together.
 pub(super) fn rough_cost(distances: &[f32], weights: &[f64]) -> f64 {
     distances.iter().zip(weights).map(|(d, w)| w * (f64::from(*d) / (2.0 * EXPLAINED)).powi(2).min(1.0)).sum()
 }
@@ -166,7 +167,7 @@ mod tests {
         before_wall, first_arm, moved, put_board, raised, standing, turned, with_context, without_background,
     };
 
-    /// Costs of poses before an image of the standing body.
+    /// Costs of poses in an image of the body at `truth`.
     fn costs(model: &Model, truth: &[Pose], tried: &[Vec<Pose>]) -> Vec<Cost> {
         let (pixels, config) = (before_wall(&model.body, truth), without_background());
         with_context(&pixels, &config, model, truth, |context| {
@@ -177,7 +178,7 @@ mod tests {
                 let cost = overall_cost(context, fit.matched(poses));
                 let again = overall_cost(context, fit.matched(poses));
                 let bits = |cost: Cost| [cost.evidence, cost.total].map(f64::to_bits);
-                assert_eq!(bits(cost), bits(again), "the same inputs, another score");
+                assert_eq!(bits(cost), bits(again), "the cost of the same input must not change");
                 assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences())));
                 cost
             };
@@ -186,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_right_pose_costs_less_than_any_disturbed_one_and_a_score_changes_nothing() {
+    fn a_correct_pose_costs_less_than_disturbed_ones_and_the_cost_has_no_side_effects() {
         let (model, poses) = standing();
         let root = poses[0].translation;
         let mut tried = vec![poses.clone()];
@@ -205,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cameras_see_past_and_what_no_limb_explains_cost_their_area() {
+    fn free_space_violations_and_unexplained_points_cost_their_area() {
         let (model, poses) = standing();
         let config = without_background();
         let cost = |pixels: &[u16]| {
@@ -218,10 +219,10 @@ mod tests {
         };
         let alone = before_wall(&model.body, &poses);
         let (right, body) = cost(&alone);
-        // An empty room: all that should show is seen past.
+        // An empty room: the whole visible surface violates free space.
         let (past, points) = cost(&vec![4500; alone.len()]);
         assert!(points == 0.0 && past.evidence > 0.8 * body && past.total >= past.evidence, "{past:?} of {body}");
-        // Before a wall everything is hidden: possible, and no evidence.
+        // A nearer wall occludes the whole body, which has a cost but is no evidence against the pose.
         let (hidden, _) = cost(&vec![1000; alone.len()]);
         assert!(hidden.evidence == 0.0 && hidden.total > 0.0 && hidden.total < past.total, "{hidden:?}");
         // A board beside the body.
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn an_elbow_bent_backwards_costs_what_its_limit_is_broken_by() {
+    fn a_hyperextended_elbow_costs_the_squared_violation_of_its_limit() {
         let (model, poses) = standing();
         let chain = &model.extremities[first_arm(&model)];
         let (_, joint) = model.body.limbs()[chain.lower].parent.as_ref().unwrap();
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn an_arm_inside_the_trunk_costs_its_patches_and_one_beside_it_nothing() {
+    fn an_arm_inside_the_trunk_costs_its_patches_and_one_outside_costs_nothing() {
         let (model, poses) = standing();
         let (body, chain) = (&model.body, &model.extremities[first_arm(&model)]);
         assert_eq!(overlap_cost(body, None, chain, &poses), 0.0);
@@ -268,7 +269,7 @@ mod tests {
         chain.reach(body, &mut inside, middle, 0.0);
         let cost = overlap_cost(body, None, chain, &inside);
         assert!(cost > 10.0, "{cost} patches");
-        // A floor above the whole arm leaves it no room, one below it all.
+        // A floor above the whole arm has a cost, and one below it has none.
         let below = |offset| overlap_cost(body, Some(Ground { normal: Vec3::Y, offset }), chain, &poses);
         let ends = chain.limbs().map(|limb| poses[limb].translation.y);
         let [low, high] = ends.fold([f64::MAX, f64::MIN], |[low, high], y| [low.min(y), high.max(y)]);
@@ -276,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_costs_only_where_something_is_known_of_it() {
+    fn motion_costs_nothing_without_previous_poses() {
         let (model, poses) = standing();
         let (raised, _) = raised(&model, &poses, 0.2);
         let (pixels, config) = (before_wall(&model.body, &poses), without_background());
@@ -288,7 +289,7 @@ mod tests {
             let (unknown, hung, stayed) = (cost(&[]), cost(&poses), cost(&raised));
             assert_eq!(unknown, stayed);
             assert!(hung > unknown + 1.0, "{hung} after {unknown}");
-            // The strain of all arms and legs is part of the total, and no evidence.
+            // The strain of all arms and legs is part of the total, but not of the evidence.
             let overall = |previous| overall_cost(Context { previous, ..context }, fit.matched(&poses));
             let (still, moved) = (overall(&poses), overall(&raised));
             assert!(moved.total > still.total + 1.0 && moved.evidence == still.evidence, "{moved:?} and {still:?}");

@@ -1,4 +1,4 @@
-//! Whether the frame speaks against an arm or leg where it is.
+//! Whether the frame contradicts the configuration of an arm or leg.
 
 use super::score::{GAIN, REFUTED_GAIN, bounds, explain, may_explain};
 use crate::body::two_bone::TwoBone;
@@ -7,21 +7,21 @@ use crate::math::{Points, Pose, WeightedPoints};
 use crate::visibility::LITTLE;
 use crate::visibility::evidence::{EXPLAINED, Visibility, limb_visibility};
 
-/// It is refuted when cameras see past a larger share of it.
+/// Free-space violations on more than this fraction of the surface that faces a camera contradict an arm or leg.
 const REFUTED: f64 = 0.2;
 
-/// What an arm or leg explains now, and working memory.
+/// Points that an arm or leg explains, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct Suspicion {
-    /// Points it is matched to.
+    /// Points that are matched to the arm or leg.
     pub(super) own: WeightedPoints,
-    /// Their distances to the nearest limb that does not belong to it.
+    /// Distances of these points to the nearest limb outside the arm or leg.
     others: Vec<f32>,
     distances: Vec<f32>,
 }
 
 impl Suspicion {
-    /// Room for a frame of so many candidates.
+    /// Reserves memory for a frame of `count` candidates.
     pub(super) fn make_room(&mut self, count: usize) {
         self.own.clear();
         self.own.reserve(count);
@@ -31,12 +31,20 @@ impl Suspicion {
         }
     }
 
-    /// Whether the frame speaks against all of an arm or leg, and against what lies beyond its hinge.
+    /// Whether the frame contradicts the whole arm or leg, and whether it contradicts the part distal to its hinge.
     ///
-    /// What cameras see past counts by its area in the image. Where unexplained points have drawn it there (`drawn`), it counts
-    /// as if seen from the side, too: a thing that appears draws a calf along the ray, where nothing of it is seen. And it has
-    /// to show itself: an arm behind the trunk may end at anything that comes into view there.
-    pub(super) fn assess(&mut self, context: Context, matched: Matched, chain: &TwoBone, drawn: bool) -> [bool; 2] {
+    /// A part is contradicted when it explains few points exclusively, compared with its visible area, or when much of its
+    /// surface violates free space. Both are weighted by area in the image. With `from_points`, the configuration was selected by
+    /// unexplained points, and is also contradicted in two other cases. First, when free space is violated with patches weighted
+    /// as if viewed from the side: points of another object can align a calf with the viewing ray, where its image area is small.
+    /// Second, when its visible area is small: an arm behind the trunk can be assigned to any points that come into view nearby.
+    pub(super) fn assess(
+        &mut self,
+        context: Context,
+        matched: Matched,
+        chain: &TwoBone,
+        from_points: bool,
+    ) -> [bool; 2] {
         let upper = self.collect_own(matched, chain);
         let Self { own, others, distances } = self;
         distances_to_others(context, matched.poses, chain, &own.points, others, distances);
@@ -58,11 +66,11 @@ impl Suspicion {
         let upper = against(chain.upper, exclusive(0));
         let visible = visibility.image.front_facing - visibility.image.occluded - visibility.image.free_space;
         let past = visibility.side.free_space > (REFUTED * visibility.side.front_facing).max(GAIN);
-        let drawn = drawn && (past || visible < GAIN);
-        [upper || drawn, lower || drawn]
+        let spurious = from_points && (past || visible < GAIN);
+        [upper || spurious, lower || spurious]
     }
 
-    /// Collects the points it is matched to; returns how many of them lie on the upper limb.
+    /// Collects the points matched to the arm or leg, first those of the upper limb. Returns the number of the latter.
     fn collect_own(&mut self, matched: Matched, chain: &TwoBone) -> usize {
         self.own.clear();
         let mut upper = 0;
@@ -82,8 +90,7 @@ impl Suspicion {
     }
 }
 
-/// Distances of points to the nearest limb that does not belong to an arm or leg; those that are too far to explain a point are
-/// not told apart.
+/// Distances of points to the nearest limb outside an arm or leg. Limbs that are too far away to explain any point are ignored.
 pub(super) fn distances_to_others(
     context: Context,
     poses: &[Pose],
@@ -114,35 +121,35 @@ mod tests {
     use crate::math::{Quat, Vec3};
     use crate::testing::{before_wall, first_arm, raised, standing, turned, with_context, without_background};
 
-    /// What is said of the first arm at `poses` when the body is seen in `truth`: all of it, and beyond its hinge.
-    fn suspect(truth: &[Pose], poses: &[Pose], drawn: bool) -> [bool; 2] {
+    /// Assesses the first arm at `poses` in an image of the body at `truth`: the whole arm, and the part distal to its hinge.
+    fn suspect(truth: &[Pose], poses: &[Pose], from_points: bool) -> [bool; 2] {
         let (model, _) = standing();
         let (pixels, config) = (before_wall(&model.body, truth), without_background());
         with_context(&pixels, &config, &model, poses, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, poses);
-            Suspicion::default().assess(context, fit.matched(poses), &model.extremities[first_arm(&model)], drawn)
+            Suspicion::default().assess(context, fit.matched(poses), &model.extremities[first_arm(&model)], from_points)
         })
     }
 
     #[test]
-    fn an_arm_where_it_is_visible_is_not_suspect() {
+    fn an_arm_at_its_observed_position_is_not_suspect() {
         let (model, poses) = standing();
         let (raised, _) = raised(&model, &poses, 0.2);
         for pose in [&poses, &raised] {
-            assert_eq!([false, true].map(|drawn| suspect(pose, pose, drawn)), [[false; 2]; 2]);
+            assert_eq!([false, true].map(|from_points| suspect(pose, pose, from_points)), [[false; 2]; 2]);
         }
     }
 
     #[test]
-    fn an_arm_that_the_camera_sees_past_is_suspect() {
+    fn an_arm_that_violates_free_space_is_suspect() {
         let (model, poses) = standing();
         assert_eq!(suspect(&poses, &raised(&model, &poses, 0.2).0, false), [true; 2]);
         assert_eq!(suspect(&raised(&model, &poses, 0.2).0, &poses, false), [true; 2]);
     }
 
     #[test]
-    fn an_arm_behind_the_trunk_explains_nothing_alone() {
+    fn an_arm_behind_the_trunk_explains_nothing_exclusively() {
         let (model, poses) = standing();
         let arm = &model.extremities[first_arm(&model)];
         let mut hidden = poses.clone();
@@ -152,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_forearm_alone_may_be_wrong() {
+    fn a_wrong_forearm_makes_only_the_distal_part_suspect() {
         let (model, poses) = standing();
         let arm = &model.extremities[first_arm(&model)];
         let (truth, _) = raised(&model, &poses, 0.2);
@@ -163,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_forearm_along_the_ray_is_suspect_where_points_have_drawn_it() {
+    fn a_forearm_along_the_ray_makes_an_arm_proposed_from_points_suspect() {
         let (model, poses) = standing();
         let arm = &model.extremities[first_arm(&model)];
         let (_, joint) = model.body.limbs()[arm.lower].parent.as_ref().unwrap();
@@ -172,6 +179,6 @@ mod tests {
         bent[arm.lower] = place(joint, &poses[arm.upper], turn);
         let hand = poses[arm.lower].inverse() * poses[arm.ends[0]];
         bent[arm.ends[0]] = bent[arm.lower] * hand;
-        assert_eq!([false, true].map(|drawn| suspect(&poses, &bent, drawn)), [[false, true], [true; 2]]);
+        assert_eq!([false, true].map(|from_points| suspect(&poses, &bent, from_points)), [[false, true], [true; 2]]);
     }
 }

@@ -4,33 +4,34 @@ use crate::fit::{Context, Matched};
 use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::evidence::EXPLAINED;
 
-/// A larger share of the frame's weight than this unexplained is clutter: a heap of points in it says nothing.
+/// When more than this fraction of the frame's weight is unexplained, the scene is cluttered, and unexplained points near an arm
+/// are no evidence against it.
 pub(crate) const CLUTTER: f64 = 0.15;
 
-/// What the current matches leave unexplained.
+/// Candidates that the current correspondences leave unexplained.
 #[derive(Debug, Default)]
 pub(super) struct Unexplained {
     points: WeightedPoints,
-    /// So much is unexplained that a heap of it says nothing.
+    /// Whether the unexplained fraction exceeds `CLUTTER`.
     pub(super) cluttered: bool,
-    /// Distance of every candidate to the nearest limb it is matched to.
+    /// Distance of every candidate to the nearest limb that it is matched to.
     nearest: Vec<f32>,
 }
 
 impl Unexplained {
-    /// Collects them anew.
+    /// Collects the unexplained candidates of a frame.
     pub(super) fn collect(&mut self, context: Context, matched: Matched) {
         let candidates = context.observation.candidates;
         let Self { points, cluttered, nearest } = self;
         points.clear();
-        // Room for the worst case at once, not when the first hard frame comes.
+        // Reserved now, so that later steps do not allocate.
         points.reserve(candidates.len());
         nearest.clear();
         nearest.resize(candidates.len(), f32::INFINITY);
         for matches in &matched.correspondences.limbs {
             for (candidate, distance) in matches.candidate.iter().zip(&matches.surface.signed_distance) {
                 let nearest = &mut nearest[*candidate as usize];
-                // A refused match (a cap inside the body) still explains its point.
+                // A rejected match (to a cap inside the body) still explains its point.
                 *nearest = nearest.min(distance.abs());
             }
         }
@@ -44,7 +45,7 @@ impl Unexplained {
         *cluttered = points.total() > CLUTTER * all;
     }
 
-    /// Those within `reach` meters of a place, into `near`.
+    /// Writes the unexplained points within `reach` meters of a position to `near`.
     pub(super) fn near(&self, place: Vec3, reach: f64, near: &mut WeightedPoints) {
         near.clear();
         for index in 0..self.points.len() {
@@ -64,7 +65,7 @@ mod tests {
     use crate::math::Pose;
     use crate::testing::{before_wall, first_arm, raised, standing, with_context, without_background};
 
-    /// What the hanging arms leave unexplained when the body is seen in `truth`.
+    /// Checks the points that hanging arms leave unexplained in an image of the body at `truth`.
     fn collected(truth: &[Pose], check: impl FnOnce(&Unexplained)) {
         let (model, poses) = standing();
         let (pixels, config) = (before_wall(&model.body, truth), without_background());
@@ -78,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_right_pose_leaves_hardly_a_point_unexplained() {
+    fn a_correct_pose_leaves_few_points_unexplained() {
         let (_, poses) = standing();
         collected(&poses, |unexplained| {
             assert!(unexplained.points.total() < 5.0 && !unexplained.cluttered);
@@ -86,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_raised_arm_is_what_the_hanging_one_leaves_and_lies_about_the_shoulder() {
+    fn points_of_a_raised_arm_are_unexplained_by_a_hanging_one_and_lie_near_its_shoulder() {
         let (model, poses) = standing();
         let (truth, end) = raised(&model, &poses, 0.2);
         let chain = &model.extremities[first_arm(&model)];
@@ -98,10 +99,7 @@ mod tests {
             let hand = near.total();
             unexplained.near(root, 1.2 * chain.stretched_length(), &mut near);
             let arm = near.total();
-            assert!(
-                hand > 20.0 && arm > 0.95 * all && arm > 1.5 * hand,
-                "{hand} of the hand, {arm} of the arm, {all} in all"
-            );
+            assert!(hand > 20.0 && arm > 0.95 * all && arm > 1.5 * hand, "hand: {hand}, arm: {arm}, all: {all}");
             unexplained.near(root - 2.0 * (end - root), 0.15, &mut near);
             assert!(near.len() == 0);
         });

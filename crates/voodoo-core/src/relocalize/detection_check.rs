@@ -174,7 +174,7 @@ mod tests {
     use crate::math::Quat;
 
     #[test]
-    fn new_and_lost_tracks_are_checked_often_and_good_ones_never() {
+    fn new_lost_and_uncertain_tracks_are_checked_often_and_confident_ones_never() {
         let count = |from: f64, [limb_suspect, pose_uncertain, lost]: [bool; 3]| {
             let mut check = DetectionCheck::default();
             check.is_due(0.0, false, false, false);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_given_start_that_proves_right_is_checked_half_as_often_and_one_that_was_found_as_often_as_ever() {
+    fn a_confirmed_user_start_is_checked_half_as_often_as_an_auto_initialized_one() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let poses = body.rest_pose(Pose::IDENTITY);
         let comparisons = |auto_initialized| {
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_turned_about_or_elsewhere_is_tried_and_what_is_where_it_is_visible_is_not() {
+    fn a_detection_that_is_reversed_or_elsewhere_is_tried_and_a_consistent_one_is_not() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
         let map = JointMap::new(&body, &names, &[]);
@@ -229,19 +229,19 @@ mod tests {
             })
         };
         assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [[true; 2], [true; 2], [false; 2]]);
-        assert_eq!(tried(aside, 0.2), [false, true], "unsure of it");
+        assert_eq!(tried(aside, 0.2), [false, true], "within the uncertainty of the detection");
     }
 
     #[test]
-    fn a_lost_auto_initialized_body_is_given_up_and_any_body_that_is_no_person() {
+    fn a_lost_auto_initialized_body_is_gone_and_so_is_any_body_that_is_no_person() {
         let mut check = DetectionCheck::default();
         assert!(
             !(0..100).any(|frame| check.person_gone(f64::from(frame) / 30.0, true, None)),
-            "somebody said where it is"
+            "a body that the user placed is kept"
         );
         check.set_auto_initialized(true);
         assert!(check.person_gone(100.0 / 30.0, true, None));
-        assert!(!check.person_gone(4.0, false, None), "it is back");
+        assert!(!check.person_gone(4.0, false, None), "recovered");
         let mut check = DetectionCheck::default();
         assert!((0..4).any(|frame| check.person_gone(f64::from(frame), false, Some(-4.0))));
         let mut check = DetectionCheck::default();

@@ -7,7 +7,7 @@ use crate::hypotheses::PATIENCE;
 /// Outcome of a frame for the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FrameOutcome {
-    /// Time of the frame, seconds.
+    /// Stamp of the frame, seconds.
     pub stamp: f64,
     /// The body is lost.
     pub lost: bool,
@@ -75,13 +75,13 @@ mod tests {
     }
 
     #[test]
-    fn a_body_is_lost_from_the_second_frame_on_that_reports_so() {
+    fn a_body_is_searched_for_from_the_second_lost_frame_on() {
         let searched = |frames: i32| after((0..frames).map(|frame| outcome(f64::from(frame), true))).frames_searched();
         assert_eq!([1, 2, 3, 4].map(searched), [None, Some(0), Some(1), Some(2)]);
     }
 
     #[test]
-    fn a_lost_frame_is_forgotten_and_a_silent_camera_counts_for_nothing() {
+    fn a_single_lost_frame_is_ignored_and_frames_without_images_do_not_count() {
         let blurred = [(0.0, false), (0.1, true), (0.2, false), (0.3, true)].map(|(stamp, lost)| outcome(stamp, lost));
         let loss = after(blurred);
         assert_eq!((loss.frames_searched(), loss.recently_recovered()), (None, false));
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_is_back_is_monitored_for_a_while_and_one_that_is_degraded_is_not_back() {
+    fn a_recovered_body_is_monitored_for_a_while_and_a_degraded_one_is_not_recovered() {
         let lost = [0.1, 0.2].map(|stamp| outcome(stamp, true));
         let back = |stamp| after(lost.into_iter().chain([outcome(0.3, false), outcome(stamp, false)]));
         assert!(back(0.4).recently_recovered() && back(0.4).frames_searched().is_none());

@@ -195,8 +195,8 @@ impl Relocalizer {
         self.people.own_pixels()
     }
 
-    /// Updates the occlusion state with a frame and the positions of the body's joints, the root's first, world frame. What hides
-    /// the body is another person.
+    /// Updates the occlusion state with a frame and the positions of the body's joints, the root's first, world frame. An object
+    /// that hides the body is treated as another person.
     pub(crate) fn observe_occlusion(
         &mut self,
         views: DepthViews,
@@ -218,7 +218,7 @@ impl Relocalizer {
         among: bool,
     ) -> Option<DetectionVerdict> {
         let detected = self.people.detection().filter(|_| lost || self.check.compares())?;
-        // A lost body is at a confirmed detection.
+        // A lost body is elsewhere once a detection is confirmed.
         Some(match lost {
             true if self.tentative.observe(self.people.place()) => DetectionVerdict::Elsewhere,
             true => DetectionVerdict::Inconsistent,
@@ -351,17 +351,17 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_no_detector_knows_is_found_a_meter_beside_its_last_place() {
+    fn a_body_without_detector_is_found_a_meter_from_its_last_position() {
         let (model, poses) = standing();
         for turn in [0.0, 0.4] {
             let place = turned(&moved(&poses, 0.5 * Vec3::X), poses[0].translation + 0.5 * Vec3::X, Vec3::Y, turn);
             let off = farthest(&found(&depth(&model.body, &place)).unwrap(), &place);
-            assert!(off < 0.028, "{off} m off");
+            assert!(off < 0.028, "error of {off} m");
         }
     }
 
     #[test]
-    fn nothing_is_found_where_nothing_is_visible_or_what_is_visible_is_too_small_or_too_large() {
+    fn nothing_is_found_in_an_empty_image_or_at_a_segment_of_another_size() {
         let empty = vec![0; depth(&standing().0.body, &standing().1).len()];
         assert_eq!(found(&empty), None);
         for (depth, size) in [(2.6, [0.15, 0.2]), (3.5, [1.9, 1.4])] {

@@ -23,8 +23,8 @@ pub(super) struct Occlusion {
 }
 
 impl Occlusion {
-    /// Updates with a frame and the positions of a body's joints, the root's first, world frame; `tracked` and `visible` say
-    /// whether the body is tracked, or at least not lost. Furniture in the background may also hide the body, but is ignored
+    /// Updates with a frame and the positions of a body's joints, the root's first, world frame. `tracked` is whether the body is
+    /// tracked, and `visible` whether it is at least not lost. Furniture in the background may also hide the body, but is ignored
     /// because it is never taken for the body.
     pub(super) fn observe(
         &mut self,
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_before_a_body_that_was_tracked_hides_it_and_for_a_while_after_that() {
+    fn an_object_in_front_of_a_tracked_body_is_an_occluder_then_and_for_a_while_afterwards() {
         let (model, poses) = standing();
         let root = poses[0].translation;
         let open = before_wall(&model.body, &poses);
@@ -93,19 +93,19 @@ mod tests {
                 [0.6 * Vec3::X, 0.6 * Vec3::Z, -0.6 * Vec3::Z].map(|off| occlusion.is_occluder(frame, root + off))
             })
         };
-        assert_eq!(after(&covered, -2.0, false), [false; 3], "it was never seen");
+        assert_eq!(after(&covered, -2.0, false), [false; 3], "the body was never observed");
         for frame in 0..PATIENCE {
-            assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing stands before it");
+            assert_eq!(after(&open, 0.1 * frame as f64 - 1.0, true), [false; 3], "nothing occludes the body");
         }
         assert_eq!(after(&covered, 0.2, true), [false, false, true]);
         for tracked in [false, true] {
             assert_eq!(
                 after(&open, if tracked { 0.4 } else { 0.3 }, tracked),
                 [false, false, true],
-                "it may come back"
+                "occluded recently"
             );
         }
-        assert_eq!(after(&open, 0.3 + NEW_TRACK_AGE, true), [false; 3], "long ago");
+        assert_eq!(after(&open, 0.3 + NEW_TRACK_AGE, true), [false; 3], "no longer occluded recently");
         // The position that the body moves to while it is hidden counts as well; furniture does not.
         let beyond = moved(&poses, 0.3 * Vec3::Z);
         with_frame(&covered, 2.6, |frame| {

@@ -136,7 +136,7 @@ mod tests {
     use crate::detect::{DetectedJoint, Detection};
 
     #[test]
-    fn a_plane_under_the_feet_is_the_floor_and_a_table_above_them_is_none() {
+    fn a_plane_at_the_ankles_is_the_floor_and_one_at_another_height_is_not() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let names = ["l_ankle", "r_ankle", "l_shoulder"].map(String::from);
         let map = JointMap::new(&body, &names, &[]);

@@ -46,14 +46,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sure_detection_is_enough_and_uncertain_ones_at_one_place_add_up() {
+    fn one_confident_detection_suffices_and_weak_ones_at_one_position_add_up() {
         assert_eq!(confirmed(&[Some((6.0, 2.0))]), Some(0));
         assert_eq!(confirmed(&[Some((3.0, 2.0)); 5]), Some(1));
-        assert_eq!(confirmed(&[Some((2.5, 2.0)), Some((2.5, 2.2)), Some((2.5, 2.4))]), Some(2), "people walk");
+        assert_eq!(confirmed(&[Some((2.5, 2.0)), Some((2.5, 2.2)), Some((2.5, 2.4))]), Some(2), "a walking person");
     }
 
     #[test]
-    fn what_flickers_or_jumps_is_nobody() {
+    fn intermittent_and_jumping_detections_are_not_confirmed() {
         assert_eq!(confirmed(&[Some((4.0, 2.0)), None, None, None].repeat(5)), None);
         assert_eq!(confirmed(&[Some((1.0, 2.0)); 50]), None);
         assert_eq!(confirmed(&[Some((4.0, 2.0)), Some((4.0, 4.0))].repeat(5)), None);

@@ -1,4 +1,4 @@
-//! Tries a body at a detection: after refinement there it must explain the points no worse than the present pose.
+//! Tries a body at a new position: after refinement there, it must explain the points no worse than the present pose.
 
 use crate::body::Model;
 use crate::fit::{Context, Fit};
@@ -82,7 +82,7 @@ impl Trials {
     }
 }
 
-/// Returns the score of all hypotheses plus the costs of named sites and of the other joints.
+/// Returns the cost of poses: that of hypotheses, plus those of the sites and of the other joints.
 fn pose_score(context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
     let matched = fit.matched(poses);
     overall_cost(context, matched).total + body_landmark_cost(matched) + other_joints_strain(context.model, poses)

@@ -1,4 +1,4 @@
-//! Where the arm or leg was a frame ago, carried along by its parent.
+//! Proposes the joint rotations of the previous frame: the arm or leg moves rigidly with its parent.
 
 use super::{Pool, Propose};
 use crate::body::Body;
@@ -7,7 +7,7 @@ use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
-/// Its joints as in the frame before.
+/// Proposal with the joint rotations of the previous frame.
 #[derive(Debug)]
 pub(in crate::hypotheses) struct CarriedByParent;
 
@@ -27,7 +27,7 @@ impl Propose for CarriedByParent {
     }
 }
 
-/// The relative pose that the arm or leg had `then`, on its parent of `now`.
+/// Sets the limbs of an arm or leg in `now` such that their poses relative to their parents are those in `then`.
 fn move_with_parent(chain: &TwoBone, body: &Body, then: &[Pose], now: &mut [Pose]) {
     for limb in chain.limbs() {
         if let Some((parent, _)) = &body.limbs()[limb].parent {
@@ -43,14 +43,14 @@ mod tests {
     use crate::math::{Quat, Vec3};
 
     #[test]
-    fn an_arm_moves_with_its_parent_and_nothing_else_does() {
+    fn a_chain_moves_rigidly_with_its_parent_and_no_other_limb_moves() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let then = body.rest_pose(Pose::IDENTITY);
         let motion = Pose::from_parts(Vec3::new(0.3, -0.2, 0.1), Quat::from_rotation_z(0.4));
         for chain in TwoBone::from_body(&body) {
             let mut now: Vec<Pose> = then.iter().map(|pose| motion * *pose).collect();
             let expected = now.clone();
-            // The arm itself went elsewhere.
+            // The current poses of the arm must not matter.
             chain.limbs().for_each(|limb| now[limb] = Pose::IDENTITY);
             move_with_parent(&chain, &body, &then, &mut now);
             for (found, expected) in now.iter().zip(&expected) {

@@ -1,4 +1,5 @@
-//! The arm or leg is where pictures show its colors: its upper limb in all directions, then its lower one on the best of these.
+//! Proposes the directions that explain the colors best: of the upper limb among directions on a sphere, then of the lower limb
+//! at the best of these.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,11 +9,11 @@ use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::hypotheses::score::limit_strain;
 use crate::math::{Pose, Vec3};
 
-/// Looks in all directions; working memory.
+/// Search over directions, with working memory.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct ColorDirections {
     trial: Vec<Pose>,
-    /// The best directions of the upper limb, working frame, and what they cost.
+    /// The best directions of the upper limb, working frame, and their costs in ascending order.
     kept: Vec<(f64, Vec3)>,
 }
 
@@ -38,7 +39,7 @@ impl Propose for ColorDirections {
 }
 
 impl ColorDirections {
-    /// Room for a body of so many limbs.
+    /// Reserves memory for a body of `limbs` limbs.
     pub(in crate::hypotheses) fn make_room(&mut self, limbs: usize) {
         self.trial.clear();
         self.trial.reserve(limbs);
@@ -46,7 +47,7 @@ impl ColorDirections {
         self.kept.reserve(SWIVELS);
     }
 
-    /// The directions of the upper limb that pictures speak for most, among them the one it has.
+    /// Finds the directions of the upper limb of lowest cost. The current direction is one of the candidates.
     fn find_directions(&mut self, at: Extremity, rough: &RoughSearch) {
         let Self { trial, kept } = self;
         let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
@@ -66,7 +67,7 @@ impl ColorDirections {
     }
 }
 
-/// Directions all around, as far from each other as bends are.
+/// Directions on the unit sphere on a grid of `SWIVELS` polar angles and twice as many azimuths.
 fn directions() -> impl Iterator<Item = Vec3> {
     let step = PI / SWIVELS as f64;
     (0..SWIVELS).flat_map(move |row| {

@@ -1,17 +1,17 @@
-//! The whole body stands as a detector sees it: of a trunk that has slid aside, no arm or leg alone is right.
+//! Proposes the whole body as detected: when the trunk is displaced, no change of a single arm or leg is correct.
 
 use super::{Pool, Propose};
 use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Pose, shifted};
 
-/// Poses of all limbs as a detector sees them in this frame, world frame; empty where it did not look.
+/// Poses of all limbs, fitted to the detections in this frame, world frame; empty without detections.
 #[derive(Debug)]
 pub(in crate::hypotheses) struct DetectedBody<'a>(pub(in crate::hypotheses) &'a [Pose]);
 
 impl Propose for DetectedBody<'_> {
     fn propose(&mut self, at: Extremity, _history: &[History], _rough: &mut RoughSearch, pool: &mut Pool) {
-        // An arm alone is right or wrong by itself.
+        // A wrong arm is no evidence against the rest of the body.
         if !at.chain().leg || self.0.len() != at.matched.poses.len() {
             return;
         }
@@ -31,7 +31,7 @@ mod tests {
     use crate::testing::{before_wall, farthest, moved, standing, with_context, without_background};
 
     #[test]
-    fn of_an_uncertain_leg_the_whole_body_is_proposed_in_the_frame_of_now_and_of_an_arm_it_is_not() {
+    fn the_detected_body_is_proposed_for_legs_in_the_working_frame_and_not_for_arms() {
         let (model, poses) = standing();
         let (pixels, config, origin) =
             (before_wall(&model.body, &poses), without_background(), Vec3::new(2.0, -1.0, 0.5));
@@ -53,7 +53,7 @@ mod tests {
             assert_eq!(found.len(), 1);
             assert!(farthest(&found[0], &moved(&poses, 0.1 * Vec3::X)) < 1e-12);
             assert!(proposed(false, &truth_at).is_empty());
-            assert!(proposed(true, &[]).is_empty(), "nobody looked");
+            assert!(proposed(true, &[]).is_empty(), "no detections");
         });
     }
 }

@@ -1,4 +1,4 @@
-//! The arm or leg ends where a detector sees its wrist or ankle.
+//! Proposes an arm or leg that ends at the detected hand, wrist or ankle.
 
 use super::{Pool, Propose, SWIVELS};
 use crate::detect::Detected;
@@ -6,12 +6,13 @@ use crate::hypotheses::history::{Basis, History};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Vec3;
 
-/// What a detector says of this frame, if it looked.
+/// The detections in this frame, if the detector ran.
 #[derive(Debug)]
 pub(in crate::hypotheses) struct DetectedEnd<'a>(pub(in crate::hypotheses) Option<Detected<'a>>);
 
 impl DetectedEnd<'_> {
-    /// Where the end is seen, world frame: the hand's middle, or as far from the ankle as it is now.
+    /// Detected position of the chain's end, world frame: a joint detected on its last limb, or the detected wrist or ankle plus
+    /// the current offset of the end from it.
     fn end(&self, at: Extremity) -> Option<Vec3> {
         let (chain, body, poses) = (at.chain(), &at.context.model.body, at.matched.poses);
         let detected = self.0?;
@@ -29,10 +30,10 @@ impl Propose for DetectedEnd<'_> {
     fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
         let Some(end) = self.end(at) else { return };
         let place = end - at.context.observation.origin();
-        // The detector's elbow is no better than its wrist.
+        // The bend is searched for, because a detected elbow or knee is no more accurate than the wrist or ankle.
         let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected.poses);
         if cost < f64::INFINITY {
-            pool.detected.set(Basis::Rest);
+            pool.detected.set(Basis::End);
         }
     }
 }

@@ -1,11 +1,11 @@
-//! What the frame before asked for, again: two frames in a row have to ask for the same change.
+//! Proposes the change that the previous frame requested: two consecutive frames have to request the same change.
 
 use super::{Pool, Propose};
 use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::shifted;
 
-/// The body as the frame before wanted it.
+/// Proposal of the poses that the previous frame requested.
 #[derive(Debug)]
 pub(in crate::hypotheses) struct LastProposal;
 
@@ -16,9 +16,9 @@ impl Propose for LastProposal {
             return;
         }
         let origin = at.context.observation.origin();
-        pool.again.poses.clear();
-        pool.again.poses.extend(own.last_proposal.iter().map(|pose| shifted(pose, origin)));
-        pool.again.set(own.last_basis);
+        pool.repeated.poses.clear();
+        pool.repeated.poses.extend(own.last_proposal.iter().map(|pose| shifted(pose, origin)));
+        pool.repeated.set(own.last_basis);
     }
 }
 
@@ -33,7 +33,7 @@ mod tests {
     use crate::testing::{before_wall, farthest, first_arm, moved, raised, standing, with_context, without_background};
 
     #[test]
-    fn what_the_frame_before_asked_for_is_proposed_again_in_the_frame_of_now() {
+    fn the_last_request_is_proposed_again_in_the_current_working_frame() {
         let (model, poses) = standing();
         let (expected, _) = raised(&model, &poses, 0.2);
         let (pixels, config, index) = (before_wall(&model.body, &poses), without_background(), first_arm(&model));
@@ -53,7 +53,7 @@ mod tests {
             history[index].last_basis = Basis::Lean;
             history[index].persistence.observe(Some(1), false, Times { before: 0.0, now: 0.1 });
             LastProposal.propose(at, &history, &mut rough, &mut pool);
-            assert_eq!(pool.found().count(), 0, "nobody asked for it");
+            assert_eq!(pool.found().count(), 0, "no frame requested it");
             history[index].persistence.vote();
             history[index].persistence.observe(Some(1), false, Times { before: 0.0, now: 0.1 });
             LastProposal.propose(at, &history, &mut rough, &mut pool);

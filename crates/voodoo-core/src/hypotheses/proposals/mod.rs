@@ -1,4 +1,4 @@
-//! Where an arm, a leg or the trunk may be instead: each kind of proposal is a file.
+//! Proposals of alternative configurations of an arm, a leg or the trunk, one file for each kind.
 
 mod carried_by_parent;
 mod color_directions;
@@ -22,17 +22,18 @@ use super::history::{Basis, History};
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
-/// Bends of an arm or leg about the line from its root to its end that are tried, twice as many where nothing seen has to agree
-/// with them; and places of its end, at most, and directions of its upper limb: all cost time in proportion.
+/// Number of bends of an arm or leg about the line from its root to its end that are compared; twice as many where the position
+/// of the end is given. Also the maximum number of clusters of unexplained points, and of directions of the upper limb, for one
+/// arm or leg. The time is proportional to all of them.
 pub(crate) const SWIVELS: usize = 6;
 
-/// Looks for one kind of other configuration of an arm or leg.
+/// A kind of proposal for an arm or leg.
 pub(super) trait Propose {
-    /// Puts the best one into `pool`, where it is worth refining. `history` is that of all arms and legs.
+    /// Writes the best configuration of this kind to `pool` if it is worth refining. `history` is that of all arms and legs.
     fn propose(&mut self, at: Extremity, history: &[History], rough: &mut RoughSearch, pool: &mut Pool);
 }
 
-/// One configuration of the whole body that may be refined.
+/// A configuration of the whole body that may be refined.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Proposal {
     pub(super) found: bool,
@@ -40,28 +41,28 @@ pub(super) struct Proposal {
     pub(super) poses: Vec<Pose>,
 }
 
-/// What was proposed for one arm or leg, a slot for each kind, in the order in which they are refined.
+/// Proposals for one arm or leg: one slot for each kind, in the order in which they are refined.
 #[derive(Debug, Default)]
 pub(super) struct Pool {
-    /// The trunk leans and both feet stay. While the trunk is wrong, both legs ask for what does not last: it comes first.
+    /// The trunk leans and both feet stay. It is first because changes of single legs do not last while the trunk is wrong.
     pub(super) lean: Proposal,
-    /// What the last frame asked for: two frames that ask for a change shall ask for the same one.
-    pub(super) again: Proposal,
-    /// The end is where it was when all was well.
-    pub(super) rest: Proposal,
-    /// What explains the points best; it has to cost less than this.
+    /// The change that the previous frame requested.
+    pub(super) repeated: Proposal,
+    /// The end is at its last good position.
+    pub(super) last_good: Proposal,
+    /// The configuration of lowest rough cost, and that cost; initially an upper bound.
     pub(super) points: Proposal,
     pub(super) least: f64,
-    /// Both feet are where they were when all was well.
+    /// Both feet are at their last good positions.
     pub(super) both_feet: Proposal,
-    /// The end is where a detector sees it.
+    /// The end is at its detected position.
     pub(super) detected: Proposal,
-    /// The whole body is as a detector sees it.
+    /// The whole body has the detected poses.
     pub(super) body: Proposal,
 }
 
 impl Pool {
-    /// Room for a body of so many limbs.
+    /// Reserves memory for a body of `limbs` limbs.
     pub(super) fn prepare(&mut self, limbs: usize) {
         for proposal in self.slots() {
             proposal.poses.clear();
@@ -69,7 +70,7 @@ impl Pool {
         }
     }
 
-    /// Empties it; what explains the points has to cost less than `least`.
+    /// Clears all slots. The proposal in `points` has to cost less than `least`.
     pub(super) fn begin(&mut self, least: f64) {
         for proposal in self.slots() {
             proposal.found = false;
@@ -77,20 +78,20 @@ impl Pool {
         self.least = least;
     }
 
-    /// What was found, in the order in which it is refined.
+    /// The proposals found, in the order in which they are refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { lean, again, rest, points, both_feet, detected, body, .. } = self;
-        [lean, again, rest, points, both_feet, detected, body].into_iter().filter(|slot| slot.found)
+        let Self { lean, repeated, last_good, points, both_feet, detected, body, .. } = self;
+        [lean, repeated, last_good, points, both_feet, detected, body].into_iter().filter(|slot| slot.found)
     }
 
     fn slots(&mut self) -> [&mut Proposal; 7] {
-        let Self { lean, again, rest, points, both_feet, detected, body, .. } = self;
-        [lean, again, rest, points, both_feet, detected, body]
+        let Self { lean, repeated, last_good, points, both_feet, detected, body, .. } = self;
+        [lean, repeated, last_good, points, both_feet, detected, body]
     }
 }
 
 impl Proposal {
-    /// Fills the slot with the poses it holds.
+    /// Marks the poses in the slot as found.
     fn set(&mut self, basis: Basis) {
         (self.found, self.basis) = (true, basis);
     }

@@ -1,5 +1,6 @@
-//! A body that sits down, squats or stands up: the trunk leans about its shoulders while the feet stay where they were when all
-//! was well. A body that sinks pushes both legs out of place, and each alone is held by the other and by the trunk.
+//! Proposes a lean of the trunk about its shoulders, with both feet at their last good positions, for a body that sits down,
+//! squats or stands up. A wrong height of the pelvis displaces both legs, and a change of one leg alone is held back by the other
+//! leg and the trunk.
 
 use std::f64::consts::TAU;
 
@@ -13,27 +14,29 @@ use crate::hypotheses::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
 use crate::math::{Pose, Quat, Vec3, WeightedPoints};
 use crate::visibility::evidence::limb_visibility;
 
-/// Leans that are tried after none, radians, and twice as far: coarser or finer ones were no better.
+/// Step between the leans that are compared, radians: none, and one or two steps in each direction. Coarser and finer steps gave
+/// no better results.
 const LEAN: f64 = 0.2;
 
-/// What leans and what stands, and working memory.
+/// The limbs that lean and the legs that stand, and working memory.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct TrunkLean {
-    /// The two legs among the extremities, none of a body on one or four, and the two arms: without them nothing leans.
+    /// The two legs and the two arms among the extremities; `None` if a body has another number of them. There are no proposals
+    /// without two legs, and no leans without two arms.
     legs: Option<[usize; 2]>,
     arms: Option<[usize; 2]>,
-    /// The limbs from the root to the arms.
+    /// The ancestors of the arms.
     trunk: Vec<usize>,
     sample: WeightedPoints,
     distances: Distances,
     trial: Vec<Pose>,
-    /// The body as it is, with both feet in place; the best that leans.
+    /// The body with both feet at their last good positions: with the current trunk, and with the best lean.
     upright: Vec<Pose>,
     leant: Vec<Pose>,
 }
 
-/// Distances of the sample to the nearest limb of those that stay, of those and the leaning trunk, and of the legs tried there as
-/// well.
+/// Distances of the sample to the nearest limb: of the limbs that stay; of these and the leaning trunk; and of all of these and
+/// the legs under test.
 #[derive(Debug, Default)]
 struct Distances {
     staying: Vec<f32>,
@@ -42,20 +45,20 @@ struct Distances {
     scratch: Vec<f32>,
 }
 
-/// How a body stands best with both feet in place.
+/// The best trunk pose with both feet at their last good positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stance {
-    /// Its trunk as it is.
+    /// The current one.
     Upright,
-    /// Leaning.
+    /// A lean.
     Leant,
 }
 
-/// A leg and the place of its foot, working frame.
+/// A leg and the position of its end, working frame.
 type StandingLeg<'a> = (&'a TwoBone, Vec3);
 
 impl TrunkLean {
-    /// Learns what leans and what stands of a body.
+    /// Finds the legs, the arms and the trunk of a body, and reserves memory.
     pub(in crate::hypotheses) fn prepare(&mut self, model: &Model) {
         let Model { body, extremities, .. } = model;
         let pair = |leg: bool| {
@@ -82,7 +85,7 @@ impl TrunkLean {
         }
     }
 
-    /// Room for a frame of so many candidates.
+    /// Reserves memory for a frame of `count` candidates.
     pub(in crate::hypotheses) fn make_room(&mut self, count: usize) {
         self.sample.clear();
         self.sample.reserve(count);
@@ -93,7 +96,8 @@ impl TrunkLean {
         }
     }
 
-    /// The stance that costs least, and its poses in `upright` or `leant`; none when a foot's place is not known.
+    /// Finds the stance of lowest cost and writes its poses to `upright` or `leant`. `None` if the last good position of a foot
+    /// is not known.
     fn best_stance(&mut self, context: Context, matched: Matched, history: &[History]) -> Option<Stance> {
         let extremities = &context.model.extremities;
         let [one, two] = self.legs?;
@@ -122,7 +126,7 @@ impl TrunkLean {
         stance
     }
 
-    /// The middle between the shoulders and the axis through them; zero without two arms.
+    /// The midpoint of the shoulders and the axis through them; zero without two arms.
     fn shoulders(&self, context: Context, matched: Matched) -> (Vec3, Vec3) {
         let model = context.model;
         let roots = self.arms.map(|arms| arms.map(|arm| model.extremities[arm].root(&model.body, matched.poses)));
@@ -131,7 +135,7 @@ impl TrunkLean {
         })
     }
 
-    /// Draws the sample, and its distances to the limbs that neither lean nor stand.
+    /// Draws the sample of points and computes its distances to the limbs outside the trunk and the legs.
     fn explain_what_stays(&mut self, context: Context, matched: Matched, legs: [StandingLeg; 2]) {
         let candidates = context.observation.candidates;
         self.make_room(candidates.len());
@@ -145,7 +149,7 @@ impl TrunkLean {
         }
     }
 
-    /// Turns the trunk about the shoulders, into `trial`; what cameras have against it there.
+    /// Writes the trunk, rotated about the shoulders, to `trial`. Returns the visibility cost of the trunk there.
     fn lean_trunk(&mut self, context: Context, matched: Matched, shoulders: Vec3, turn: Quat) -> f64 {
         let body = &context.model.body;
         let Self { trunk, sample, distances: Distances { staying, leaning, scratch, .. }, trial, .. } = self;
@@ -163,7 +167,8 @@ impl TrunkLean {
         cost
     }
 
-    /// Puts a leg on its foot's place below the trunk of `trial`, with the bend that costs least; what speaks against it there.
+    /// Poses a leg between the trunk in `trial` and the position of its foot, with the bend of lowest cost. Returns its cost
+    /// except that of unexplained points: visibility and strain.
     fn place_leg(&mut self, context: Context, matched: Matched, (leg, end): StandingLeg) -> f64 {
         let body = &context.model.body;
         let Self { sample, distances: Distances { leaning, tried, scratch, .. }, trial, .. } = self;
@@ -191,7 +196,7 @@ impl TrunkLean {
 
 impl Propose for TrunkLean {
     fn propose(&mut self, at: Extremity, history: &[History], _rough: &mut RoughSearch, pool: &mut Pool) {
-        // Pictures have no points to judge a trunk by.
+        // With color images alone, there are no points to evaluate the trunk.
         if !at.chain().leg || at.regions.is_some() {
             return;
         }
@@ -201,11 +206,11 @@ impl Propose for TrunkLean {
                 pool.lean.set(Basis::Lean);
             }
             Some(Stance::Upright) => {
-                // Both feet, when both legs are in doubt.
+                // Both feet are moved together only when all legs are suspect.
                 let extremities = at.context.model.extremities.iter().zip(history);
                 if extremities.into_iter().all(|(chain, own)| !chain.leg || !own.persistence.is_clear()) {
                     pool.both_feet.poses.clone_from(&self.upright);
-                    pool.both_feet.set(Basis::Rest);
+                    pool.both_feet.set(Basis::End);
                 }
             }
             None => {}
@@ -222,8 +227,8 @@ mod tests {
     use crate::config::Config;
     use crate::testing::{depth, turned, with_context};
 
-    /// A person upright in a camera's frame whose trunk and head are bent forward by `bow`, with thighs and calves at these
-    /// angles from the vertical, the middle of the feet at the same place for all.
+    /// A person in front of a camera whose trunk and head are bent forward by `bow`, with thighs and calves at the given angles
+    /// from the vertical. The midpoint of the feet does not depend on the angles.
     fn bent(body: &Body, bow: f64, thigh: f64, calf: f64) -> Vec<Pose> {
         let upright = Quat::from_axis_angle(Vec3::X, std::f64::consts::FRAC_PI_2);
         let rest = body.rest_pose(Pose::from_parts(Vec3::ZERO, upright * Quat::from_axis_angle(Vec3::Z, -1.571)));
@@ -247,7 +252,7 @@ mod tests {
         poses.iter().map(|pose| Pose::from_parts(pose.translation + shift, pose.rotation)).collect()
     }
 
-    /// Largest distance of a hip or knee from where it is in `truth`.
+    /// Maximum error of a hip or knee position.
     fn off(legs: &[&TwoBone], body: &Body, poses: &[Pose], truth: &[Pose]) -> f64 {
         let places = |leg: &TwoBone, poses: &[Pose]| [leg.root(body, poses), poses[leg.lower].translation];
         let distances = legs.iter().flat_map(|leg| {
@@ -258,12 +263,12 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_sits_down_leans_until_its_feet_stand() {
+    fn the_trunk_of_a_sitting_body_leans_until_its_feet_are_in_place() {
         let model = Model::new(Body::human(1.75, HumanModel::Full).unwrap());
         let (body, config) = (&model.body, Config::default());
         let truth = bent(body, 0.5, 1.1, 0.15);
         let pixels = depth(body, &truth);
-        // The trunk has not bent, and straight legs hang on it: hips and feet are off.
+        // The whole body is rotated about the shoulders, so that hips and feet are wrong.
         let arms: Vec<Vec3> =
             model.extremities.iter().filter(|arm| !arm.leg).map(|arm| arm.root(body, &truth)).collect();
         let wrong = turned(&truth, 0.5 * (arms[0] + arms[1]), (arms[1] - arms[0]).normalize(), 0.35);
@@ -288,7 +293,7 @@ mod tests {
         for leg in legs {
             assert!(leg.end(&leant).distance(leg.end(&truth)) < 0.02);
         }
-        // Where all is right nothing leans, and without a foot's place nothing is said.
+        // A correct pose does not lean, and there is no stance without positions of the feet.
         assert_eq!(stance(&truth, &ends(&truth)).0, Some(Stance::Upright));
         assert_eq!(stance(&truth, &vec![History::default(); model.extremities.len()]).0, None);
     }

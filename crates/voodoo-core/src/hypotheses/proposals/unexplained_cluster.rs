@@ -1,4 +1,4 @@
-//! The arm or leg ends at a cluster of points that no limb explains.
+//! Proposes an arm or leg that ends at a cluster of unexplained points.
 
 use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::APART;
@@ -7,14 +7,14 @@ use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::FEW;
 
-/// The end at the clusters that are farthest from the root and from each other.
+/// Proposal of ends at the clusters that are farthest from the root and from each other.
 #[derive(Debug, Default)]
 pub(in crate::hypotheses) struct UnexplainedCluster {
     apart: Vec<f32>,
 }
 
 impl UnexplainedCluster {
-    /// Room for a frame of so many candidates.
+    /// Reserves memory for a frame of `count` candidates.
     pub(in crate::hypotheses) fn make_room(&mut self, count: usize) {
         self.apart.clear();
         self.apart.reserve(count);
@@ -34,7 +34,7 @@ impl Propose for UnexplainedCluster {
     }
 }
 
-/// Where the end may be: middles of clusters, each as far as can be from the root and the others.
+/// Positions for the end: centroids of clusters, selected by farthest-point sampling from the root. `apart` is working memory.
 fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> [Option<Vec3>; SWIVELS] {
     let WeightedPoints { points, weights } = cluster;
     apart.clear();
@@ -56,7 +56,7 @@ fn end_proposals(cluster: &WeightedPoints, root: Vec3, apart: &mut Vec<f32>) -> 
                 total += weights[index];
             }
         }
-        // A few stray points are no hand.
+        // Clusters of few points are noise.
         if total > FEW {
             ends[found] = Some(sum / total);
             found += 1;
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_clusters_farthest_first() {
+    fn ends_are_cluster_centroids_farthest_first() {
         let mut points = WeightedPoints::default();
         let (far, near) = (Vec3::new(0.5, 0.1, 0.2), Vec3::new(-0.1, 0.3, -0.1));
         cluster(&mut points, near, 40);
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_proposed_without_points_or_beside_the_root() {
+    fn nothing_is_proposed_without_points_or_close_to_the_root() {
         let mut points = WeightedPoints::default();
         assert_eq!(end_proposals(&points, Vec3::ZERO, &mut Vec::new()), [None; SWIVELS]);
         cluster(&mut points, Vec3::new(0.02, 0.0, 0.0), 30);

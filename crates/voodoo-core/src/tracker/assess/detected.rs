@@ -5,9 +5,9 @@ use crate::detect::Detected;
 use crate::math::{Pose, Vec3};
 use crate::visibility::evidence::EXPLAINED;
 
-/// Returns the log odds that a limb's pose is right, from the detected positions of its near end and of the near end of the
-/// `next` limb. The sum over both joints makes a limb wrong if the detection is far from all of it, even if one joint agrees.
-/// Poses are in a frame whose origin is `origin` in the world.
+/// Returns the log odds that a limb's pose is right, from the detected positions of the proximal joints of `limbs`: the limb
+/// itself and the next one. The sum over both joints contradicts a limb if the detection is far from most of it, even if one
+/// joint agrees. Poses are in the working frame, whose origin in the world is `origin`.
 pub(super) fn detection_log_odds(
     detected: Detected,
     body: &Body,
@@ -53,13 +53,13 @@ mod tests {
     }
 
     #[test]
-    fn a_detector_speaks_for_what_it_sees_there_and_against_what_it_sees_elsewhere_as_it_is_sure() {
+    fn a_detection_supports_a_near_limb_and_contradicts_a_far_one_according_to_its_sigma() {
         for (there, aside) in log_odds(Vec3::ZERO, 0.03).into_iter().zip(log_odds(0.2 * Vec3::X, 0.03)) {
             assert!((there - 3.0).abs() < 1e-9 && aside < -10.0, "{there} {aside}");
         }
         assert!(
             log_odds(0.2 * Vec3::X, 0.2).iter().all(|value| *value > 0.0),
-            "a detector that knows little says little"
+            "a detection of large sigma does not contradict"
         );
     }
 }

@@ -1,5 +1,5 @@
-//! Status of arms and legs when color pictures are the only evidence: a limb whose position is not known to a few centimeters
-//! from color edges is not reported as measured.
+//! Status of arms and legs when color images are the only evidence: a limb whose position is not known to a few centimeters from
+//! color edges is not reported as measured.
 
 use super::Assessor;
 use crate::association::correspondence::RegionSupport;
@@ -16,8 +16,8 @@ fn sigma_factor(apart: f64) -> f64 {
 }
 
 impl Assessor {
-    /// Updates the uncertainty of each limb with a frame's color edges. `branch_distance` gives the distance of a limb's far end
-    /// to that in the second branch, if there is one.
+    /// Updates the uncertainty of each limb with a frame's color edges. `branch_distance` gives the distance of a limb's distal
+    /// end to that in the second branch, if there is one.
     pub(in crate::tracker) fn follow_edges(
         &mut self,
         model: &Model,
@@ -90,7 +90,7 @@ mod tests {
             assessor.forget_edges();
             let mut forgotten = vec![internal; poses.len()];
             assessor.report_edges(&model.extremities, &mut forgotten);
-            assert_eq!(forgotten, vec![internal; poses.len()], "edges are not all there is");
+            assert_eq!(forgotten, vec![internal; poses.len()], "edges only count as the only evidence");
             (statuses[0], [chain.upper, chain.lower, chain.ends[0]].map(|limb| statuses[limb]))
         };
         let (measured, inferred, lost) = (LimbStatus::Measured, LimbStatus::Inferred, LimbStatus::Lost);
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limb_is_uncertain_where_a_second_opinion_ends_elsewhere() {
+    fn a_limb_is_uncertain_where_the_second_branch_ends_elsewhere() {
         let (model, poses) = standing();
         let mut correspondences = Correspondences::default();
         for (limb, part) in model.body.limbs().iter().enumerate() {

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn limbs_explain_most_of_a_body_alone_and_depth_images_are_no_clouds() {
+    fn limbs_explain_most_of_a_body_exclusively_and_depth_images_are_not_point_clouds() {
         let (_, poses) = standing();
         let (weight, all) = counted(&poses, &poses, |_, exclusive| assert!(exclusive.clouds.iter().all(|w| *w == 0.0)));
         let sum: f64 = weight.iter().sum();
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn what_two_limbs_explain_is_no_merit_of_either_and_what_none_explains_counts_for_nothing() {
+    fn points_that_two_limbs_or_no_limb_explain_are_not_exclusive() {
         let (model, poses) = standing();
         let arm = &model.extremities[first_arm(&model)];
         let (raised, _) = raised(&model, &poses, 0.2);

@@ -17,11 +17,11 @@ pub(super) struct LimbHistory {
     contradicted: f64,
     /// Fraction of the front-facing patches that are unoccluded.
     visible: f64,
-    /// Filters for two events: the images show this limb in its pose, and they show its far end. `None` for limbs without
+    /// Filters for two events: the images support the limb, and they support its distal end. `None` for limbs without
     /// evidence from images.
     states: Option<[TwoState; 2]>,
     frames: usize,
-    /// Displacement of the far end in the last frame, and its difference to the displacement in the frame before, meters.
+    /// Displacement of the distal end in the last frame, and its difference to the displacement in the frame before, meters.
     motion: Vec3,
     unexpected: f64,
 }
@@ -38,18 +38,18 @@ impl LimbHistory {
         self.frames += 1;
     }
 
-    /// Updates with the displacement of the far end since the last frame, meters.
+    /// Updates with the displacement of the distal end since the last frame, meters.
     pub(super) fn moved(&mut self, motion: Vec3) {
         self.unexpected = motion.distance(self.motion);
         self.motion = motion;
     }
 
-    /// Difference between the last two displacements of the far end, meters.
+    /// Difference between the last two displacements of the distal end, meters.
     pub(super) fn unexpected(&self) -> f64 {
         self.unexpected
     }
 
-    /// Updates both filters with the log odds from this frame's images for the limb and for its far end, and with those from a
+    /// Updates both filters with the log odds from this frame's images for the limb and for its distal end, and with those from a
     /// detection. `unexpected` is the unexpected part of the motion, meters.
     pub(super) fn observe(&mut self, evidence: [f64; 2], detected: f64, unexpected: f64) {
         let mut states = self.states.unwrap_or_default();
@@ -84,12 +84,12 @@ impl LimbHistory {
         }
     }
 
-    /// Whether the images leave it open if the limb is right.
+    /// Whether the evidence of images for or against the limb is weak.
     pub(super) fn is_uncertain(&self) -> bool {
         self.states.is_some_and(|[whole, _]| whole.is_uncertain())
     }
 
-    /// Whether the far end of the limb is supported, and so the position of its child limb.
+    /// Whether the distal end of the limb is supported, and so the position of its child limb.
     pub(super) fn is_end_supported(&self) -> bool {
         self.states.is_none_or(|[_, end]| end.is_likely())
     }
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_against_a_good_limb_does_not_lose_it_and_three_do() {
+    fn a_measured_limb_is_lost_after_three_contradicting_frames_but_not_after_one() {
         let (good, bad) = ([0.5, 0.0, 1.0], [0.0, 1.0, 1.0]);
         assert_eq!(after(&[good, good], None).supported(), LimbStatus::Measured);
         assert_ne!(after(&[good, good, bad], None).supported(), LimbStatus::Inferred);
@@ -120,17 +120,17 @@ mod tests {
     }
 
     #[test]
-    fn a_hidden_limb_is_inferred_and_one_that_should_show_is_lost() {
+    fn an_occluded_limb_is_inferred_and_an_unsupported_visible_one_is_lost() {
         assert_eq!(after(&[[0.0, 0.0, 0.1]], None).supported(), LimbStatus::Inferred);
         assert_eq!(after(&[[0.0, 0.0, 1.0]], None).supported(), LimbStatus::Lost);
     }
 
     #[test]
-    fn images_correct_what_support_reports() {
+    fn evidence_of_images_overrides_the_status_by_support() {
         let weak = after(&[[0.5, 0.0, 1.0]], Some([-1.0, -1.0]));
         assert_eq!(weak.status(weak.supported()), LimbStatus::Inferred);
         let past = after(&[[0.5, 0.5, 1.0]], Some([-1.0, -1.0]));
-        assert_eq!(past.status(LimbStatus::Measured), LimbStatus::Lost, "cameras see past it");
+        assert_eq!(past.status(LimbStatus::Measured), LimbStatus::Lost, "violates free space");
         let strong = after(&[[0.0, 0.0, 1.0]], Some([2.0, -1.0]));
         assert_eq!(strong.status(strong.supported()), LimbStatus::Measured);
         assert!(!strong.is_end_supported());

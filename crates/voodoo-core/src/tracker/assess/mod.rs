@@ -6,7 +6,7 @@
 //! images in more detail; without any depth image, the status of an arm or leg follows from its parent.
 //!
 //! A lower limb is right only if the whole arm or leg is: without evidence for the upper arm, a forearm may have been fitted to
-//! any object. The far end of an upper limb is supported where its outer part is visible or where its lower limb begins.
+//! any object. The distal end of an upper limb is supported where its outer part is visible or where its lower limb begins.
 //!
 //! The internal status of the body depends on support alone, because a lost body starts a search and arms in front of the trunk
 //! must not start one. However, a body with more than a quarter of its limbs not measured is never reported as tracked.
@@ -163,7 +163,7 @@ impl Assessor {
         // If all limbs are lost, the ends stay lost, too.
         if statuses.iter().any(|status| *status != LimbStatus::Lost) {
             for chain in &model.extremities {
-                // The inner part of a forearm may be measured while its far end and the hand are not.
+                // The inner part of a forearm may be measured while its distal end and the hand are not.
                 let hidden =
                     statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].is_end_supported();
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
@@ -205,7 +205,7 @@ impl Assessor {
                 now = [1.0, 0.0, 1.0];
                 support.known = false;
             }
-            // Without depth coverage, color pictures give the evidence.
+            // Without depth coverage, color images give the evidence.
             if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
                 now = [colors.own[0] * colors.visible, colors.against[0], colors.visible];
             }
@@ -316,16 +316,16 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_that_was_set_is_trusted_before_anything_is_visible() {
+    fn a_pose_that_the_user_set_is_trusted_before_its_first_frame() {
         let estimate = reported(&trusting());
         assert_eq!(estimate.status, Status::Tracking);
         assert_eq!(estimate.limb_status, vec![LimbStatus::Inferred; standing().1.len()]);
-        assert!(!trusting().is_reliable(0), "nothing was seen");
+        assert!(!trusting().is_reliable(0), "nothing was measured");
         assert_eq!(reported(&Assessor::default()).status, Status::Searching);
     }
 
     #[test]
-    fn a_right_pose_is_tracked_and_what_is_visible_of_it_is_measured() {
+    fn a_correct_pose_is_tracked_and_its_visible_limbs_are_measured() {
         let (model, poses) = standing();
         let mut assessor = trusting();
         assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_beside_what_is_visible_is_lost_and_so_is_one_before_nothing() {
+    fn a_body_away_from_the_observed_surface_or_in_an_empty_image_is_lost() {
         let (model, poses) = standing();
         let nothing = vec![0; before_wall(&model.body, &poses).len()];
         let image = before_wall(&model.body, &poses);
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_measures_nothing_loses_the_body_whatever_was_visible_before() {
+    fn a_frame_without_measurements_loses_the_body_whatever_was_observed_before() {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
         let mut assessor = trusting();
@@ -391,13 +391,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_flat_is_lost_in_time_and_at_once_where_nobody_trusts_it() {
+    fn a_body_on_a_flat_surface_is_lost_eventually_and_at_once_after_a_move() {
         let (model, poses) = standing();
         let mut pixels = vec![0; depth(&model.body, &poses).len()];
         put_board(&mut pixels, Vec3::new(0.0, 0.0, 2.5), [0.35, 0.9]);
         let mut assessor = trusting();
         assess_frames(&mut assessor, &pixels, &poses, 10);
-        assert_ne!(assessor.status(), Status::Lost, "a blurred frame is flat, too");
+        assert_ne!(assessor.status(), Status::Lost, "a few blurred frames may look flat");
         assess_frames(&mut assessor, &pixels, &poses, 10);
         assert_eq!(reported(&assessor).status, Status::Lost);
         // A body that becomes visible again needs a few frames to be tracked.
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_given_up_has_no_limb_and_one_that_moved_is_judged_anew() {
+    fn a_lost_body_has_no_measured_limb_and_a_moved_one_is_assessed_again() {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
         let mut assessor = trusting();
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_of_limbs_decide_what_the_body_is() {
+    fn the_status_of_a_body_follows_from_its_fraction_of_measured_limbs() {
         let (measured, other) = (LimbStatus::Measured, LimbStatus::Inferred);
         let first = |count: usize| [vec![measured; count], vec![other; 16 - count]].concat();
         assert_eq!(

@@ -81,15 +81,15 @@ mod tests {
     }
 
     #[test]
-    fn one_weak_frame_against_what_was_sure_does_not_turn_it_and_several_do() {
+    fn one_weak_frame_does_not_reverse_a_confident_state_and_several_do() {
         let (good, bad) = ((max_log_odds(), 0.0), (-1.0, 0.0));
         assert!(after(&[good, good, bad, bad]).is_likely());
         assert!(!after(&[good, good, bad, bad, bad, bad, bad]).is_likely());
-        assert!(!after(&[bad]).is_likely() && after(&[good]).is_likely(), "nothing is taken for granted");
+        assert!(!after(&[bad]).is_likely() && after(&[good]).is_likely(), "the initial odds are even");
     }
 
     #[test]
-    fn what_moved_far_needs_evidence_anew() {
+    fn a_limb_that_moved_far_needs_new_evidence() {
         let weak = |moved| after(&[(max_log_odds(), 0.0), (-1.0, moved)]).is_likely();
         assert!(weak(0.02) && !weak(0.15));
         // A wrong limb becomes right in the same way.
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn one_detection_turns_no_limb_that_images_have_long_been_sure_of_and_two_turn_what_they_leave_open() {
+    fn one_detection_does_not_reverse_a_confident_state_and_two_reverse_it_without_images() {
         let detection = -20.0;
         let mut state = after(&[(max_log_odds(), 0.0); 5]);
         state.observe(max_log_odds(), detection, 0.0);
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_of_independent_things_multiply() {
+    fn probabilities_of_independent_events_multiply() {
         for (one, other) in [(0.3, -1.2), (2.0, 1.0), (-2.0, 0.5)] {
             let both = probability(one) * probability(other);
             assert!((probability(all_log_odds(&[one, other])) - both).abs() < 1e-12);
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn odds_are_even_at_a_fraction_and_grow_from_there() {
+    fn log_odds_are_zero_at_the_even_fraction_and_grow_linearly() {
         assert_eq!([support_log_odds(0.0), support_log_odds(EVEN), support_log_odds(2.0 * EVEN)], [-1.0, 0.0, 1.0]);
     }
 }
