@@ -258,7 +258,7 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
                     front_end.step(RecordedFrame(plain.stamp, (*items, spoiled)))
                 assert (front_end.frozen, front_end.reports, front_end.rays) == before
             estimate = front_end.step(observed if index % 2 else plain)
-            blobs = [skin.followed for skin in front_end.skin.values()]
+            skin = [(cue.candidates, cue.assigned) for cue in front_end.skin.values()]
             gate = copy(front_end._gate.core)
             gates = {site: gate.limit(site, "network", estimate.stamp + 0.05) for site in ("l_wrist", "r_wrist")}
             steps.append(
@@ -268,7 +268,7 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
                         front_end.frozen,
                         front_end.reports,
                         gates,
-                        blobs,
+                        skin,
                     )
                 )
             )
