@@ -91,7 +91,8 @@ def follow_people(
     ]
     written += [path for path in (outputs.overlay, outputs.save) if path is not None]
     rows = sum(len(track) for track in result.tracks.values())
-    message = f"{len(result)} frames, {len(result.tracks)} persons in {rows} rows"
+    count = len(result.tracks)
+    message = f"{len(result)} frames, {count} {'person' if count == 1 else 'persons'} in {rows} rows"
     if written:
         message += f"; wrote {' and '.join(str(path) for path in written)}"
     if interrupted:
