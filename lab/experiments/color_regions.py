@@ -184,8 +184,8 @@ def recall_and_false_alarms(
 ) -> tuple[float, float, int]:
     """Share of what is more than 10 cm off that is not called measured, and of the rest, in percent; how many are off."""
     far = errors > 0.1
-    message, false_alarms = (100 * float((~measured[which]).mean()) if which.any() else np.nan for which in (far, ~far))
-    return message, false_alarms, int(far.sum())
+    recall, false_alarms = (100 * float((~measured[which]).mean()) if which.any() else np.nan for which in (far, ~far))
+    return recall, false_alarms, int(far.sum())
 
 
 def main() -> None:
@@ -210,22 +210,22 @@ def main() -> None:
         options.cameras = cameras
         errors, measured, angles, seconds = run(folder, options)
         together.append((errors[:, ends].ravel(), measured[:, ends].ravel()))
-        message, false_alarms, count = recall_and_false_alarms(*together[-1])
+        recall, false_alarms, count = recall_and_false_alarms(*together[-1])
         lost = [joint for joint, error in zip(JOINTS, errors[-10:].mean(axis=0), strict=True) if error > 0.1]
         tenth = len(errors) // 10
         print(
             f"{folder.name} {cameras}: {100 * errors.mean():.2f} cm, {100 * (errors < 0.1).mean():.1f} % within 10 cm,"
             f" angles {angles[0]:.1f} deg, spread {angles[1]:.1f}, lost {lost},"
-            f" told {message:.0f} % of {count}, doubted {false_alarms:.1f} %, first and last tenth"
+            f" reported {recall:.0f} % of {count}, false alarms {false_alarms:.1f} %, first and last tenth"
             f" {100 * errors[:tenth].mean():.2f} {100 * errors[-tenth:].mean():.2f} cm,"
             f" {1e3 * float(np.median(seconds)):.1f} ms",
             flush=True,
         )
     if options.pairs:
-        message, false_alarms, count = recall_and_false_alarms(
+        recall, false_alarms, count = recall_and_false_alarms(
             *(np.concatenate(part) for part in zip(*together, strict=True))
         )
-        print(f"all: told {message:.1f} % of {count}, doubted {false_alarms:.1f} %")
+        print(f"all: reported {recall:.1f} % of {count}, false alarms {false_alarms:.1f} %")
 
 
 if __name__ == "__main__":

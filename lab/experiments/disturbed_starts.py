@@ -134,8 +134,8 @@ def main() -> None:
         print(f"| {recording.name} | " + " | ".join(cells) + f" | {'; '.join(gone) or 'none'} |", flush=True)
     total = len(options.recordings) * options.starts
     print(f"\nmean {np.mean(means):.2f} cm; {ended} of {total} runs end with a joint lost")
-    for (message, all_of_them), which in zip(counts, ("off by 10 cm", "nearer"), strict=True):
-        fraction = f"{100.0 * message / all_of_them:.1f} %" if all_of_them else "none"
+    for (not_measured, all_of_them), which in zip(counts, ("off by 10 cm", "nearer"), strict=True):
+        fraction = f"{100.0 * not_measured / all_of_them:.1f} %" if all_of_them else "none"
         print(f"{all_of_them} limbs {which}: {fraction} not called measured")
     calibration = calibrate(deviations)
     if calibration is not None:

@@ -112,10 +112,19 @@ def row(observed: Observed) -> str:
     false = [body for body in observed.bodies if body.kind == "empty"]
     minute = f"{60.0 * len(false) / observed.empty:.1f}" if observed.empty else ""
     seconds = sum(body.seconds for body in false)
-    message = f"{100.0 * sum(body.seconds * body.lost for body in false) / seconds:.0f} %" if false else ""
+    lost_fraction = f"{100.0 * sum(body.seconds * body.lost for body in false) / seconds:.0f} %" if false else ""
     longest = f"{max(body.seconds for body in false):.1f}" if false else ""
     left, others = (sum(body.kind == kind for body in observed.bodies) for kind in ("left", "others"))
-    cells = [observed.name, f"{observed.empty:.0f}", f"{len(false)}", minute, longest, message, f"{left}", f"{others}"]
+    cells = [
+        observed.name,
+        f"{observed.empty:.0f}",
+        f"{len(false)}",
+        minute,
+        longest,
+        lost_fraction,
+        f"{left}",
+        f"{others}",
+    ]
     return "| " + " | ".join(cells) + " |"
 
 

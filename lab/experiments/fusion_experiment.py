@@ -4,7 +4,7 @@
 
 The 2-D cue is skin color: head and hands in one color picture. Which way a fast arm goes is partly chance: each recording is
 tracked eight times (`--starts N`), the first time from its own start and then with 4 mm of noise on the start's
-joints, and the table tells the means. How much of a change is chance is told by `--modes depth again`: depth alone once
+joints, and the table has the means. How much of a change is chance is shown by `--modes depth again`: depth alone once
 more, from joints moved by another 0.1 mm. Writes table.md, groups.png (error of each joint group) and frames_SOLVER.png (what
 each of the ways makes of the frame in which fusion gains most).
 """

@@ -167,7 +167,7 @@ def main() -> None:
     parser.add_argument("--offsets", action="store_true", help="without each joint's constant offset")
     options = parser.parse_args()
     by = Judged(options.bones, options.consistent, options.whole, options.offsets)
-    found, message = Counter(), Counter()
+    found, reported = Counter(), Counter()
     for path in options.recordings:
         recording = voodoo.open_recording(path)
         if recording.reference is None:
@@ -175,16 +175,18 @@ def main() -> None:
         for winner, error, measured in judged(recording, by):
             for limit in (0.10, 0.15, 0.20):
                 found[winner, limit] += error > limit
-                message[winner, limit] += error > limit and not measured
+                reported[winner, limit] += error > limit and not measured
     print("| off by more than | " + " | ".join(f"{name} explains the depth better" for name in GROUPS) + " | all |")
     print("|---|" + "---|" * (len(GROUPS) + 1))
     for limit in (0.10, 0.15, 0.20):
-        total, all_reported = (sum(counts[name, limit] for name in GROUPS) for counts in (found, message))
+        total, all_reported = (sum(counts[name, limit] for name in GROUPS) for counts in (found, reported))
         cells = [
-            f"{fraction(found[name, limit], total)}, told {fraction(message[name, limit], found[name, limit])}"
+            f"{fraction(found[name, limit], total)}, reported {fraction(reported[name, limit], found[name, limit])}"
             for name in GROUPS
         ]
-        print(f"| {100 * limit:.0f} cm | " + " | ".join(cells) + f" | {total}, told {fraction(all_reported, total)} |")
+        print(
+            f"| {100 * limit:.0f} cm | " + " | ".join(cells) + f" | {total}, reported {fraction(all_reported, total)} |"
+        )
 
 
 def fraction(part: int, whole: int) -> str:

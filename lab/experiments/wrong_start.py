@@ -116,7 +116,7 @@ def seconds_until_right(wrong: np.ndarray, right: np.ndarray, stamps: np.ndarray
 
 
 def run(path: Path, at: Sequence[float], seed: int) -> tuple[list[list[float]], list[list[tuple[bool, int, int]]], int]:
-    """Seconds until the body is right again and what was told of it, for each of CASES lists over the starts; and how many starts
+    """Seconds until the body is right again and what status it had, for each of CASES lists over the starts; and how many starts
     were left out."""
     recording = voodoo.open_recording(path)
     reference = recording.reference

@@ -32,17 +32,17 @@ def test_wrong_frames_are_those_called_tracking_far_from_the_person(both):
 
     turns = [(near, "tracking"), (far, "tracking"), (far, "lost"), None]
     estimates = [turn and reported(root, *turn) for turn, root in zip(cycle(turns), roots, strict=False)]
-    message = example.passed(passed, estimates)
+    counts = example.passed(passed, estimates)
     inside = [index % 4 for index, frame in enumerate(passed) if begin <= frame.stamp <= end]
-    assert message.frames == len(inside) > 20
-    assert (message.wrong, message.without) == (inside.count(1), inside.count(3))
-    assert message.far == inside.count(1) + inside.count(2)
-    assert message.greatest == pytest.approx(0.7)
+    assert counts.frames == len(inside) > 20
+    assert (counts.wrong, counts.without) == (inside.count(1), inside.count(3))
+    assert counts.far == inside.count(1) + inside.count(2)
+    assert counts.greatest == pytest.approx(0.7)
 
 
 def test_whoever_is_hidden_in_a_cartwheel_is_not_taken_for_the_one_in_front(voodoo_data):
     """Everything that could lead there did once: the search, the detector's place, and hypotheses of limbs where it saw them."""
     example = load_experiment("passer_by")
     passed = WithPasserBy(open_recording(voodoo_data / "rendered" / "dev_06_cartwheel"), speed=0.6)
-    message = example.passed(passed, example.alone(passed))
-    assert message.frames > 80 and message.wrong == 0
+    counts = example.passed(passed, example.alone(passed))
+    assert counts.frames > 80 and counts.wrong == 0

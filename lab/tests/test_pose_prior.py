@@ -38,16 +38,16 @@ def test_the_turns_of_a_mirrored_pose_are_the_mirrored_turns():
     np.testing.assert_allclose(swapped, pose_prior.mirrored(pose_prior.turns(poses)), atol=1e-6)
 
 
-def test_what_hidden_joints_are_reported_is_what_goes_with_the_others():
+def test_hidden_joints_are_guessed_from_the_others():
     chance = np.random.default_rng(2)
     found = chance.normal(0.0, 0.3, (2000, pose_prior.SIZE))
     knees = [pose_prior.columns(joint).start for joint in ("l_knee", "r_knee")]
     found[:, knees[0]] = 0.8 * found[:, knees[1]] + chance.normal(0.0, 0.05, 2000)
-    message = pose_prior.message(found, *pose_prior.statistics(found), ["l_knee"])
-    before, after = (np.sqrt(np.mean((found[:, knees[0]] - guess) ** 2)) for guess in (0.0, message[:, knees[0]]))
+    guessed = pose_prior.conditional_mean(found, *pose_prior.statistics(found), ["l_knee"])
+    before, after = (np.sqrt(np.mean((found[:, knees[0]] - guess) ** 2)) for guess in (0.0, guessed[:, knees[0]]))
     assert after < 0.5 * before
     others = np.delete(np.arange(pose_prior.SIZE), knees[0])
-    np.testing.assert_array_equal(message[:, others], found[:, others])
+    np.testing.assert_array_equal(guessed[:, others], found[:, others])
 
 
 @pytest.mark.long

@@ -105,7 +105,7 @@ def statistics(found: Array) -> tuple[Array, Array]:
     return both.mean(0), np.asarray(np.linalg.inv(covariance), dtype=np.float64)
 
 
-def message(found: Array, mean: Array, precision: Array, hidden: list[str]) -> Array:
+def conditional_mean(found: Array, mean: Array, precision: Array, hidden: list[str]) -> Array:
     """Turns in which those of the hidden joints are what the others tell."""
     observed = np.full(SIZE, OBSERVED_SIGMA**-2)
     for joint in hidden:
@@ -148,7 +148,7 @@ def main() -> None:
     print("| hidden | by the mean, degrees | by the others |\n|---|---|---|")
     for hidden in (["l_shoulder", "l_elbow"], ["l_elbow"], ["l_hip", "l_knee"], ["l_knee"], ["vl3"]):
         at = np.r_[tuple(columns(joint) for joint in hidden)]
-        off = left_out - message(left_out, mean, precision, hidden)
+        off = left_out - conditional_mean(left_out, mean, precision, hidden)
         errors = [np.degrees(np.sqrt((d[:, at] ** 2).sum(1).mean())) for d in (left_out - mean, off)]
         print(f"| {', '.join(hidden)} | {errors[0]:.0f} | {errors[1]:.0f} |")
 

@@ -138,11 +138,11 @@ class Scenes:
             image = sensors.user_mask(rng, image, who, height)
             who[image == 0] = 0
         tilt = about("x", rng.normal(0, 0.015)) @ about("z", rng.normal(0, 0.015))
-        x, message = rng.random(), None
+        x, given_floor = rng.random(), None
         if x < 0.35:
-            message = (tilt @ up, floor + rng.normal(0, 0.015))
-        known = tilt @ up if message is not None or x < 0.75 or abs(up[1]) < 0.6 else None
-        return Frame(image.astype(np.float32), who, sensor.intrinsics, known, message, people)
+            given_floor = (tilt @ up, floor + rng.normal(0, 0.015))
+        known = tilt @ up if given_floor is not None or x < 0.75 or abs(up[1]) < 0.6 else None
+        return Frame(image.astype(np.float32), who, sensor.intrinsics, known, given_floor, people)
 
 
 def _carried(rng: Rng, joints: dict[str, Array], pose: Pose) -> list[shapes.Mesh]:

@@ -290,9 +290,9 @@ class Live:
     def _check_roots(self) -> None:
         roots = {source.name: source.root_frame for source in self.sources if source.root_frame}
         if len(set(roots.values())) > 1:
-            message = ", ".join(f"{name} in {root!r}" for name, root in roots.items())
+            frames = ", ".join(f"{name} in {root!r}" for name, root in roots.items())
             raise VoodooError(
-                f"sources: expected one root frame, found {message}; --calibration and --frame say where they are"
+                f"sources: expected one root frame, found {frames}; --calibration and --frame say where they are"
             )
 
     @property

@@ -124,8 +124,8 @@ def open_recording(
         options["left_out"] = left_out
     unknown = sorted(set(options) - set(known))
     if unknown:
-        message = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
-        raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {message}")
+        allowed = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
+        raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {allowed}")
     recording = LOADERS[name].open(path, **options)
     found = getattr(recording, "loader", name)  # the bag determines which of the two kinds it is
     if found != name:

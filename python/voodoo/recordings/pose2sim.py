@@ -178,8 +178,8 @@ def calibration_of(path: Path, names: Sequence[str] = ()) -> Path:
         hint = (
             f"Write {path / 'Calib.toml'} with the numbers of the cameras:\n\n{tables}" if names and not found else ""
         )
-        message = "one Calib*.toml, the calibration of the cameras"
-        raise RecordingError(f"{path}: expected {message}, found {len(found) or 'none'}", hint=hint)
+        calibration = "one Calib*.toml, the calibration of the cameras"
+        raise RecordingError(f"{path}: expected {calibration}, found {len(found) or 'none'}", hint=hint)
     return found[0]
 
 

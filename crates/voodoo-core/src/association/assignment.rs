@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn sampling_keeps_what_the_configuration_reports() {
+    fn sampling_keeps_as_many_points_as_configured() {
         let config = Config { sampling_factor: 4, min_limb_points: 20, max_limb_points: 60, ..Config::default() };
         for (members, kept) in [(0, 0), (10, 10), (40, 20), (100, 25), (1000, 60)] {
             assert_eq!(sampled_count(members, &config), kept, "of {members}");

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_position_within_its_bias_reports_nothing() {
+    fn a_position_within_its_bias_has_no_effect() {
         let body = Body::human(1.75, HumanModel::Papers).unwrap();
         let poses = body.rest_pose(Pose::IDENTITY);
         let site = body.site_index("r_hip").unwrap();

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_known_fades_as_the_dense_inverse_reports() {
+    fn old_information_fades_as_the_dense_inverse_has_it() {
         let (model, poses) = standing();
         let mut filter = EdgeFilter::default();
         let found = edges(&model, &poses, &[Vec3::X, Vec3::Z], 0.7);
