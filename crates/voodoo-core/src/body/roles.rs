@@ -173,7 +173,7 @@ impl JointRole {
 /// ```
 /// use voodoo_core::{Body, HumanModel, LimbRole, Side};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let forearm = body.limb_index("l_forearm")?;
 /// assert_eq!(body.roles().limb(forearm), Some(LimbRole::Forearm(Side::Left)));
 /// assert_eq!(Side::of("r_wrist"), Some(Side::Right));
@@ -295,6 +295,12 @@ impl Roles {
     /// Pairs of a clavicle and the upper arm on it.
     pub(crate) fn clavicles(&self) -> &[[usize; 2]] {
         &self.clavicles
+    }
+
+    /// The limb of the same name on the other side.
+    pub(crate) fn counterpart(&self, limb: usize) -> Option<usize> {
+        let group = self.groups.get(limb)?;
+        (0..self.groups.len()).find(|other| *other != limb && self.groups[*other] == *group)
     }
 
     /// A group number for each limb, shared by a limb and its counterpart on the other side; counted from 0, for any body.

@@ -17,7 +17,9 @@ pub(super) const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
 /// Standard deviation of the shift of a limb's surface relative to its joints (meters), and of its relative girth: the variation
 /// between persons, clothes and definitions of joint centers that anthropometry leaves.
 pub(super) const SHIFT_SIGMA: f64 = 0.03;
-pub(super) const GIRTH_SIGMA: f64 = 0.15;
+pub(super) const GIRTH_SIGMA: f64 = 0.12;
+/// Correlation of the relative girths of a limb and its counterpart on the other side.
+const SYMMETRY: f64 = 0.9;
 /// Standard deviation of a surface point about the model, meters, and the maximum number of independent points on a limb: errors
 /// of neighbors are correlated.
 const POINT_SIGMA: f64 = 0.015;
@@ -49,59 +51,6 @@ impl Default for GirthFit {
     }
 }
 
-/// One Gauss-Newton step for shift and semi-axes from the matches of one limb.
-///
-/// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb frame),
-/// contributes the equation `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, with the relative
-/// changes `e`. Weights are robust (Cauchy). A prior pulls `total`, the change made so far, towards zero.
-pub(crate) fn girth_step(
-    shape: &TaperedEllipticCylinder,
-    matches: &LimbMatches,
-    working_from_limb: &Pose,
-    edges: &[DepthEdge],
-    total: &GirthFit,
-) -> Option<GirthFit> {
-    let (points, _) = matches.accepted();
-    if points < ENOUGH {
-        return None;
-    }
-    let mut h = SMatrix::<f64, 5, 5>::zeros();
-    let mut g = SVector::<f64, 5>::zeros();
-    let row = |foot: Vec3, n: Vec3| {
-        let girth = girth_row(shape, foot, n);
-        SVector::from([n.x, n.y, girth.x, girth.y, girth.z])
-    };
-    for index in 0..matches.weight.len() {
-        if matches.weight[index] <= 0.0 {
-            continue;
-        }
-        let distance = f64::from(matches.surface.signed_distance[index]);
-        let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
-        let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
-        let row = row(foot, n);
-        let weight = kernel(distance);
-        h += weight * row * row.transpose();
-        g += weight * distance * row;
-    }
-    let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
-    let [e0, e1, e2] = total.factors.map(|factor| factor - 1.0);
-    let so_far = SVector::from([total.shift.x, total.shift.y, e0, e1, e2]);
-    let prior = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA])
-        .map(|sigma| 1.0 / (sigma * sigma));
-    let mut h = h * information + SMatrix::from_diagonal(&prior);
-    let mut g = g * information - prior.component_mul(&so_far);
-    for edge in edges {
-        let distance = edge.reach - edge.rim;
-        let row = row(edge.foot, edge.side);
-        let weight = kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA);
-        h += weight * row * row.transpose();
-        g += weight * distance * row;
-    }
-    let step = h.cholesky()?.solve(&g);
-    let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
-    step.iter().all(|value| value.is_finite()).then(|| GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors })
-}
-
 /// Returns the derivatives of the surface displacement at `foot` along `n` (limb frame) with respect to the three relative girth
 /// changes.
 pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
@@ -116,27 +65,106 @@ pub(super) fn kernel(distance: f64) -> f64 {
     1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
 }
 
-/// Estimate of the girth of one limb since it was fitted.
+/// Prior of a limb's girth: mean and information of the logarithms of the three factors.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Girth {
+pub(super) struct GirthPrior {
+    mean: Vector3<f64>,
     information: Matrix3<f64>,
-    total: GirthFit,
 }
 
-impl Default for Girth {
-    fn default() -> Self {
-        Self { information: Matrix3::identity() / (GIRTH_SIGMA * GIRTH_SIGMA), total: GirthFit::default() }
+impl GirthPrior {
+    /// The prior of a limb whose counterpart on the other side has the girth `counterpart`; `None` for a limb without one.
+    ///
+    /// Both limbs have the standard deviation `GIRTH_SIGMA` and the correlation `SYMMETRY`.
+    pub(super) fn given(counterpart: Option<&Girth>) -> Option<Self> {
+        let alone = Self { mean: Vector3::zeros(), information: Matrix3::identity() / (GIRTH_SIGMA * GIRTH_SIGMA) };
+        let Some(counterpart) = counterpart else { return Some(alone) };
+        let own = (1.0 - SYMMETRY * SYMMETRY) * GIRTH_SIGMA * GIRTH_SIGMA;
+        let known = (counterpart.information + alone.information).try_inverse()?;
+        let covariance = known * (SYMMETRY * SYMMETRY) + Matrix3::identity() * own;
+        Some(Self { mean: SYMMETRY * (known * counterpart.measured), information: covariance.try_inverse()? })
     }
 }
 
+/// Estimate of the girth of one limb: what frames measured of the logarithms of its factors, and the factors that were applied.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Girth {
+    /// Information of the measurements, and its product with their mean.
+    information: Matrix3<f64>,
+    measured: Vector3<f64>,
+    total: GirthFit,
+}
+
 impl Girth {
+    /// Fits the surface of a limb of known pose to the matches and edges of the first frame: one Gauss-Newton step for shift and
+    /// semi-axes. Returns the change since the last step; `None` for a limb with too few points.
+    ///
+    /// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb
+    /// frame), contributes the equation `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, with
+    /// the relative changes `e`. Weights are robust (Cauchy).
+    pub(super) fn start(
+        &mut self,
+        shape: &TaperedEllipticCylinder,
+        matches: &LimbMatches,
+        working_from_limb: &Pose,
+        edges: &[DepthEdge],
+        prior: &GirthPrior,
+    ) -> Option<GirthFit> {
+        let (points, _) = matches.accepted();
+        if points < ENOUGH {
+            return None;
+        }
+        let mut h = SMatrix::<f64, 5, 5>::zeros();
+        let mut g = SVector::<f64, 5>::zeros();
+        let row = |foot: Vec3, n: Vec3| {
+            let girth = girth_row(shape, foot, n);
+            SVector::from([n.x, n.y, girth.x, girth.y, girth.z])
+        };
+        for index in 0..matches.weight.len() {
+            if matches.weight[index] <= 0.0 {
+                continue;
+            }
+            let distance = f64::from(matches.surface.signed_distance[index]);
+            let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
+            let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
+            let row = row(foot, n);
+            let weight = kernel(distance);
+            h += weight * row * row.transpose();
+            g += weight * distance * row;
+        }
+        let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
+        h *= information;
+        g *= information;
+        for edge in edges {
+            let distance = edge.reach - edge.rim;
+            let row = row(edge.foot, edge.side);
+            let weight = kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA);
+            h += weight * row * row.transpose();
+            g += weight * distance * row;
+        }
+        // The shift is eliminated, and follows from the girths.
+        let so_far = Vector2::new(self.total.shift.x, self.total.shift.y);
+        let loose = 1.0 / (SHIFT_SIGMA * SHIFT_SIGMA);
+        let shift = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() * loose;
+        let pull = g.fixed_rows::<2>(0) - so_far * loose;
+        let inverse = shift.try_inverse()?;
+        let mixed = h.fixed_view::<3, 2>(2, 0);
+        let before = self.changes();
+        self.information = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
+        self.measured = self.information * before + g.fixed_rows::<3>(2) - mixed * inverse * pull;
+        let girths = self.most_likely(prior)? - before;
+        let shift = inverse * (pull - mixed.transpose() * girths);
+        self.change(shift, girths)
+    }
+
     /// Returns the factors of the semi-axes after one more frame, by a Kalman filter of the three relative changes. `edges` lie
     /// on the sides of the limb. The lateral offset of its axis in this frame is eliminated, so edges on both sides give the most
     /// information. The thickness along the line of sight is kept: the surface there was already measured.
-    pub(crate) fn follow(
+    pub(super) fn follow(
         &mut self,
         shape: &TaperedEllipticCylinder,
         edges: impl Iterator<Item = DepthEdge>,
+        prior: &GirthPrior,
     ) -> Option<[f64; 4]> {
         let mut aside = Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * ALIKE);
         let (mut mixed, mut pull) = (Matrix3x2::zeros(), Vector2::zeros());
@@ -167,24 +195,47 @@ impl Girth {
         if h.trace() <= 0.0 {
             return None;
         }
-        self.information = self.information * (1.0 - 1.0 / REMEMBERED) + h;
-        let step = self.information.cholesky()?.solve(&g);
-        if !step.iter().all(|value| value.is_finite()) {
+        let (kept, before) = (1.0 - 1.0 / REMEMBERED, self.changes());
+        self.information = self.information * kept + h;
+        self.measured = self.measured * kept + h * before + g;
+        let girths = self.most_likely(prior)? - before;
+        self.change(Vector2::zeros(), girths).map(|done| done.axes())
+    }
+
+    /// Reduces the information of the first frame to that of any other. The errors of successive frames are correlated; those of a
+    /// first frame are not, if its pose was set exactly.
+    pub(super) fn discount(&mut self) {
+        self.information /= ALIKE;
+        self.measured /= ALIKE;
+    }
+
+    /// Standard deviation of the mean radius of a limb of this shape, meters.
+    pub(super) fn sigma(&self, shape: &TaperedEllipticCylinder, prior: &GirthPrior) -> f64 {
+        let radii = 0.25 * Vector3::new(shape.a0() + shape.a1(), shape.b0() + shape.b1(), shape.a1() + shape.b1());
+        let known = (self.information + prior.information).cholesky().map(|factor| factor.solve(&radii));
+        known.map_or(f64::NAN, |known| radii.dot(&known).max(0.0).sqrt())
+    }
+
+    /// The logarithms of the factors applied so far.
+    fn changes(&self) -> Vector3<f64> {
+        Vector3::from(self.total.factors.map(f64::ln))
+    }
+
+    /// The most likely logarithms of the factors.
+    fn most_likely(&self, prior: &GirthPrior) -> Option<Vector3<f64>> {
+        let factor = (self.information + prior.information).cholesky()?;
+        Some(factor.solve(&(self.measured + prior.information * prior.mean)))
+    }
+
+    /// Applies a shift and logarithms of factors. Returns the part of them that was applied.
+    fn change(&mut self, shift: Vector2<f64>, girths: Vector3<f64>) -> Option<GirthFit> {
+        if !shift.iter().chain(girths.iter()).all(|value| value.is_finite()) {
             return None;
         }
-        let step = GirthFit { shift: Vec3::ZERO, factors: [0, 1, 2].map(|index: usize| 1.0 + step[index]) };
-        let (total, step) = self.total.followed_by(&step);
+        let factors = [0, 1, 2].map(|index: usize| girths[index].exp());
+        let (total, done) = self.total.followed_by(&GirthFit { shift: Vec3::new(shift.x, shift.y, 0.0), factors });
         self.total = total;
-        Some(step.axes())
-    }
-}
-
-impl Girth {
-    /// Standard deviation of the mean radius of a limb of this shape, meters.
-    pub(crate) fn sigma(&self, shape: &TaperedEllipticCylinder) -> f64 {
-        let radii = 0.25 * Vector3::new(shape.a0() + shape.a1(), shape.b0() + shape.b1(), shape.a1() + shape.b1());
-        let known = self.information.cholesky().map(|factor| factor.solve(&radii));
-        known.map_or(f64::NAN, |known| radii.dot(&known).max(0.0).sqrt())
+        Some(done)
     }
 }
 
@@ -226,11 +277,11 @@ mod tests {
     fn girths_follow_the_contour_and_keep_their_thickness() {
         let truth = 0.20;
         let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
-        let mut girth = Girth::default();
+        let (mut girth, prior) = (Girth::default(), GirthPrior::given(None).unwrap());
         let mut after_one = 0.0;
         for frame in 0..60 {
             let found = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found.into_iter().flatten()).unwrap();
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found.into_iter().flatten(), &prior).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
             if frame == 0 {
@@ -246,15 +297,15 @@ mod tests {
     #[test]
     fn edges_on_one_side_report_as_far_as_the_axis_is_known() {
         let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
-        let mut girth = Girth::default();
-        let both = Girth::default().follow(&shape, sides(&shape, 0.02, 0.0).into_iter().flatten()).unwrap();
+        let (mut girth, prior) = (Girth::default(), GirthPrior::given(None).unwrap());
+        let both = Girth::default().follow(&shape, sides(&shape, 0.02, 0.0).into_iter().flatten(), &prior).unwrap();
         let one = |shape: &_| sides(shape, 0.02, 0.0).into_iter().map(|[left, _]| left).collect::<Vec<_>>();
-        let [_, after_one, ..] = girth.follow(&shape, one(&shape).into_iter()).unwrap();
+        let [_, after_one, ..] = girth.follow(&shape, one(&shape).into_iter(), &prior).unwrap();
         assert!(1.0 < after_one && after_one < both[1], "one side tells less: {after_one}, both {}", both[1]);
         for _ in 0..100 {
             let wider = 0.2 - 0.5 * (shape.b0() + shape.b1());
             let found = sides(&shape, wider, 0.0).into_iter().map(|[left, _]| left);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found).unwrap();
+            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found, &prior).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
         }
@@ -265,6 +316,6 @@ mod tests {
     #[test]
     fn girths_without_edges_stay() {
         let shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
-        assert_eq!(Girth::default().follow(&shape, std::iter::empty()), None);
+        assert_eq!(Girth::default().follow(&shape, std::iter::empty(), &GirthPrior::given(None).unwrap()), None);
     }
 }

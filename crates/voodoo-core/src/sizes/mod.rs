@@ -14,7 +14,7 @@ use crate::math::{Pose, Vec3};
 use crate::solver::LENGTH_INFORMATION;
 use color_girth::ColorGirths;
 use equalize::{START_GATE, equalize_limb_lengths};
-use girth::{GIRTH_STEPS, Girth, GirthFit, TIP_FACTORS, girth_step};
+use girth::{GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS};
 use reported::ReportedLengths;
 
 /// Greatest relative change of a limb's length in one frame.
@@ -100,7 +100,8 @@ impl Sizes {
 
     /// Standard deviation of the mean radius of a limb, meters; NaN where it was given.
     pub(crate) fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
-        self.girths.get(limb).map_or(f64::NAN, |girth| girth.sigma(&body.limbs()[limb].shape))
+        let known = self.girths.get(limb).zip(self.girth_prior(body, limb));
+        known.map_or(f64::NAN, |(girth, prior)| girth.sigma(&body.limbs()[limb].shape, &prior))
     }
 
     /// Whether the sizes are known, so that no frame changes them.
@@ -147,12 +148,11 @@ impl Sizes {
 
     fn fit_girths(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         self.girths = vec![Girth::default(); poses.len()];
-        let mut totals = vec![GirthFit::default(); poses.len()];
         let mut edges_found = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known, so the closest limb is the one that was observed.
             fit.match_points(setting.with_model(model), poses, &START_GATE);
-            for (limb, total) in totals.iter_mut().enumerate() {
+            for limb in 0..poses.len() {
                 let shape = model.body.limbs()[limb].shape;
                 edges_found.clear();
                 for view in setting.observation.views.iter() {
@@ -168,14 +168,17 @@ impl Sizes {
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let matches = &fit.correspondences().limbs[limb];
-                let Some(step) = girth_step(&shape, matches, &poses[limb], &edges_found, total) else { continue };
-                let (sum, step) = total.followed_by(&step);
+                let Some(prior) = self.girth_prior(&model.body, limb) else { continue };
+                let girth = &mut self.girths[limb];
+                let Some(step) = girth.start(&shape, matches, &poses[limb], &edges_found, &prior) else { continue };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
-                    *total = sum;
                 }
             }
+        }
+        if self.rough {
+            self.girths.iter_mut().for_each(Girth::discount);
         }
     }
 
@@ -239,15 +242,18 @@ impl Sizes {
 
     /// Updates the girths with the depth-contour edges on the sides of each limb.
     fn refine_girths(&mut self, model: &mut Model, fit: &Fit, relied_on: impl Fn(usize) -> bool) {
-        for (limb, girth) in self.girths.iter_mut().enumerate() {
-            if !relied_on(limb) {
-                continue;
-            }
+        for limb in (0..self.girths.len()).filter(|limb| relied_on(*limb)) {
+            let Some(prior) = self.girth_prior(&model.body, limb) else { continue };
             let shape = model.body.limbs()[limb].shape;
-            if let Some(axes) = girth.follow(&shape, fit.contours().sides(limb)) {
+            if let Some(axes) = self.girths[limb].follow(&shape, fit.contours().sides(limb), &prior) {
                 model.body.change_girth(limb, Vec3::ZERO, axes);
             }
         }
+    }
+
+    /// The prior of a limb's girth, given that of its counterpart.
+    fn girth_prior(&self, body: &Body, limb: usize) -> Option<GirthPrior> {
+        GirthPrior::given(body.roles().counterpart(limb).and_then(|other| self.girths.get(other)))
     }
 }
 
