@@ -32,7 +32,7 @@ class Skeletons(Node):
         depth, faults = self.resolve_topic_name("depth"), Faults(self.get_logger().warning)
         self.feed, self.frames = RosFeed([depth], faults, CLOCK), Assembler(faults)
         self.feed.expects_transforms = TFMessage is not None
-        self.follower = Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
+        self.follower = Follower(voodoo.Tracker(voodoo.Body.human()))
         types = {"/tf": TFMessage, f"{BODY}/joint_states": JointState, f"{BODY}/markers": MarkerArray}
         self.outputs = {name: self.create_publisher(kind, name, 10) for name, kind in types.items() if kind}
         self.on_message(depth, Image, IMAGE, qos_profile_sensor_data)

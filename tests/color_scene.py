@@ -26,7 +26,8 @@ _SHIRT = (60, 50, 175)
 
 
 def sequence(frames):
-    return VirtualSequence(body=voodoo.Body.human(1.75), frames=frames, speed=3.0, seed=4)
+    # Of the default human, hanging arms touch the trunk: no outline separates them.
+    return VirtualSequence(body=voodoo.Body.human(1.75, model="full"), frames=frames, speed=3.0, seed=4)
 
 
 @cache

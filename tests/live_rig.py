@@ -81,7 +81,7 @@ class Rig:
 
 def follower_of(root_frame: str = "base_link") -> Follower:
     settings = FrontEndSettings(use=("depth", "points", "scan"), ground_z=0.0 if root_frame == "base_link" else None)
-    return Follower(voodoo.Tracker(voodoo.Body.human(model="measured")), settings=settings)
+    return Follower(voodoo.Tracker(voodoo.Body.human()), settings=settings)
 
 
 def arrival_of(item, *, stamp: float | None = None, drives: bool = True, measure=None, **more) -> Arrival:

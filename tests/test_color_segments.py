@@ -95,7 +95,9 @@ def test_inverse_kinematics_takes_silhouettes_by_region(tmp_path):
     positions, known = Positions.of(recording), ["l_shoulder", "r_shoulder", "l_hip", "r_hip"]
     errors = {}
     for kind in ("none", "regions"):
-        _, found = follow(recording, start_tracker(recording), positions, sites=known, pictures=kind, rest=False)
+        _, found = follow(
+            recording, start_tracker(recording, model="full"), positions, sites=known, pictures=kind, rest=False
+        )
         errors[kind] = np.nanmean(
             [np.nanmean(found[name]) for name in ("l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_ankle", "r_ankle")]
         )

@@ -25,7 +25,7 @@ STANDING = {
     "humanoid_root": (2.4, 0.0, 0.95), "vc7": (2.4, 0.0, 1.48), "l_shoulder": (2.4, -0.18, 1.42),
     "r_shoulder": (2.4, 0.18, 1.42), "l_hip": (2.4, -0.1, 0.92), "r_hip": (2.4, 0.1, 0.92),
 }  # fmt: skip
-BODY = voodoo.Body.human(1.75, model="measured")
+BODY = voodoo.Body.human(1.75)
 NETWORK = Path(os.environ.get("VOODOO_DATA", "../shared/data")).resolve().parent / "prototypes" / "start.onnx"
 needs_onnxruntime = pytest.mark.skipif(
     importlib.util.find_spec("onnxruntime") is None, reason="onnxruntime is not installed"

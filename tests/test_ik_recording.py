@@ -86,7 +86,8 @@ def test_wrists_stand_in_for_hands_that_nobody_measured(some):
     assert {"l_wrist", "r_wrist", "skullbase"} <= set(errors)
 
 
-def test_what_nothing_reports_goes_back_to_the_mean_unless_reported_otherwise(some):
+def test_what_nothing_reports_goes_back_to_the_mean_unless_reported_otherwise(recording):
+    some = Some(recording, 40)
     drawn, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
     left, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", rest=False)
     # Targets come first: to be drawn costs them nothing.

@@ -101,7 +101,7 @@ def test_poses_are_those_of_the_recording(run):
     from voodoo.pipeline.pairing import paired
 
     settings = FrontEndSettings(use=("depth", "points", "scan"), ground_z=0.0)
-    front_end = FrontEnd(voodoo.Tracker(voodoo.Body.human(model="measured")), settings=settings)
+    front_end = FrontEnd(voodoo.Tracker(voodoo.Body.human()), settings=settings)
     for recorded, step in zip(paired(recording), rig.steps, strict=False):
         expected = front_end.step(recorded)
         assert step.stamp == expected.stamp
@@ -228,7 +228,7 @@ def played(rate, **options):
 
 
 def follower(_frame):
-    return Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
+    return Follower(voodoo.Tracker(voodoo.Body.human()))
 
 
 def test_a_slow_viewer_holds_nobody_up():

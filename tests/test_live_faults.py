@@ -221,7 +221,7 @@ def bad_transforms(bus):
 
 
 def stalls(bus):
-    bus.stalls(15)
+    bus.stalls(12)
 
 
 def stalls_long(bus):
@@ -282,6 +282,17 @@ def test_a_fault_is_named_counted_and_over_within_a_second(name):
     assert found < RIGHT_M, f"{100 * found:.1f} cm, {bus.at - begun} frames after it"
     stamps = [step.stamp for step in bus.rig.steps]
     assert len(set(stamps)) == len(stamps), "a pose is published once"
+
+
+def test_after_stalls_of_most_lengths_the_person_is_where_they_are():
+    found = []
+    for frames in range(10, 21, 2):
+        bus = Bus()
+        bus.good(15)
+        bus.stalls(frames)
+        bus.good(WITHIN_FRAMES)
+        found.append(error(bus.rig.steps[-1].estimates[1], bus.images[bus.at - 1].stamp))
+    assert np.median(found) < 0.6 * RIGHT_M, found
 
 
 def test_every_bad_image_is_counted_as_received_and_refused():

@@ -42,7 +42,7 @@ def frame(stamp, *people):
 
 @pytest.fixture(scope="module")
 def someone():
-    tracker = voodoo.Tracker(voodoo.Body.human(1.75, model="measured"))
+    tracker = voodoo.Tracker(voodoo.Body.human(1.75))
     return tracker.body, tracker.reset(joints=STANDING, fit_sizes=False)
 
 
@@ -55,7 +55,7 @@ def test_a_person_enters_and_leaves(someone):
     # Of drawn bodies a detector tells sizes that are not quite theirs: a limb may be called lost.
     assert person.id == 1 and person.status in ("tracking", "degraded") and found is people.estimate
     assert np.linalg.norm(person.estimate.joints["humanoid_root"] - STANDING["humanoid_root"]) < 0.15
-    assert people.body(1).limb_names == voodoo.Body.human(model="measured").limb_names
+    assert people.body(1).limb_names == voodoo.Body.human().limb_names
     for index in range(6, 14):
         found = people.step(frame(index / 15.0))
     assert len(found) == 0

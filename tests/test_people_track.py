@@ -231,7 +231,9 @@ def test_skin_is_searched_for_on_everybody_where_it_is_asked_for():
     recording = two_people()
     used = {}
     for use in (None, ("depth", "skin")):
-        *_, last = track_people(recording, voodoo.People(), settings=FrontEndSettings.of(recording, use=use))
-        used[use] = [person.estimate.sources[COLOR][1] for person in last.estimate]
+        steps = track_people(recording, voodoo.People(), settings=FrontEndSettings.of(recording, use=use))
+        sources = [[person.estimate.sources for person in step.estimate] for step in steps]
+        *_, last = [persons for persons in sources if persons and COLOR in persons[0]]
+        used[use] = [person[COLOR][1] for person in last]
     assert len(used[None]) == 2 and max(used[None]) == 0
     assert min(used["depth", "skin"]) >= 1, used

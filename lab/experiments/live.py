@@ -40,7 +40,7 @@ def memory_mb(process: int | str = "self") -> float:
 
 
 def follower(_frame: object) -> Follower:
-    return Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
+    return Follower(voodoo.Tracker(voodoo.Body.human()))
 
 
 class TooFast(Source):

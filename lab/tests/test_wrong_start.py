@@ -86,7 +86,7 @@ def test_a_start_elsewhere_that_had_another_stature_leaves_it_too(scale):
         name: tuple(root + scale * (place - root) + [0.0, 0.5, 0.0])
         for name, place in zip(names, truth[0], strict=True)
     }
-    tracker = voodoo.Tracker(voodoo.Body.human(model="measured"))
+    tracker = voodoo.Tracker(voodoo.Body.human())
     tracker.reset(joints=given)
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth",)))
     *_, (last, estimate) = ((index, front_end.step(frame)) for index, frame in enumerate(islice(paired(recording), 16)))

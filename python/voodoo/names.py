@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias, get_args
 
-HumanModel: TypeAlias = Literal["papers", "full", "measured"]
+HumanModel: TypeAlias = Literal["measured", "full", "papers"]
 """Models of the default human, see `voodoo.Body.human`."""
 TopicKind: TypeAlias = Literal["depth", "points", "scan", "color"]
 TOPIC_KINDS: tuple[TopicKind, ...] = get_args(TopicKind)

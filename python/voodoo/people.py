@@ -66,7 +66,7 @@ class People:
     images, clothes agree.
 
     Args:
-        body: body that is copied for every new person; None: `Body.human(model="measured")`.
+        body: body that is copied for every new person; None: `Body.human()`.
         config: parameters; `threads` persons are tracked in parallel, with bit-identical results.
         detector: finds persons in depth images, as for `Tracker`; with None only persons passed to `add` are tracked.
         limit: largest number of persons tracked at the same time; None: any number.
@@ -101,7 +101,7 @@ class People:
         if not (isinstance(forget_after, int | float) and math.isfinite(forget_after) and forget_after >= 0.0):
             raise ConfigError(f"forget_after: expected a finite number of seconds, found {forget_after!r}")
         self.config = Config() if config is None else config
-        self._prototype = Body.human(model="measured") if body is None else body
+        self._prototype = Body.human() if body is None else body
         self._core = _core.People(
             self._prototype.core,
             self.config.values(),

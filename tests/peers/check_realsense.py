@@ -19,7 +19,7 @@ def images():
 
 
 def follower(_frame):
-    return Follower(voodoo.Tracker(voodoo.Body.human(model="measured")))
+    return Follower(voodoo.Tracker(voodoo.Body.human()))
 
 
 def test_images_arrive_as_they_were_taken(images):
@@ -65,7 +65,7 @@ def test_a_calibration_reports_where_it_is(images, tmp_path):
         camera.send()
         pose = live.next(2.0).measurements[0].root_from_sensor
         assert pose[:3, 3].tolist() == [0.1, 0.0, 1.0]
-        step = Follower(voodoo.Tracker(voodoo.Body.human(model="measured"))).step
+        step = Follower(voodoo.Tracker(voodoo.Body.human())).step
         camera.send()
         camera.send()
         frame = live.next(2.0)

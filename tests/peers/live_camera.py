@@ -15,7 +15,7 @@ CAMERA = voodoo.Camera(W, H, 525.0, 525.0, 319.5, 239.5)
 
 def pictures(count: int = 30) -> list[np.ndarray]:
     """Depth images (H, W) uint16 [mm] of somebody who stands 2.4 m away before a wall and moves the arms, with noise."""
-    body = voodoo.Body.human(1.75, model="measured")
+    body = voodoo.Body.human(1.75)
     camera_from_world = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.0], [1, 0, 0, 0], [0, 0, 0, 1]])
     rng = np.random.default_rng(7)
     found = []

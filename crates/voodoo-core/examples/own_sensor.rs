@@ -27,7 +27,7 @@ fn measurement(body: &Body, reading: &Reading) -> Result<PositionRelation, BodyE
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let body = Body::human(1.75, HumanModel::Full)?;
+    let body = Body::human(1.75, HumanModel::Measured)?;
     let standing = body.rest_pose(Pose::IDENTITY);
     let wrists = ["l_wrist", "r_wrist"];
     let mut tracker = Tracker::new(body.clone(), Config::default())?;

@@ -8,7 +8,7 @@ use voodoo_core::{
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let body = Body::human(1.75, HumanModel::Full)?;
+    let body = Body::human(1.75, HumanModel::Measured)?;
     let camera = Camera::pinhole(320, 240, [290.0, 290.0, 159.5, 119.5])?;
     // The camera stands 3 m before the person at the height of the hips and looks along -x of the world.
     let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));

@@ -7,7 +7,7 @@ use crate::shape::ShapeError;
 /// ```
 /// use voodoo_core::{Body, BodyError, HumanModel};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// match body.site_index("left_wrist") {
 ///     Err(BodyError::Unknown { name, known, .. }) => {
 ///         assert!(name == "left_wrist" && known.contains(&"l_wrist".to_owned()));
@@ -104,7 +104,7 @@ impl CameraError {
 /// use voodoo_core::math::Pose;
 /// use voodoo_core::{Body, Config, Frame, HumanModel, TrackError, Tracker};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let mut tracker = Tracker::new(body.clone(), Config::default())?;
 /// tracker.reset_pose(&body.rest_pose(Pose::IDENTITY))?;
 /// tracker.step(&Frame::empty(1.0))?;

@@ -15,7 +15,7 @@
 //! use voodoo_core::{Body, Cloud, Config, Frame, HumanModel, PointSlice, Scope, Status, Tracker};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let body = Body::human(1.78, HumanModel::Full)?;
+//! let body = Body::human(1.78, HumanModel::Measured)?;
 //!
 //! // Where named sites are in the first frame: index of the site, position in the world.
 //! // Here the body stands at the origin.
@@ -132,7 +132,7 @@
 //! use voodoo_core::{Body, Config, HumanModel, People, PeopleOptions};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let people = People::new(Body::human(1.75, HumanModel::Full)?, Config::default(), PeopleOptions::default())?;
+//! let people = People::new(Body::human(1.75, HumanModel::Measured)?, Config::default(), PeopleOptions::default())?;
 //! assert_eq!(people.present().count(), 0);
 //! # Ok(())
 //! # }

@@ -7,7 +7,7 @@
 //! use voodoo_detect::Detector;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let body = Body::human(1.75, HumanModel::Full)?;
+//! let body = Body::human(1.75, HumanModel::Measured)?;
 //! let tracker = Tracker::new(body, Config::default())?.with_detector(Box::new(Detector::new()));
 //! assert!(tracker.can_search());
 //! # Ok(())

@@ -104,13 +104,14 @@ impl PyBody {
     #[staticmethod]
     fn human(py: Python<'_>, stature: f64, model: &str) -> PyResult<Self> {
         let model = match model {
+            "measured" => HumanModel::Measured,
             "papers" => HumanModel::Papers,
             "full" => HumanModel::Full,
             _ => {
                 return Err(exception(
                     py,
                     "BodyError",
-                    format!("model: expected \"full\" or \"papers\", found {model:?}"),
+                    format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}"),
                 ));
             }
         };

@@ -266,13 +266,13 @@ def _signals() -> Iterator[list[str]]:
 def warm_up() -> None:
     """Run initialization that would delay the first frames: track a person in a small image and serialize the result."""
     camera = Camera(80, 60, 66.0, 66.0, 39.5, 29.5)
-    body = Body.human(model="measured")
+    body = Body.human()
     tracker = Tracker(body)
     tracker.reset(joints=_STANDING, fit_sizes=False)
     pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
     observed = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
     image = np.where(np.isfinite(observed) & (observed > 0.0), observed, 4.0).astype(np.float32)
-    follower = Follower(Tracker(Body.human(model="measured")))
+    follower = Follower(Tracker(Body.human()))
     for number in range(3):
         item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
         step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))

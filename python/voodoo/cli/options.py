@@ -62,7 +62,7 @@ ModelOption = Annotated[
     HumanModel | None,
     typer.Option(
         "--model",
-        help="The human: full (eighteen limbs), papers (ten limbs), or measured (full, mean sizes; default without a start).",
+        help="The human: measured (eighteen limbs; default), full (the same, centered on their joints), or papers (ten limbs).",
     ),
 ]
 PeopleOption = Annotated[

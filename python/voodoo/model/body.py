@@ -34,11 +34,6 @@ class Limb:
     shape: TaperedEllipticCylinder
 
 
-_MEASURED = Path(__file__).resolve().parent.parent / "data" / "human_measured.toml"
-_MEASURED_M = 1.75
-"""Stature of the body in that file."""
-
-
 class Body:
     """A body to track. Immutable; made by `human`, `load` or `from_toml`."""
 
@@ -61,13 +56,14 @@ class Body:
         return tuple(limb.name for limb in self.limbs)
 
     @classmethod
-    def human(cls, height: float = 1.75, *, model: HumanModel = "full") -> Body:
+    def human(cls, height: float = 1.75, *, model: HumanModel = "measured") -> Body:
         """The default human.
 
         Args:
             height: stature [m], 0.3 to 3.0.
-            model: "papers": ten limbs and nine joints (K06 III-C); "full": eighteen, with waist, neck, clavicles, hands and feet;
-                "measured": the same with the mean joints and girths of 120 bodies, for persons without a given first pose.
+            model: "measured": eighteen limbs with the mean joints and girths of 120 bodies in clothes; "full": the same limbs
+                around the lines between their joints, with the girths of an anthropometric survey; "papers": ten limbs and nine
+                joints (K06 III-C).
 
         Raises:
             BodyError: the stature is out of range, or the model unknown.
@@ -75,10 +71,6 @@ class Body:
         height = number_of("height", height, "a stature in meters")
         if not isinstance(model, str):
             raise BodyError(f"model: expected one of {', '.join(get_args(HumanModel))}, found {short(model)}")
-        if model == "measured":
-            # The core checks the stature of the other models.
-            _core.Body.human(height, "full")
-            return cls.load(_MEASURED).scaled(height / _MEASURED_M)
         return cls(_core.Body.human(height, model))
 
     @classmethod

@@ -154,7 +154,7 @@ def start_tracker(
             tracker without a pose; then pass `starts_of(init)` to `track`.
         body: body to track; None means the default human, or two legs if a laser is the only input to start from.
         height: stature of the default body [m]; not together with `body`.
-        model: which human, see `Body.human`; None: "measured" without a first pose, else "full".
+        model: which human, see `Body.human`.
         config: None means the defaults.
         markers: markers worn on limbs, which become sites of the body.
         use: kinds of inputs that are used; None: all.
@@ -173,7 +173,7 @@ def start_tracker(
         if init == AUTO and model is None and _only_laser(recording, use):
             body = legs_body(**known)
         else:
-            body = Body.human(**known, model=model or ("measured" if init == AUTO else "full"))
+            body = Body.human(**known, model=model or "measured")
     if markers is not None and markers.limbs:
         body = body_with_markers(body, markers.worn())
     for marker, site in () if markers is None else markers.sites.items():

@@ -11,16 +11,19 @@ use crate::shape::TaperedEllipticCylinder;
 /// use voodoo_core::{Body, HumanModel};
 ///
 /// assert_eq!(Body::human(1.75, HumanModel::Papers)?.limbs().len(), 10);
-/// assert_eq!(Body::human(1.75, HumanModel::Full)?.limbs().len(), 18);
+/// assert_eq!(Body::human(1.75, HumanModel::default())?.limbs().len(), 18);
 /// # Ok::<(), voodoo_core::BodyError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HumanModel {
     /// Ten limbs and nine joints, as in the papers (K06 III-C): torso, head, two limbs for each arm and leg.
     Papers,
-    /// Eighteen limbs: in addition the torso is split at the waist, and there are neck, clavicles, hands and feet.
-    #[default]
+    /// Eighteen limbs: in addition the torso is split at the waist, and there are neck, clavicles, hands and feet. Limbs lie
+    /// around the lines between their joints and have the girths of an anthropometric survey.
     Full,
+    /// The same limbs with the mean joints and girths of 120 bodies in clothes.
+    #[default]
+    Measured,
 }
 
 // Heights of joint centers and segment lengths as fractions of the stature: Drillis and Contini as tabulated in Winter,
@@ -31,8 +34,6 @@ const ANKLE: f64 = 0.039;
 const SHOULDER: [f64; 2] = [0.112, 0.818];
 /// Center of the sternoclavicular joint: forward, outward and height.
 const STERNOCLAVICULAR: [f64; 3] = [0.015, 0.030, 0.800];
-/// Start of the shoulder's slope beside the neck: outward and height.
-const SLOPE: [f64; 2] = [0.025, 0.838];
 const UPPER_ARM: f64 = 0.186;
 /// Height of the deltoid muscle above the shoulder joint's center.
 const DELTOID: f64 = 0.022;
@@ -47,22 +48,99 @@ const SKULLBASE: f64 = 0.912;
 const TOE: f64 = 0.115;
 const HEEL: f64 = 0.035;
 
-// Semi-axes [front, side] at the proximal and the distal end: half of the mean breadths and depths, and girths over 2 pi, of
-// ANSUR II (Gordon et al., "2012 Anthropometric Survey of U.S. Army Personnel", 2014), both sexes, over stature.
-const TORSO: [f64; 4] = [0.068, 0.098, 0.064, 0.096];
-const PELVIS: [f64; 4] = [0.068, 0.098, 0.064, 0.088];
-const THORAX: [f64; 4] = [0.064, 0.090, 0.060, 0.092];
-const PAPERS_HEAD: [f64; 4] = [0.046, 0.040, 0.050, 0.042];
-/// The semi-axes point up and forward: the trapezius on the shoulder's slope.
-const CLAVICLE: [f64; 4] = [0.034, 0.040, 0.030, 0.034];
-const NECK: [f64; 4] = [0.036, 0.035, 0.034, 0.033];
-const HEAD: [f64; 4] = [0.050, 0.040, 0.050, 0.042];
-const UPPER_ARM_AXES: [f64; 4] = [0.031, 0.029, 0.025, 0.025];
-const FOREARM_AXES: [f64; 4] = [0.026, 0.025, 0.018, 0.018];
+/// The surface of a limb relative to the line between its joints: how far the middles of its proximal and distal end lie in front
+/// of and outside that line, and the semi-axes [front, side] at both ends.
+#[derive(Clone, Copy)]
+struct Surface {
+    offsets: [[f64; 2]; 2],
+    axes: [f64; 4],
+}
+
+/// Where limbs lie about their joints, and how thick they are, over stature.
+struct Build {
+    pelvis: Surface,
+    thorax: Surface,
+    neck: Surface,
+    head: Surface,
+    /// The semi-axes point up and forward: the trapezius on the shoulder's slope.
+    clavicle: Surface,
+    /// Where the clavicle begins beside the neck and ends above the shoulder joint: forward, outward and height.
+    slope: [[f64; 3]; 2],
+    upper_arm: Surface,
+    forearm: Surface,
+    thigh: Surface,
+    calf: Surface,
+    /// Heights of the middle of the foot's heel and toe.
+    foot: [f64; 2],
+    /// How far the root, the joints of the arms, and the base, the center and the tip of the skull lie in front of the hips.
+    root: f64,
+    arm: f64,
+    skull: [f64; 3],
+}
+
+/// Half of the mean breadths and depths, and girths over 2 pi, of ANSUR II (Gordon et al., "2012 Anthropometric Survey of U.S.
+/// Army Personnel", 2014), both sexes.
+const ANSUR: Build = Build {
+    pelvis: centered([0.068, 0.098, 0.064, 0.088]),
+    thorax: centered([0.064, 0.090, 0.060, 0.092]),
+    neck: centered([0.036, 0.035, 0.034, 0.033]),
+    head: Surface { offsets: [[0.008, 0.0]; 2], axes: [0.050, 0.040, 0.050, 0.042] },
+    clavicle: centered([0.034, 0.040, 0.030, 0.034]),
+    slope: [[0.0, 0.025, 0.838], [0.0, SHOULDER[0], SHOULDER[1]]],
+    upper_arm: centered([0.031, 0.029, 0.025, 0.025]),
+    forearm: centered([0.026, 0.025, 0.018, 0.018]),
+    thigh: centered([0.053, 0.051, 0.036, 0.036]),
+    calf: centered([0.034, 0.034, 0.022, 0.022]),
+    foot: [0.022; 2],
+    root: 0.0,
+    arm: 0.0,
+    skull: [0.0, 0.008, 0.0],
+};
+/// The mean of 120 bodies with 9 mm of clothes (MakeHuman, CC0), as printed by `scripts/calibrate_human`.
+const MEASURED: Build = Build {
+    pelvis: Surface { offsets: [[0.012, 0.0], [0.012, 0.0]], axes: [0.077, 0.116, 0.063, 0.094] },
+    thorax: Surface { offsets: [[0.030, 0.0], [0.009, 0.0]], axes: [0.062, 0.104, 0.080, 0.104] },
+    neck: Surface { offsets: [[0.002, 0.0], [0.025, 0.0]], axes: [0.035, 0.038, 0.035, 0.038] },
+    head: Surface { offsets: [[0.037, 0.0], [0.026, 0.0]], axes: [0.053, 0.035, 0.062, 0.048] },
+    clavicle: centered([0.039, 0.045, 0.035, 0.039]),
+    slope: [[-0.002, 0.024, 0.833], [0.002, 0.113, 0.824]],
+    upper_arm: Surface { offsets: [[-0.003, -0.005], [-0.001, 0.0]], axes: [0.046, 0.040, 0.028, 0.026] },
+    forearm: Surface { offsets: [[0.003, -0.001], [-0.001, 0.0]], axes: [0.030, 0.031, 0.020, 0.017] },
+    thigh: Surface { offsets: [[0.013, -0.010], [0.007, -0.004]], axes: [0.069, 0.066, 0.042, 0.037] },
+    calf: Surface { offsets: [[-0.017, 0.006], [-0.005, 0.006]], axes: [0.045, 0.044, 0.028, 0.020] },
+    foot: [0.020, 0.014],
+    root: 0.005,
+    arm: 0.009,
+    skull: [0.024, 0.039, 0.039],
+};
+/// Trunk and head of `Papers`; its other surfaces are those of `ANSUR`.
+const TORSO: Surface = centered([0.068, 0.098, 0.064, 0.096]);
+const PAPERS_HEAD: Surface = centered([0.046, 0.040, 0.050, 0.042]);
 const HAND_AXES: [f64; 4] = [0.022, 0.012, 0.019, 0.010];
-const THIGH_AXES: [f64; 4] = [0.053, 0.051, 0.036, 0.036];
-const CALF_AXES: [f64; 4] = [0.034, 0.034, 0.022, 0.022];
 const FOOT_AXES: [f64; 4] = [0.020, 0.022, 0.014, 0.017];
+
+const fn centered(axes: [f64; 4]) -> Surface {
+    Surface { offsets: [[0.0; 2]; 2], axes }
+}
+
+impl HumanModel {
+    fn build(self) -> &'static Build {
+        match self {
+            Self::Papers | Self::Full => &ANSUR,
+            Self::Measured => &MEASURED,
+        }
+    }
+}
+
+impl Surface {
+    /// The ends of the surface of a left (`side` = 1), right (-1) or central limb (0) whose joints' line has these ends.
+    fn ends(&self, line: [Vec3; 2], side: f64) -> [Vec3; 2] {
+        std::array::from_fn(|end| {
+            let [forward, outward] = self.offsets[end];
+            line[end] + Vec3::new(forward, side * outward, 0.0)
+        })
+    }
+}
 
 /// One limb in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
 struct LimbSpec {
@@ -92,16 +170,20 @@ struct Builder {
 }
 
 impl Builder {
+    /// Adds a limb between two places. The x axis of its frame points to the `front` as far as possible.
     fn limb(
         &mut self,
         name: impl Into<String>,
-        start: Vec3,
-        rotation: Quat,
-        length: f64,
+        [start, end]: [Vec3; 2],
+        front: Vec3,
         axes: [f64; 4],
         parent: Option<(usize, JointSpec)>,
         match_caps: [bool; 2],
     ) -> usize {
+        let length = (end - start).length();
+        let along = (end - start) / length;
+        let x = (front - along * front.dot(along)).normalize();
+        let rotation = Quat::from_mat3(&Mat3::from_cols(x, along.cross(x), along));
         let standing_from_limb = Pose::from_parts(start, rotation);
         self.parts.push(LimbSpec { name: name.into(), standing_from_limb, length, axes, parent, match_caps });
         self.parts.len() - 1
@@ -113,89 +195,100 @@ impl Builder {
 
     /// Adds the pelvis or torso, and the parts of the trunk above it. Returns the limbs that carry the legs and the arms.
     fn trunk(&mut self, model: HumanModel) -> (usize, usize) {
-        let up = Quat::IDENTITY;
-        let link = |name: &str, height: f64, semi_axes: [f64; 2], limits, motion| JointSpec {
+        let link = |name: &str, center: Vec3, semi_axes: [f64; 2], limits, motion| JointSpec {
             name: name.into(),
-            center: Vec3::Z * height,
+            center,
             flexion: Vec3::Y,
             along: Vec3::Z,
             semi_axes,
             limits,
             motion,
         };
-        let neck = |semi_axis: f64| link("vc7", VC7, [semi_axis; 2], [[-0.9, 1.0], [-0.7, 0.7], [-1.2, 1.2]], 0.15);
+        let neck =
+            |semi_axis: f64| link("vc7", Vec3::Z * VC7, [semi_axis; 2], [[-0.9, 1.0], [-0.7, 0.7], [-1.2, 1.2]], 0.15);
+        let upright = |surface: Surface, from: f64, to: f64| surface.ends([Vec3::Z * from, Vec3::Z * to], 0.0);
+        let build = model.build();
+        let [base, center, tip] = build.skull;
         let (legs, arms) = match model {
             HumanModel::Papers => {
-                let torso = self.limb("torso", Vec3::Z * 0.490, up, 0.345, TORSO, None, [false; 2]);
+                let torso = self.limb("torso", upright(TORSO, 0.490, 0.835), Vec3::X, TORSO.axes, None, [false; 2]);
                 (torso, torso)
             }
-            HumanModel::Full => {
-                let pelvis = self.limb("pelvis", Vec3::Z * 0.485, up, WAIST - 0.485, PELVIS, None, [false; 2]);
-                let spine = link("vl3", WAIST, [0.04; 2], [[-0.5, 1.3], [-0.6, 0.6], [-0.8, 0.8]], 0.12);
-                let thorax =
-                    self.limb("thorax", Vec3::Z * WAIST, up, 0.830 - WAIST, THORAX, Some((pelvis, spine)), [false; 2]);
+            HumanModel::Full | HumanModel::Measured => {
+                let pelvis = self.limb(
+                    "pelvis",
+                    upright(build.pelvis, 0.485, WAIST),
+                    Vec3::X,
+                    build.pelvis.axes,
+                    None,
+                    [false; 2],
+                );
+                let spine = link("vl3", Vec3::Z * WAIST, [0.04; 2], [[-0.5, 1.3], [-0.6, 0.6], [-0.8, 0.8]], 0.12);
+                let chest = upright(build.thorax, WAIST, 0.830);
+                let thorax = self.limb("thorax", chest, Vec3::X, build.thorax.axes, Some((pelvis, spine)), [false; 2]);
                 (pelvis, thorax)
             }
         };
-        let head = match model {
+        let (neck, skull) = match model {
             HumanModel::Papers => {
-                self.limb("head", Vec3::Z * VC7, up, 0.135, PAPERS_HEAD, Some((arms, neck(0.02))), [false, true])
+                let line = upright(PAPERS_HEAD, VC7, VC7 + 0.135);
+                let head = self.limb("head", line, Vec3::X, PAPERS_HEAD.axes, Some((arms, neck(0.02))), [false, true]);
+                (head, head)
             }
-            HumanModel::Full => {
-                let bottom = self.limb("neck", Vec3::Z * 0.830, up, 0.080, NECK, Some((arms, neck(0.02))), [false; 2]);
-                let skull = link("skullbase", SKULLBASE, [0.015; 2], [[-0.6, 0.6], [-0.4, 0.4], [-0.8, 0.8]], 0.10);
-                self.limb("head", Vec3::new(0.008, 0.0, 0.880), up, 0.115, HEAD, Some((bottom, skull)), [false, true])
+            HumanModel::Full | HumanModel::Measured => {
+                let line = upright(build.neck, 0.830, 0.910);
+                let bottom = self.limb("neck", line, Vec3::X, build.neck.axes, Some((arms, neck(0.02))), [false; 2]);
+                let limits = [[-0.6, 0.6], [-0.4, 0.4], [-0.8, 0.8]];
+                let skull = link("skullbase", Vec3::new(base, 0.0, SKULLBASE), [0.015; 2], limits, 0.10);
+                let line = upright(build.head, 0.880, 0.995);
+                (bottom, self.limb("head", line, Vec3::X, build.head.axes, Some((bottom, skull)), [false, true]))
             }
         };
-        self.site("humanoid_root", legs, Vec3::Z * 0.535);
-        self.site(
-            "vc7",
-            self.parts[head]
-                .parent
-                .as_ref()
-                .map_or(head, |(parent, _)| if model == HumanModel::Full { *parent } else { head }),
-            Vec3::Z * VC7,
-        );
-        self.site("skullbase", head, Vec3::Z * SKULLBASE);
-        self.site("head_center", head, Vec3::new(0.008, 0.0, 0.937));
-        self.site("skull_tip", head, Vec3::Z * 0.997);
+        self.site("humanoid_root", legs, Vec3::new(build.root, 0.0, 0.535));
+        self.site("vc7", neck, Vec3::Z * VC7);
+        self.site("skullbase", skull, Vec3::new(base, 0.0, SKULLBASE));
+        self.site("head_center", skull, Vec3::new(center, 0.0, 0.937));
+        self.site("skull_tip", skull, Vec3::new(tip, 0.0, 0.997));
         (legs, arms)
     }
 
     fn arm(&mut self, model: HumanModel, prefix: &str, side: f64, thorax: usize) {
         let named = |name: &str| format!("{prefix}_{name}");
-        let shoulder = Vec3::new(0.0, side * SHOULDER[0], SHOULDER[1]);
+        let shoulder = Vec3::new(model.build().arm, side * SHOULDER[0], SHOULDER[1]);
         let elbow = shoulder - Vec3::Z * UPPER_ARM;
         let wrist = elbow - Vec3::Z * FOREARM;
         // The joint's y axis points backward: negative rotations about it raise the left arm sideways.
         let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
         let carrier = match model {
             HumanModel::Papers => thorax,
-            HumanModel::Full => self.clavicle(prefix, side, shoulder, thorax),
+            HumanModel::Full | HumanModel::Measured => self.clavicle(model.build(), prefix, side, thorax),
         };
+        let surface = model.build().upper_arm;
         let upper = self.limb(
             named("upperarm"),
-            shoulder + Vec3::Z * DELTOID,
-            hanging(),
-            UPPER_ARM + DELTOID,
-            UPPER_ARM_AXES,
+            surface.ends([shoulder + Vec3::Z * DELTOID, elbow], side),
+            Vec3::X,
+            surface.axes,
             Some((carrier, arm_link(named("shoulder"), shoulder, [0.0; 2], shoulder_limits, 0.35))),
             [false; 2],
         );
         self.site(named("shoulder"), upper, shoulder);
-        let (length, caps) = match model {
+        let (end, caps) = match model {
             // The ten-limb model has no hand: its forearm ends at the knuckles.
-            HumanModel::Papers => (FOREARM + KNUCKLES, [false, true]),
-            HumanModel::Full => (FOREARM, [false; 2]),
+            HumanModel::Papers => (wrist - Vec3::Z * KNUCKLES, [false, true]),
+            HumanModel::Full | HumanModel::Measured => (wrist, [false; 2]),
         };
         let link = arm_link(named("elbow"), elbow, [0.02, 0.0], [[-0.1, 2.7], [0.0; 2], [0.0; 2]], 0.45);
-        let forearm = self.limb(named("forearm"), elbow, hanging(), length, FOREARM_AXES, Some((upper, link)), caps);
+        let surface = model.build().forearm;
+        let line = surface.ends([elbow, end], side);
+        let forearm = self.limb(named("forearm"), line, Vec3::X, surface.axes, Some((upper, link)), caps);
         let last = match model {
             HumanModel::Papers => forearm,
-            HumanModel::Full => {
+            HumanModel::Full | HumanModel::Measured => {
                 let limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
                 let link = arm_link(named("wrist"), wrist, [0.012; 2], limits, 0.3);
-                self.limb(named("hand"), wrist, hanging(), HAND, HAND_AXES, Some((forearm, link)), [false, true])
+                let line = [wrist, wrist - Vec3::Z * HAND];
+                self.limb(named("hand"), line, Vec3::X, HAND_AXES, Some((forearm, link)), [false, true])
             }
         };
         self.site(named("elbow"), forearm, elbow);
@@ -204,12 +297,7 @@ impl Builder {
     }
 
     /// Adds a clavicle. It carries the arm and moves slightly on the chest: a raised arm raises its shoulder.
-    fn clavicle(&mut self, prefix: &str, side: f64, shoulder: Vec3, thorax: usize) -> usize {
-        // z outward along the slope of the shoulder, x up.
-        let start = Vec3::new(0.0, side * SLOPE[0], SLOPE[1]);
-        let outward = (shoulder - start).normalize();
-        let up = (Vec3::Z - outward * outward.z).normalize();
-        let rotation = Quat::from_mat3(&Mat3::from_cols(up, outward.cross(up), outward));
+    fn clavicle(&mut self, build: &Build, prefix: &str, side: f64, thorax: usize) -> usize {
         let [x, y, z] = STERNOCLAVICULAR;
         let link = JointSpec {
             name: format!("{prefix}_sternoclavicular"),
@@ -221,12 +309,11 @@ impl Builder {
             limits: [mirrored([-0.15, 0.70], side), [-0.1, 0.1], [-0.4, 0.4]],
             motion: 0.015,
         };
-        let length = (shoulder - start).length();
-        self.limb(format!("{prefix}_clavicle"), start, rotation, length, CLAVICLE, Some((thorax, link)), [false; 2])
+        let line = build.slope.map(|[x, y, z]| Vec3::new(x, side * y, z));
+        self.limb(format!("{prefix}_clavicle"), line, Vec3::Z, build.clavicle.axes, Some((thorax, link)), [false; 2])
     }
 
     fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) {
-        let down = hanging();
         let named = |name: &str| format!("{prefix}_{name}");
         let hip = Vec3::new(0.0, side * HIP[0], HIP[1]);
         let knee = Vec3::new(0.0, hip.y, KNEE);
@@ -241,8 +328,9 @@ impl Builder {
             limits: hip_limits,
             motion: 0.25,
         };
-        let thigh =
-            self.limb(named("thigh"), hip, down, HIP[1] - KNEE, THIGH_AXES, Some((pelvis, link_hip)), [false; 2]);
+        let surface = model.build().thigh;
+        let line = surface.ends([hip, knee], side);
+        let thigh = self.limb(named("thigh"), line, Vec3::X, surface.axes, Some((pelvis, link_hip)), [false; 2]);
         // A hanging calf bends backward, which is a rotation about the axis to the left.
         let link_knee = JointSpec {
             name: named("knee"),
@@ -254,17 +342,18 @@ impl Builder {
             motion: 0.30,
         };
         self.site(named("hip"), thigh, hip);
-        let (length, caps) = match model {
-            HumanModel::Papers => (KNEE, [false, true]),
-            HumanModel::Full => (KNEE - ANKLE, [false; 2]),
+        let (end, caps) = match model {
+            HumanModel::Papers => (knee - Vec3::Z * KNEE, [false, true]),
+            HumanModel::Full | HumanModel::Measured => (ankle, [false; 2]),
         };
-        let calf = self.limb(named("calf"), knee, down, length, CALF_AXES, Some((thigh, link_knee)), caps);
+        let surface = model.build().calf;
+        let line = surface.ends([knee, end], side);
+        let calf = self.limb(named("calf"), line, Vec3::X, surface.axes, Some((thigh, link_knee)), caps);
         self.site(named("knee"), calf, knee);
         self.site(named("ankle"), calf, ankle);
-        if model == HumanModel::Full {
-            // z forward, x up.
-            let forward = Quat::from_mat3(&Mat3::from_cols(Vec3::Z, -Vec3::Y, Vec3::X));
-            let start = Vec3::new(-HEEL, hip.y, 0.022);
+        if model != HumanModel::Papers {
+            let [heel, toe] = model.build().foot;
+            let line = [Vec3::new(-HEEL, hip.y, heel), Vec3::new(TOE, hip.y, toe)];
             let link = JointSpec {
                 name: named("ankle"),
                 center: ankle,
@@ -274,8 +363,7 @@ impl Builder {
                 limits: [[-0.8, 0.6], [-0.4, 0.4], [-0.4, 0.4]],
                 motion: 0.20,
             };
-            let foot =
-                self.limb(named("foot"), start, forward, HEEL + TOE, FOOT_AXES, Some((calf, link)), [true, true]);
+            let foot = self.limb(named("foot"), line, Vec3::Z, FOOT_AXES, Some((calf, link)), [true, true]);
             self.site(named("toe"), foot, Vec3::new(TOE, hip.y, 0.012));
         }
     }
@@ -310,11 +398,6 @@ impl Builder {
             .collect();
         Body::new(name, limbs, sites)
     }
-}
-
-/// Orientation of a hanging limb: z points down, x stays forward.
-fn hanging() -> Quat {
-    Quat::from_axis_angle(Vec3::X, std::f64::consts::PI)
 }
 
 /// A joint of a hanging arm.

@@ -70,7 +70,7 @@ pub struct Site {
 /// use voodoo_core::math::Pose;
 /// use voodoo_core::{Body, HumanModel};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let standing = body.rest_pose(Pose::IDENTITY); // one pose for each limb
 /// let wrist = body.site_position(&standing, body.site_index("l_wrist")?);
 /// let ankle = body.site_position(&standing, body.site_index("l_ankle")?);

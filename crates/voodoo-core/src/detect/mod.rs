@@ -64,7 +64,7 @@ const AROUND_JOINTS: f64 = 0.2;
 /// use voodoo_core::HumanModel;
 /// use voodoo_core::{Body, Config, Tracker};
 ///
-/// let tracker = Tracker::new(Body::human(1.75, HumanModel::Full)?, Config::default())?.with_detector(Box::new(Standing));
+/// let tracker = Tracker::new(Body::human(1.75, HumanModel::Measured)?, Config::default())?.with_detector(Box::new(Standing));
 /// assert!(tracker.can_search());
 /// # Ok(())
 /// # }

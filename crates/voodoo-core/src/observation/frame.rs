@@ -60,7 +60,7 @@ pub enum Scope {
 /// use voodoo_core::{Body, Cloud, Frame, HumanModel, PointSlice, Scope};
 ///
 /// // A tactile glove: all of its points lie on the left hand.
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let contacts = [[0.02_f32, 0.0, 0.01], [0.02, 0.01, 0.03]];
 /// let cloud = Cloud {
 ///     points: PointSlice::F32(&contacts),
@@ -197,7 +197,7 @@ pub struct PositionRelation {
 /// use voodoo_core::{Body, Camera, Frame, HumanModel, RayRelation};
 ///
 /// // A network found the left wrist in a pixel of a camera at the origin.
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let camera = Camera::pinhole(640, 480, [525.0, 525.0, 319.5, 239.5])?;
 /// let [x, y] = camera.ray([412.0, 200.5]).ok_or("a pixel outside the domain of the lens")?;
 /// let (site, world_from_sensor) = (body.site_index("l_wrist")?, Pose::IDENTITY);
@@ -260,7 +260,7 @@ impl Ground {
 /// use voodoo_core::math::Vec3;
 /// use voodoo_core::{Body, Frame, Ground, HumanModel, PositionRelation};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let site = body.site_index("l_wrist")?;
 /// let wrist = PositionRelation { site, position: Vec3::new(0.1, 0.2, 1.5), weight: 20.0, bias: 0.0, source: 0 };
 /// let frame = Frame::empty(0.0)

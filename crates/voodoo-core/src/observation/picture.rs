@@ -62,7 +62,7 @@ impl ColorPixels<'_> {
 ///     number: 0,
 ///     source: 0,
 /// };
-/// Frame::empty(0.0).with_colors(&[image]).check(&Body::human(1.75, HumanModel::Full)?, None)?;
+/// Frame::empty(0.0).with_colors(&[image]).check(&Body::human(1.75, HumanModel::Measured)?, None)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

@@ -45,7 +45,7 @@ const KNOWN_AFTER: f64 = 1.0;
 /// use voodoo_core::math::{Pose, Vec3};
 /// use voodoo_core::{Body, Config, Frame, HumanModel, People, PeopleOptions};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let mut people = People::new(body.clone(), Config::default(), PeopleOptions::default())?;
 /// for x in [0.0, 2.0] {
 ///     let standing = body.rest_pose(Pose::from_translation(Vec3::X * x));

@@ -14,7 +14,7 @@ const CLEARLY_NEARER: f64 = 0.3;
 ///
 /// let mut options = PeopleOptions::default();
 /// (options.limit, options.nearest) = (Some(1), true); // only the person nearest to a camera
-/// let people = People::new(Body::human(1.75, HumanModel::Full)?, Config::default(), options)?;
+/// let people = People::new(Body::human(1.75, HumanModel::Measured)?, Config::default(), options)?;
 /// assert_eq!(people.present().count(), 0); // nobody before the first frame
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -114,7 +114,7 @@ pub(crate) struct Posed<'a> {
 /// use voodoo_core::{Body, Camera, ColorImage, ColorPixels, Config, Frame, HumanModel};
 /// use voodoo_core::{NO_LIMB, Rendering, Tracker, Viewpoint};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let standing = body.rest_pose(Pose::IDENTITY);
 /// let camera = Camera::pinhole(320, 240, [290.0, 290.0, 159.5, 119.5])?;
 /// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));

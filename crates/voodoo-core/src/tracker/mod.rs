@@ -31,7 +31,7 @@ use expected::Before;
 /// use voodoo_core::math::{Pose, Vec3};
 /// use voodoo_core::{Body, Config, Frame, HumanModel, PositionRelation, Tracker};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let standing = body.rest_pose(Pose::IDENTITY);
 /// let site = body.site_index("l_wrist")?;
 /// let marker = body.site_position(&standing, site) + Vec3::X * 0.02;

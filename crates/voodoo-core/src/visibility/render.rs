@@ -68,7 +68,7 @@ impl Viewpoint<'_> {
 /// use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 /// use voodoo_core::{Body, Camera, HumanModel, NO_LIMB, Rendering, Viewpoint};
 ///
-/// let body = Body::human(1.75, HumanModel::Full)?;
+/// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let camera = Camera::pinhole(320, 240, [290.0, 290.0, 159.5, 119.5])?;
 /// // The camera is 3 m in front of the person and looks along -x of the world.
 /// let rotation = Quat::from_mat3(&Mat3::from_cols(Vec3::Y, -Vec3::Z, -Vec3::X));
