@@ -17,6 +17,7 @@ from typing import Any
 from voodoo.batch.storage import Store, named
 from voodoo.batch.summary import DONE, Row, read_table, write_table
 from voodoo.batch.task import Job, Settings, do, failed
+from voodoo.children import children
 from voodoo.errors import VoodooError
 
 SUMMARY, SETTINGS = "summary.csv", "settings.json"
@@ -148,9 +149,11 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
 
     with ExitStack() as stack:
         if scheduler is None:
-            # A worker has only its current task, and a task is tried twice.
+            # A worker has only its current task, and a task is tried twice. Pages for browsers would be open to other users.
             options = {"distributed.scheduler.allowed-failures": 1, "distributed.scheduler.worker-saturation": 1.0}
+            options |= {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
             stack.enter_context(dask.config.set(options))
+            stack.enter_context(children())  # until the end, because workers that die are started again
             scratch = stack.enter_context(
                 tempfile.TemporaryDirectory(prefix="voodoo-dask-", ignore_cleanup_errors=True)
             )
@@ -161,6 +164,7 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
                     processes=True,
                     host="127.0.0.1",
                     dashboard_address=None,
+                    security=_own_keys(distributed),
                     local_directory=scratch,
                     silence_logs=logging.CRITICAL,
                 )
@@ -176,6 +180,16 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
         except TimeoutError as error:
             raise VoodooError(f"--scheduler: expected a worker at {scheduler}, found none in {_CONNECT_S} s") from error
         yield client
+
+
+def _own_keys(distributed: Any) -> Any:  # noqa: ANN401 - Dask has no types
+    """Keys that only the processes of this batch know: other users of this machine could run code on its workers otherwise."""
+    try:
+        return distributed.Security.temporary()
+    except ImportError:
+        raise VoodooError(
+            "the processes of a batch need the package cryptography: pip install 'voodoo-tracker[batch]'"
+        ) from None
 
 
 def _distributed() -> Any:  # noqa: ANN401 - Dask has no types

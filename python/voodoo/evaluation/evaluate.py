@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
+from voodoo.children import children
 from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
@@ -163,12 +164,13 @@ def evaluate_all(
             yield index, *_task(*task)
         return
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(
-        min(jobs, len(tasks)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
-    )
+    with children():  # starts a helper process of multiprocessing
+        pool = ProcessPoolExecutor(
+            min(jobs, len(tasks)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
+        )
     done = False
     try:
-        with _deaf_children():
+        with children(), _deaf_children():
             futures = {pool.submit(_task, *task): index for index, task in enumerate(tasks)}
         for future in as_completed(futures):
             yield futures[future], *future.result()

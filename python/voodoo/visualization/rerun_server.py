@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+from voodoo.children import NEUTRAL_FOLDER, children
 from voodoo.errors import VoodooError
 
 LOOPBACK = "127.0.0.1"
@@ -42,13 +43,15 @@ class Server:
                 raise VoodooError(f"serve: expected a free port, found {each} taken")
         command = [sys.executable, "-m", "rerun", "--serve-web", "--bind", host, "--port", str(page + 1)]
         command += ["--web-viewer-port", str(page), "--server-memory-limit", _MEMORY]
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        with children(quiet=True):
+            self._process = subprocess.Popen(
+                command,
+                cwd=NEUTRAL_FOLDER,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
         self.data = f"rerun+http://{_reached(host)}:{page + 1}/proxy"
         self.address = f"http://{_reached(host)}:{page}/?url={self.data.replace(':', '%3A').replace('/', '%2F')}"
         until = time.monotonic() + _PATIENCE_S

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
+from voodoo.children import children
 from voodoo.errors import VoodooError
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
@@ -88,7 +89,8 @@ class Viewer:
                 "view: expected a screen to open the viewer on, found none; --save FILE.rrd writes a file"
             )
         try:
-            self._stream.spawn()
+            with children(quiet=True):
+                self._stream.spawn()
         except (RuntimeError, OSError) as error:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
