@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
 from typer.testing import CliRunner
 
 import damage
@@ -13,6 +12,7 @@ from voodoo.cli import app
 from voodoo.errors import RecordingError
 from voodoo.export.track import Track
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.bag_files import BagFolder
 from voodoo.recordings.left_out import LeftOut
 
 SETTLED_S = 0.2
@@ -117,7 +117,7 @@ def test_a_picture_that_does_not_decode_costs_no_frame(entries, start):
 
 def test_messages_that_the_index_announces_and_the_file_lacks_are_counted(entries, start, monkeypatch):
     bag = damage.write(start / "fewer", entries[:120])
-    read = AnyReader.messages
+    read = BagFolder.messages
 
     def fewer(self, connections=(), start=None, stop=None):
         for number, item in enumerate(read(self, connections, start=start, stop=stop)):
@@ -125,7 +125,7 @@ def test_messages_that_the_index_announces_and_the_file_lacks_are_counted(entrie
                 raise OSError("the disk is gone")
             yield item
 
-    monkeypatch.setattr(AnyReader, "messages", fewer)
+    monkeypatch.setattr(BagFolder, "messages", fewer)
     left_out = LeftOut()
     frames = list(open_recording(bag, use=("depth",), left_out=left_out))
     assert frames and left_out.counts["rest of the file that cannot be read"] == 1

@@ -49,8 +49,8 @@ def test_toml_that_breaks_parsers_is_one_error(tmp_path, text):
 
 def test_toml_files_have_a_greatest_size(tmp_path):
     path = tmp_path / "x.toml"
-    path.write_bytes(b"#" * 11_000_000)
-    with pytest.raises(ConfigError, match="found 11000000 bytes"):
+    path.write_bytes(b"#" * 1_100_000)
+    with pytest.raises(ConfigError, match="found 1100000 bytes"):
         voodoo.Config.load(path)
 
 
@@ -179,9 +179,9 @@ def test_fifos_and_devices_are_no_pictures(tmp_path):
 def test_archives_have_a_limit_and_errors_name_them(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("x.bag", b"\0" * 30_000_000)
-    monkeypatch.setattr(ros_bag, "_LITTLE", 2**20)
+    monkeypatch.setattr("voodoo.unpacking._LITTLE", 2**20)
     monkeypatch.setattr(ros_bag.shutil, "copyfileobj", lambda *_: pytest.fail("it was unpacked"))
-    refused(run("info", tmp_path / "bomb.zip"), "bomb.zip: expected an archive that unpacks to at most")
+    refused(run("info", tmp_path / "bomb.zip"), "bomb.zip: ", "that unpack to at most", "found 30000000")
     monkeypatch.undo()
     bag = write_bag(tmp_path / "b", [("/scan", 10.0, M.scan(10.0, [1.0]))])
     part = next(bag.glob("*.mcap"))
@@ -213,7 +213,7 @@ def test_matlab_files_are_read_as_scipy_reads_them(tmp_path):
 
 
 def test_an_array_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("voodoo.recordings.matlab._MOST", 2**20)
+    monkeypatch.setattr("voodoo.unpacking._LITTLE", 2**20)
     scipy.io.savemat(tmp_path / "x.mat", {"d_depth": np.zeros((240, 320, 50), np.uint16)}, do_compression=True)
-    with pytest.raises(RecordingError, match=r"x\.mat: .* expected 1048576 bytes at most"):
+    with pytest.raises(RecordingError, match=r"x\.mat: .* that unpack to at most \d+, found more"):
         read_mat(tmp_path / "x.mat")

@@ -150,8 +150,12 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
     with ExitStack() as stack:
         if scheduler is None:
             # A worker has only its current task, and a task is tried twice. Pages for browsers would be open to other users.
-            options = {"distributed.scheduler.allowed-failures": 1, "distributed.scheduler.worker-saturation": 1.0}
-            options |= {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+            options: dict[str, Any] = {
+                "distributed.scheduler.allowed-failures": 1,
+                "distributed.scheduler.worker-saturation": 1.0,
+                "distributed.scheduler.http.routes": [],
+                "distributed.worker.http.routes": [],
+            }
             stack.enter_context(dask.config.set(options))
             stack.enter_context(children())  # until the end, because workers that die are started again
             scratch = stack.enter_context(

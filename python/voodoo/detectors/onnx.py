@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from voodoo.detectors.base import JOINTS, DetectedPerson, DetectorImage, names_of
 from voodoo.errors import ConfigError, a_path
+from voodoo.stored import MOST_RECORDED, check_stored
 
 if TYPE_CHECKING:
     from voodoo._core import PersonCandidate
@@ -64,6 +65,7 @@ class OnnxDetector:
         self.joints = names_of("joints", joints)
         self._sigma, self._most = float(joint_sigma), int(most)
         self.path = a_path(path, error=ConfigError)
+        check_stored(self.path, "an ONNX file", most=MOST_RECORDED, error=ConfigError)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = int(threads), 1
         try:

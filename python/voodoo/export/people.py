@@ -10,13 +10,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError, reading
+from voodoo.errors import VoodooError
 from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
 from voodoo.export.result_file import appearing_whole, check_suffix
 from voodoo.export.track import Track, arrays_of, track_of_rows, tracks_of
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
+from voodoo.unpacking import stored_arrays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -150,7 +151,7 @@ class PeopleTrack:
             rows = read_rows(path)
             persons = np.unique(rows.persons).tolist()
             return cls(np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in persons})
-        with reading(path, "a result of voodoo track --people"), np.load(path, allow_pickle=False) as content:
+        with stored_arrays(path, "a result of voodoo track --people") as content:
             if "persons" not in content:
                 raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
             return cls(content["stamps"], tracks_of(content))

@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError, reading
+from voodoo.stored import MOST_RECORDED, check_stored
+from voodoo.unpacking import stored_arrays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -67,6 +69,7 @@ def read_rows(path: Path) -> PeopleRows:
     Raises:
         VoodooError: another header, an invalid cell, decreasing stamps, or two rows of a person at one stamp.
     """
+    check_stored(path, "a result of voodoo track --people", most=MOST_RECORDED)
     with reading(path, "a result of voodoo track --people"), path.open(newline="", encoding="utf-8") as file:
         header, *rows = list(csv.reader(file)) or [[]]
     first = next((i for i, cell in enumerate(header) if cell.endswith("_rad")), len(header))
@@ -138,8 +141,9 @@ def header_of(names: Sequence[str], angle_names: Sequence[str]) -> list[str]:
 def is_people_file(path: Path) -> bool:
     """Whether a .csv begins like the result of several people, or an .npz holds one."""
     if path.suffix == ".npz":
-        with reading(path, "a result of voodoo track"), np.load(path, allow_pickle=False) as content:
+        with stored_arrays(path, "a result of voodoo track") as content:
             return "persons" in content
+    check_stored(path, "a result of voodoo track", most=MOST_RECORDED)
     try:
         with path.open(encoding="utf-8") as file:
             return file.readline().startswith(",".join(FIRST[:2]) + ",")

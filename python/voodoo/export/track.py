@@ -18,6 +18,7 @@ from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
 from voodoo.export.result_file import appearing_whole, check_suffix
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
+from voodoo.unpacking import stored_arrays
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -309,7 +310,7 @@ class Track:
 
     @classmethod
     def _read_npz(cls, path: Path) -> Track:
-        with np.load(path, allow_pickle=False) as content:
+        with stored_arrays(path, "a result of voodoo track") as content:
             return track_of(content)
 
 
@@ -387,7 +388,7 @@ def tracks_of(content: Mapping[str, npt.NDArray[Any]]) -> dict[int, Track]:
 def _only_person(path: Path) -> Track:
     """The track in a result of several people that holds one."""
     if path.suffix == ".npz":
-        with reading(path, "a result of voodoo track --people"), np.load(path, allow_pickle=False) as content:
+        with stored_arrays(path, "a result of voodoo track --people") as content:
             tracks = tracks_of(content)
     else:
         rows = read_rows(path)

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from voodoo.errors import VoodooError, a_path, reading, shortened
+from voodoo.stored import MOST_METADATA, read_stored_text
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-_LARGEST = 10_000_000
-"""Largest size of a TOML file [bytes]; bodies and configurations are a thousand times smaller."""
 
 
 def parse_toml(text: str, *, source: str, error: type[VoodooError]) -> dict[str, Any]:
@@ -45,11 +43,7 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
     Raises:
         VoodooError: of the class `error`, naming the file.
     """
-    file = a_path(path, error=error)
-    with reading(path, "a readable TOML file", error=error):
-        if file.stat().st_size > _LARGEST:
-            raise error(f"{path}: expected a readable TOML file, found {file.stat().st_size} bytes")
-        return file.read_text(encoding="utf-8")
+    return read_stored_text(a_path(path, error=error), "a readable TOML file", most=MOST_METADATA, error=error)
 
 
 def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:

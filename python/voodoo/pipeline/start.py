@@ -28,10 +28,10 @@ from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
-from voodoo.recordings.stored import read_stored
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
 from voodoo.sensors.settings import FrontEndSettings, inputs_for
+from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
 Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
@@ -69,7 +69,7 @@ class Init(BaseModel):
         Raises:
             VoodooError: not readable, not JSON, or not of that form; names the file and the key.
         """
-        content = read_stored(a_path(path, error=VoodooError), "a JSON file")
+        content = read_stored(a_path(path, error=VoodooError), "a JSON file", most=MOST_METADATA)
         try:
             return cls.model_validate_json(content)
         except ValidationError as error:

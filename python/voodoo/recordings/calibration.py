@@ -14,7 +14,7 @@ from voodoo.model.camera import Camera
 from voodoo.model.joint import short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.pictures import picture_size
-from voodoo.recordings.stored import check_stored, read_stored
+from voodoo.stored import read_stored
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
@@ -75,7 +75,6 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
     if not path.is_file():
         hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
         raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
-    check_stored(path, "a calibration file")
     content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
     tables = {"depth", "color"}
     _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))

@@ -13,7 +13,7 @@ from voodoo.errors import RecordingError
 from voodoo.model.camera import Camera
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
-from voodoo.recordings.stored import read_stored
+from voodoo.stored import read_stored
 
 FOLDER = "background"
 PICTURES = (".png", ".jpg", ".jpeg")

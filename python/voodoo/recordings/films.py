@@ -21,7 +21,7 @@ from voodoo.recordings.camera_files import PlacedCamera
 from voodoo.recordings.empty_scene import PICTURES
 from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.pictures import decode_color, picture_size
-from voodoo.recordings.stored import check_stored, read_stored
+from voodoo.stored import check_stored, read_stored
 
 ByteImage: TypeAlias = npt.NDArray[np.uint8]
 
@@ -151,7 +151,7 @@ def _number(file: Path) -> str:
 
 def _opened(path: Path) -> cv2.VideoCapture:
     check_stored(path, "a video", most=_MOST_BYTES)
-    film = cv2.VideoCapture(utf8_name(path, error=RecordingError), cv2.CAP_FFMPEG)
+    film = cv2.VideoCapture(utf8_name(path.absolute(), error=RecordingError), cv2.CAP_FFMPEG)  # no URL
     if not film.isOpened():
         raise RecordingError(f"{path}: expected a video that FFmpeg reads, found none")
     return film

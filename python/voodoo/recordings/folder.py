@@ -22,8 +22,8 @@ from voodoo.recordings.recording import (
     number_option,
     refuse_blank,
 )
-from voodoo.recordings.stored import read_stored, read_stored_text
 from voodoo.recordings.truth import read_start, read_truth
+from voodoo.stored import read_stored, read_stored_text
 
 _RATE = 30.0
 """Assumed images per second of numbered images, the default of most depth cameras."""

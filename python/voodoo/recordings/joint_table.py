@@ -11,7 +11,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
-from voodoo.recordings.stored import read_stored_text
+from voodoo.stored import read_stored_text
 
 
 def read_positions(path: Path, first: tuple[str, ...]) -> tuple[tuple[str, ...], FloatArray]:

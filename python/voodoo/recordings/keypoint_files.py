@@ -11,7 +11,7 @@ from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.joint import short
 from voodoo.recordings.keypoint_layouts import layout_of
-from voodoo.recordings.stored import read_stored_text
+from voodoo.stored import read_stored_text
 
 
 def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:

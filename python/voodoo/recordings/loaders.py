@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from voodoo.errors import RecordingError, a_path
+from voodoo.stored import MOST_RECORDED, check_stored
 
 if TYPE_CHECKING:
     from voodoo.recordings.left_out import LeftOut
@@ -116,6 +117,8 @@ def open_recording(
         raise RecordingError(f"loader {loader!r}: expected one of {', '.join(LOADERS)}")
     if not path.exists():
         raise RecordingError(f"{path}: expected a recording, found no such file or folder")
+    if not path.is_dir():
+        check_stored(path, "a recording", most=MOST_RECORDED)
     name = guess_loader(path) if loader is None else loader
     known = options_of(name)
     if bare and "bare" in known:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading, shortened
-from voodoo.recordings.stored import read_stored, read_stored_text
+from voodoo.stored import read_stored, read_stored_text
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import struct
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.stored import read_stored
+from voodoo.stored import read_stored
+from voodoo.unpacking import Unpacking
 
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -26,8 +26,6 @@ _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f
 _CLASSES = range(6, 16)
 """Classes of arrays that hold numbers."""
 _COMPLEX = 0x08
-_MOST = 2**30
-"""Largest size of a decompressed array [bytes]."""
 
 
 def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
@@ -35,7 +33,7 @@ def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
     variables (text, cells, structures) are left out.
 
     Raises:
-        RecordingError: not a MATLAB file of level 5, damage, or more than a gigabyte; names the file.
+        RecordingError: not a MATLAB file of level 5, damage, or arrays that unpack to too much; names the file.
     """
     data = read_stored(path, "a MATLAB file")
     if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
@@ -43,10 +41,11 @@ def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise RecordingError(f"{path}: expected a MATLAB file of level 5, found {other}")
     order = "<" if data[126:128] == b"IM" else ">"
     found: dict[str, npt.NDArray[Any]] = {}
+    unpacking = Unpacking()
     with reading(path, "a sound MATLAB file"):
         for kind, content in _elements(data[_HEADER:], order):
             if kind == _COMPRESSED:
-                found |= dict(_matrices(_inflated(content), order))
+                found |= dict(_matrices(unpacking.unpack(content, "zlib"), order))
             elif kind == _MATRIX:
                 found |= dict(_matrices(_tagged(kind, content, order), order))
     return found
@@ -54,16 +53,6 @@ def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 def _tagged(kind: int, content: bytes, order: str) -> bytes:
     return struct.pack(order + "II", kind, len(content)) + content
-
-
-def _inflated(data: bytes) -> bytes:
-    unpacker = zlib.decompressobj()
-    content = unpacker.decompress(data, _MOST)
-    if unpacker.unconsumed_tail:
-        raise ValueError(f"expected {_MOST} bytes at most in an array, found more")
-    if not unpacker.eof:
-        raise ValueError("expected a complete array, found it cut off")
-    return content
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.recordings.joint_table import read_positions
-from voodoo.recordings.stored import MOST_BYTES
+from voodoo.stored import MOST_BYTES
 
 PEOPLE_TRUTH_FILE = "truth_people.csv"
 _FIRST = ("stamp_s", "person", "in_view")

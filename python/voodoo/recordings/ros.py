@@ -75,6 +75,7 @@ class RosRecording(Recording):
         meters_per_unit: of 16-bit depth images; None: the value in a bag of librealsense's recorder, else 0.001.
         tf_max_age: maximum age of a changing transform [s].
         background: folder of images of the empty scene, instead of the one beside the bag.
+        unpacked_gb: largest size of an unpacked archive, chunk or message [GB]; None: 2, and 200 times the size of the file.
         bare: read neither reference nor start.
         left_out: counts unusable measurements, which are then left out; None: they are errors.
 
@@ -96,6 +97,7 @@ class RosRecording(Recording):
         meters_per_unit: float | None = None,
         tf_max_age: float = 0.5,
         background: str | Path | None = None,
+        unpacked_gb: float | None = None,
         bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
@@ -108,7 +110,10 @@ class RosRecording(Recording):
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
         self._info: RecordingInfo | None = None
-        self._bag = Bag(path, left_out=left_out)
+        given = (
+            None if unpacked_gb is None else number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
+        )
+        self._bag = Bag(path, left_out=left_out, unpacked=None if given is None else int(given * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices: dict[TopicKind, TopicChoice] = {
             "depth": depth_topic,

@@ -1,36 +1,29 @@
-"""Access to the messages of ROS 1 and ROS 2 bags through rosbags, with every failure converted to a RecordingError."""
+"""Access to the messages of ROS 1 and ROS 2 bags, with every failure converted to a RecordingError."""
 
 from __future__ import annotations
 
 import shutil
-import struct
 import tempfile
 import weakref
 import zipfile
-import zlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
+from rosbags.interfaces import Connection
 
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings import realsense
+from voodoo.recordings.bag_files import BagFile, BagFolder, bag_file
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.message_types import MessageTypes
 from voodoo.recordings.ros_messages import Message, frame_of
-from voodoo.recordings.stored import check_stored
+from voodoo.stored import MOST_RECORDED, check_stored
+from voodoo.unpacking import Unpacking
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
-_MOST_UNPACKED = 2**40
-"""Largest size of a bag [bytes]."""
-_LITTLE, _MOST_GAIN = 2**28, 200
-"""An archive may unpack to a quarter of a gigabyte plus 200 times its own size. Bags compress to a tenth at best, static scenes
-to a fiftieth, and archives made to fill disks to a thousandth."""
-_MCAP_MAGIC = b"\x89MCAP0\r\n"
-_MCAP_FOOTER = 0x02
+_ADVICE = "; --option unpacked_gb=N allows N gigabytes"
 
 
 @dataclass(frozen=True)
@@ -48,22 +41,22 @@ class Bag:
     Args:
         path: a .bag, .mcap or .db3 file, a ROS 2 bag directory, a directory holding one of these (also as `bag/`),
             or a .zip holding one, which is unpacked into a temporary directory for the lifetime of this object.
-
         left_out: counts unusable messages, which are then left out; None: they are errors.
+        unpacked: largest size of an unpacked archive, chunk or message [bytes]; None: see voodoo.unpacking.Unpacking.
 
     Raises:
         RecordingError: there is no bag, or its index is damaged.
     """
 
-    def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
+    def __init__(self, path: Path, *, left_out: LeftOut | None = None, unpacked: int | None = None) -> None:
         """Unpack the archive if needed, and read the index."""
         self.path = path
-        self._left_out = left_out
+        self._left_out, self._unpacked = left_out, unpacked
         folder = path
         if path.suffix == ".zip":
             folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
             weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-            _unpack(path, folder)
+            _unpack(path, folder, unpacked)
         self._folder = folder
         with self._naming():
             self._survey()
@@ -71,20 +64,16 @@ class Bag:
     def _survey(self) -> None:
         """Find the bag and read its index."""
         self.file = find_bag(self._folder) if self._folder.is_dir() else self._folder
-        for part in [self.file] if self.file.is_file() else sorted(self.file.iterdir()):
-            if part.suffix in _BAG_SUFFIXES:
-                check_stored(part, "a complete ROS bag", most=_MOST_UNPACKED)
-            if part.suffix == ".mcap":
-                check_mcap(part)
+        self.is_ros2: bool = self.file.suffix != ".bag"
+        self._types = MessageTypes(is_ros2=self.is_ros2)
         with self._open() as reader:
             with reading(self.path, "the index of a ROS bag"):
-                self.is_ros2: bool = reader.is2
-                self.topics = _topics(reader)
+                self.topics = _topics(reader.connections)
                 self.realsense: bool = not self.is_ros2 and realsense.is_recorders(item.name for item in self.topics)
-                self.start_time: int = reader.start_time
-                self.end_time: int = reader.end_time
-        if self.file.is_dir():
-            self._check_metadata()
+                self.start_time: int = reader.metadata.start_time
+                self.end_time: int = reader.metadata.end_time
+            if isinstance(reader, BagFolder):
+                self._check_metadata(reader)
 
     @contextmanager
     def _naming(self) -> Iterator[None]:
@@ -94,7 +83,10 @@ class Bag:
         except RecordingError as error:
             if self._folder == self.path:
                 raise
-            raise RecordingError(str(error).replace(str(self._folder), str(self.path))) from error
+            raise self._named(error) from error
+
+    def _named(self, error: RecordingError) -> RecordingError:
+        return type(error)(str(error).replace(str(self._folder), str(self.path)), reason=error.reason, hint=error.hint)
 
     def read(self, topics: Collection[str]) -> Iterator[tuple[str, Message | None]]:
         """Messages of `topics` in the order they were recorded, as (topic, message); None for one that was left out.
@@ -103,10 +95,19 @@ class Bag:
             RecordingError: damage, or fewer messages than in the index of the bag.
         """
         counts = dict.fromkeys(topics, 0)
-        with self._open() as reader:
-            for topic, message in self._messages(reader, topics, None, self._left_out):
+        try:
+            for topic, message in self._messages(topics):
                 counts[topic] += 1
+                if isinstance(message, RecordingError):
+                    if self._left_out is None:
+                        raise message
+                    self._left_out.add_error(message)
+                    message = None
                 yield topic, message
+        except _Stopped as error:
+            if self._left_out is None:
+                raise RecordingError(str(error)) from error
+            self._left_out.add("rest of the file that cannot be read", error)
         announced = {topic.name: topic.messages for topic in self.topics}
         for name, count in counts.items():
             if count != announced[name]:
@@ -126,48 +127,59 @@ class Bag:
             RecordingError: damage, or no message although the index has some.
         """
         problem: RecordingError | None = None
-        with self._open() as reader:
-            for _, message in self._messages(reader, [topic], None, None if self._left_out is None else LeftOut()):
-                if message is None:
-                    continue
-                try:
-                    if good is not None and self._left_out is not None:
-                        good(message)
-                except RecordingError as error:
-                    problem = problem or error
-                    continue
+        for _, message in self._messages([topic]):
+            try:
+                if isinstance(message, RecordingError):
+                    raise message
+                if good is not None and self._left_out is not None:
+                    good(message)
                 return message
-        if problem is not None:
-            raise problem
-        raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
+            except RecordingError as error:
+                if self._left_out is None:
+                    raise
+                problem = problem or error
+        raise problem or self._without(topic)
 
     def last(self, topic: str) -> Message:
         """The last message of `topic`; reads the end of the bag first."""
-        found = None
-        with self._open() as reader:
-            for seconds in (1, 10, None):
-                start = None if seconds is None else self.end_time - seconds * 1_000_000_000
-                for _, message in self._messages(reader, [topic], start, None if self._left_out is None else LeftOut()):
-                    found = message if message is not None else found
-                if found is not None:
-                    return found
-        raise RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
+        problem: RecordingError | None = None
+        for seconds in (1, 10, None):
+            start = None if seconds is None else self.end_time - seconds * 1_000_000_000
+            found = None
+            for _, message in self._messages([topic], start):
+                if not isinstance(message, RecordingError):
+                    found = message
+                elif self._left_out is None:
+                    raise message
+                else:
+                    problem = problem or message
+            if found is not None:
+                return found
+        raise problem or self._without(topic)
+
+    def _without(self, topic: str) -> RecordingError:
+        return RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
 
     def frame_of(self, topic: str, message: Message) -> str:
         """The frame of a message: that of its header, except in bags of librealsense, whose frame ids are image numbers."""
         return realsense.frame_name(topic) if self.realsense else frame_of(message)
 
-    def _check_metadata(self) -> None:
+    def _check_metadata(self, reader: BagFolder) -> None:
         """Compare metadata.yaml with the storage files: topics in only one of them would be left out silently."""
+        listed = {storage.path.name for storage in reader.storages}  # type: ignore[attr-defined]
+        beside = sorted(part.name for part in self.file.iterdir() if part.suffix in (".mcap", ".db3"))
+        if any(name not in listed for name in beside):
+            raise RecordingError(
+                f"{self.file / 'metadata.yaml'}: expected all of {', '.join(beside)}, found {', '.join(sorted(listed))} "
+                "(`ros2 bag reindex` repairs it, or open the storage file itself)"
+            )
         stored: dict[tuple[str, str], int] = {}
-        for part in sorted(self.file.iterdir()):
-            if part.suffix in (".mcap", ".db3"):
-                with reading(part, "a complete ROS bag"), AnyReader([part], default_typestore=_typestore()) as reader:
-                    for topic in _topics(reader):
-                        key = (topic.name, topic.type)
-                        stored[key] = stored.get(key, 0) + topic.messages
+        for storage in reader.storages:
+            for topic in _topics(storage.connections):
+                key = (topic.name, topic.type)
+                stored[key] = stored.get(key, 0) + topic.messages
         announced = {(topic.name, topic.type): topic.messages for topic in self.topics}
-        for name, kind in sorted(stored.keys() | announced.keys()) if stored else ():
+        for name, kind in sorted(stored.keys() | announced.keys()):
             expected, found = announced.get((name, kind), 0), stored.get((name, kind), 0)
             if expected != found:
                 raise RecordingError(
@@ -176,10 +188,10 @@ class Bag:
                 )
 
     @contextmanager
-    def _open(self) -> Iterator[AnyReader]:
+    def _open(self) -> Iterator[BagFile]:
         with self._naming():
             with reading(self.path, "a complete ROS bag"):
-                reader = AnyReader([self.file], default_typestore=_typestore())
+                reader: BagFile = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
                 reader.open()
             try:
                 yield reader
@@ -187,44 +199,59 @@ class Bag:
                 reader.close()
 
     def _messages(
-        self, reader: AnyReader, topics: Collection[str], start: int | None, left_out: LeftOut | None
-    ) -> Iterator[tuple[str, Message | None]]:
-        connections = [connection for connection in reader.connections if connection.topic in topics]
-        if not connections:
-            return
-        stream = reader.messages(connections, start=start)
-        while True:
-            try:
-                with reading(self.path, "a complete ROS bag"):
-                    item = next(stream, None)
-            except RecordingError as error:
-                if left_out is None:
-                    raise
-                left_out.add("rest of the file that cannot be read", error)
-                return
-            if item is None:
-                return
-            connection, _, raw = item
-            try:
-                with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
-                    if self.realsense and connection.topic.endswith("/image/data"):
-                        raw = raw[: -realsense.EXTRA_BYTES]
-                    message = reader.deserialize(raw, connection.msgtype)
-            except RecordingError as error:
-                if left_out is None:
-                    raise
-                left_out.add_error(error)
-                message = None
-            yield connection.topic, message
+        self, topics: Collection[str], start: int | None = None
+    ) -> Iterator[tuple[str, Message | RecordingError]]:
+        """Topic and message, or why it cannot be read.
+
+        Raises:
+            RecordingError: the file, or the definition of the messages of a topic, cannot be read.
+            _Stopped: the rest of the file cannot be read.
+        """
+        with self._open() as reader:
+            connections = [item for item in reader.connections if item.topic in topics]
+            for item in connections:
+                self._types.check(item, self.path)
+            stream = reader.messages(connections, start) if connections else iter(())
+            while True:
+                try:
+                    with reading(self.path, "a complete ROS bag"):
+                        found = next(stream, None)
+                except RecordingError as error:
+                    raise _Stopped(str(error)) from error
+                if found is None:
+                    return
+                connection, _, data = found
+                yield connection.topic, self._message(connection, data)
+
+    def _message(self, connection: Connection, data: bytes | RecordingError) -> Message | RecordingError:
+        if isinstance(data, RecordingError):
+            return self._named(data)
+        try:
+            with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
+                if self.realsense and connection.topic.endswith("/image/data"):
+                    data = data[: -realsense.EXTRA_BYTES]
+                return self._types.deserialize(data, connection.msgtype)
+        except RecordingError as error:
+            return error
 
 
-def _typestore() -> Typestore:
-    """Bags of older ROS 2 releases have no message definitions; those used here are the same in all releases."""
-    return get_typestore(Stores.ROS2_HUMBLE)
+class _Stopped(RecordingError):
+    """A bag of which the rest cannot be read."""
 
 
-def _topics(reader: AnyReader) -> tuple[Topic, ...]:
-    return tuple(Topic(name, str(item.msgtype), item.msgcount) for name, item in sorted(reader.topics.items()))
+def _topics(connections: Iterable[Connection]) -> tuple[Topic, ...]:
+    """One for each name; its type is "None" if the connections of that name do not agree."""
+    named: dict[str, list[Connection]] = {}
+    for item in connections:
+        named.setdefault(item.topic, []).append(item)
+    return tuple(
+        Topic(
+            name,
+            str(items[0].msgtype if len({item.msgtype for item in items}) == 1 else None),
+            sum(item.msgcount for item in items),
+        )
+        for name, items in sorted(named.items())
+    )
 
 
 def find_bag(folder: Path) -> Path:
@@ -257,63 +284,22 @@ def zip_members(path: Path) -> list[str]:
     Raises:
         RecordingError: not a .zip, or a damaged one.
     """
+    check_stored(path, "a complete .zip file", most=MOST_RECORDED)
     with reading(path, "a complete .zip file"), zipfile.ZipFile(path) as archive:
         return archive.namelist()
 
 
-def _unpack(path: Path, folder: Path) -> None:
+def _unpack(path: Path, folder: Path, most: int | None) -> None:
     with reading(path, "a complete .zip file"), zipfile.ZipFile(path) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
         requested = [member for member in members if _is_of_bag(PurePosixPath(member.filename).name)]
-        unpacked, packed = sum(member.file_size for member in requested), path.stat().st_size
-        room = min(_MOST_UNPACKED, shutil.disk_usage(folder).free)
-        if unpacked > room or unpacked > _LITTLE + _MOST_GAIN * packed:
-            raise RecordingError(
-                f"{path}: expected an archive that unpacks to at most {min(room, _LITTLE + _MOST_GAIN * packed)} bytes, "
-                f"found {unpacked}"
-            )
+        unpacked = sum(member.file_size for member in requested)
+        Unpacking(most, advice=_ADVICE).check(path.stat().st_size, unpacked)
+        if unpacked > shutil.disk_usage(folder).free:
+            raise RecordingError(f"{path}: expected {unpacked} free bytes in {folder.parent} to unpack it, found fewer")
         for member in requested:
             name = PurePosixPath(member.filename).name
             if (folder / name).exists():
                 raise RecordingError(f"{path}: expected one bag, found several files named {name}")
             with archive.open(member) as source, (folder / name).open("wb") as target:
                 shutil.copyfileobj(source, target)
-
-
-def check_mcap(path: Path) -> None:
-    """Check that the records of an MCAP file are consecutive up to its footer and that the summary is valid.
-
-    A reader that skips records by their length would silently skip a damaged length.
-    See the MCAP specification, "Records" and "Footer".
-
-    Raises:
-        RecordingError: names the offset.
-    """
-    size = path.stat().st_size
-    with reading(path, "a readable file"), path.open("rb") as file:
-        if file.read(8) != _MCAP_MAGIC:
-            raise RecordingError(f"{path}: expected an MCAP file, found other bytes at its start")
-        position = 8
-        while True:
-            head = file.read(9)
-            if len(head) < 9:
-                raise RecordingError(f"{path}: expected a complete MCAP file, found it cut off at byte {size}")
-            code, length = struct.unpack("<BQ", head)
-            if position + 9 + length > size:
-                raise RecordingError(
-                    f"{path}: expected a complete MCAP file, found a record of {length} bytes at byte {position} of "
-                    f"{size}: cut off or damaged"
-                )
-            if code == _MCAP_FOOTER:
-                break
-            position += 9 + length
-            file.seek(position)
-        footer = file.read(length)
-        if length != 20 or file.read() != _MCAP_MAGIC:
-            raise RecordingError(f"{path}: expected an MCAP footer at byte {position}, found damage")
-        summary_start, _, summary_crc = struct.unpack("<QQI", footer)
-        if summary_crc:
-            file.seek(summary_start)
-            summary = file.read(position + 9 + 16 - summary_start)
-            if zlib.crc32(summary) != summary_crc:
-                raise RecordingError(f"{path}: expected a sound MCAP summary, found a wrong checksum")

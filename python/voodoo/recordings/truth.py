@@ -15,7 +15,7 @@ from voodoo.measurements import FloatArray
 from voodoo.model.joint import short
 from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.recording import Reference, Start
-from voodoo.recordings.stored import read_stored_text
+from voodoo.stored import MOST_METADATA, read_stored_text
 
 OWN_ROOTS = ("base_link", "world")
 """The default root frame of a recording is the first of these in its transforms; both files are in it."""
@@ -59,7 +59,7 @@ def read_start(path: Path, root_from: RootFromStart) -> Start:
         RecordingError: not JSON, another format, or a frame without a transform.
     """
     with reading(path, "a JSON file"):
-        content = json.loads(read_stored_text(path, "a JSON file"))
+        content = json.loads(read_stored_text(path, "a JSON file", most=MOST_METADATA))
     if not isinstance(content, dict) or not isinstance(content.get("joints"), dict) or not content["joints"]:
         raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {short(content)}")
     frame = content.get("frame")

@@ -17,6 +17,7 @@ from voodoo.measurements import ColorImage, DepthImage
 from voodoo.recordings.calibration import FolderCalibration, read_calibration
 from voodoo.recordings.folder import FrameClock as NameClock
 from voodoo.recordings.pictures import decode_color, decode_depth_png
+from voodoo.stored import read_stored
 
 _POLL_S = 0.005
 _PATIENCE_S = 0.5
@@ -114,7 +115,7 @@ class GrowingSource(Source):
         size = (place.camera.width, place.camera.height)
         try:
             stamp = NameClock(self._rate).of([path])[0]
-            data = path.read_bytes()
+            data = read_stored(path, "a picture")
             if kind == "rgb":
                 image = ColorImage(
                     "rgb", stamp, partial(decode_color, data, path, size), place.camera, place.root_from_sensor

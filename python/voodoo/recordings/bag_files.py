@@ -1,0 +1,177 @@
+"""Opens the files of a bag: MCAP, SQLite and ROS 1, and folders of the first two."""
+
+from __future__ import annotations
+
+import heapq
+import io
+import os
+import re
+from collections.abc import Collection, Iterator
+from functools import partial
+from pathlib import Path, PurePath
+from typing import Any, Protocol
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag1 import Reader
+from rosbags.rosbag1.reader import Header, IndexData, RecordType, decompressors, read_bytes, read_uint32
+from rosbags.rosbag2.metadata import ReaderMetadata
+from rosbags.rosbag2.reader import DirectoryReader
+
+from voodoo.errors import RecordingError, reading
+from voodoo.recordings.mcap_file import DAMAGED, Item, McapFile
+from voodoo.recordings.sqlite_file import SqliteFile
+from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored, read_stored_text
+from voodoo.unpacking import Unpacking, count_zstd
+
+_ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
+_MOST_BRACKETS = 10_000
+
+
+class BagFile(Protocol):
+    """What is read from a bag."""
+
+    connections: list[Connection]
+
+    def open(self) -> None:
+        """Read the index."""
+
+    def close(self) -> None:
+        """Close the files."""
+
+    @property
+    def metadata(self) -> ReaderMetadata:
+        """Times and number of messages."""
+
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:
+        """Messages in the order of their time."""
+
+
+def bag_file(path: Path, unpacking: Unpacking) -> Any:  # noqa: ANN401 - rosbags declares other messages
+    """The reader of a bag.
+
+    Args:
+        path: .bag, .mcap, .db3, or a folder with metadata.yaml.
+        unpacking: limits compressed data.
+
+    Returns:
+        a BagFile.
+
+    Raises:
+        RecordingError: another kind of file.
+    """
+    if path.is_dir():
+        return BagFolder(path, unpacking)
+    check_stored(path, "a complete ROS bag", most=MOST_RECORDED)
+    if path.suffix == ".mcap":
+        return McapFile(path, unpacking)
+    if path.suffix == ".db3":
+        return SqliteFile(path)
+    return Ros1File(path, unpacking)
+
+
+class Ros1File(Reader):
+    """Reads a .bag; messages in a damaged chunk are errors, and those in other chunks are read."""
+
+    def __init__(self, path: Path, unpacking: Unpacking) -> None:
+        """Read nothing yet."""
+        super().__init__(path)
+        self._unpacking = unpacking
+        self._last: tuple[int, bytes | Exception] = (-1, b"")
+
+    @property
+    def metadata(self) -> ReaderMetadata:
+        """Times and number of messages."""
+        start, end = self.start_time, self.end_time
+        return ReaderMetadata(max(end - start, 0), start, end, self.message_count, None, None, None, None)
+
+    def messages(  # type: ignore[override]
+        self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
+    ) -> Iterator[Item]:
+        """Messages in the order of their time."""
+        first = -1 if start is None else start
+        entries = [
+            [(entry.time, entry, one) for entry in self.indexes[one.id] if first <= entry.time] for one in connections
+        ]
+        for time, entry, one in heapq.merge(*entries, key=lambda item: item[0]):
+            data: bytes | RecordingError
+            try:
+                with reading(self.path, f"a sound chunk at byte {entry.chunk_pos}"):
+                    data = self._message(entry)
+            except RecordingError as error:
+                data = RecordingError(str(error), reason=DAMAGED)
+            yield one, time, data
+
+    def _message(self, entry: IndexData) -> bytes:
+        if self._last[0] != entry.chunk_pos:
+            try:
+                self._last = entry.chunk_pos, self._content(entry.chunk_pos)
+            except Exception as error:  # told for each of its messages
+                self._last = entry.chunk_pos, error
+        content = self._last[1]
+        if isinstance(content, Exception):
+            raise content
+        chunk = io.BytesIO(content)
+        chunk.seek(entry.offset)
+        while (header := Header.read(chunk)).get_uint8("op") == RecordType.CONNECTION:
+            chunk.seek(read_uint32(chunk), os.SEEK_CUR)
+        if header.get_uint8("op") != RecordType.MSGDATA or header.get_time("time") != entry.time:
+            raise ValueError("expected a message, found none")
+        return read_bytes(chunk, read_uint32(chunk))
+
+    def _content(self, position: int) -> bytes:
+        assert self.bio is not None
+        chunk = self.chunks[position]
+        if chunk.datasize > MOST_BYTES:
+            raise ValueError(f"expected {MOST_BYTES} bytes at most, found {chunk.datasize}")
+        self.bio.seek(chunk.datapos)
+        data = read_bytes(self.bio, chunk.datasize)
+        compression = next(name for name, function in decompressors.items() if function is chunk.decompressor)
+        return data if compression == "none" else self._unpacking.unpack(data, compression)
+
+
+class BagFolder(DirectoryReader):
+    """Reads a folder of MCAP or SQLite files in the order given by its metadata.yaml."""
+
+    def __init__(self, path: Path, unpacking: Unpacking) -> None:
+        """Read nothing yet."""
+        super().__init__(path)
+        self._folder, self._unpacking = path, unpacking
+        plugins: Any = {"mcap": partial(McapFile, unpacking=unpacking), "sqlite3": SqliteFile}
+        self.STORAGE_PLUGINS = plugins
+
+    def open(self) -> None:
+        """Check metadata.yaml and the size of the files, and read the index of each."""
+        yaml = self._folder / "metadata.yaml"
+        text = read_stored_text(yaml, "the metadata of a ROS 2 bag", most=MOST_METADATA)
+        # A few lines that refer to each other describe billions of entries, and deep nesting exhausts the stack of the parser.
+        if _ANCHOR.search(text) or text.count("[") + text.count("{") > _MOST_BRACKETS:
+            raise RecordingError(f"{yaml}: expected the metadata of a ROS 2 bag, found references or deep nesting")
+        for part in sorted(self._folder.iterdir()):
+            if part.suffix == ".zstd":
+                check_stored(part, "a complete ROS bag", most=MOST_RECORDED)
+                with reading(part, "a file of zstd"):
+                    count_zstd(part, self._unpacking)
+        super().open()
+        names = [PurePath(storage.path).name for storage in self.storages]  # type: ignore[attr-defined]
+        if len(set(names)) != len(names):
+            raise RecordingError(f"{yaml}: expected every file once, found {', '.join(sorted(names))[:300]}")
+
+    def messages(  # type: ignore[override]
+        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
+    ) -> Iterator[Item]:
+        """Messages in the order of the files."""
+        wanted = {(item.topic, item.msgtype): item for item in connections}
+        for storage in self.storages:
+            own = [item for item in storage.connections if (item.topic, item.msgtype) in wanted]
+            found: Iterator[Any] = storage.messages(own, start, stop) if own else iter(())
+            for item, time, data in found:
+                if self.metadata.compression_mode == "message" and isinstance(data, bytes):
+                    data = self._unpacked(item.topic, data)
+                yield wanted[item.topic, item.msgtype], time, data
+
+    def _unpacked(self, topic: str, data: bytes) -> bytes | RecordingError:
+        try:
+            with reading(f"{self._folder}, topic {topic}", "a message compressed by zstd"):
+                return self._unpacking.unpack(data, "zstd")
+        except RecordingError as error:
+            return error

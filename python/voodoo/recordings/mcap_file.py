@@ -1,0 +1,230 @@
+"""MCAP files through rosbags, checked before and read on behind damaged chunks."""
+
+from __future__ import annotations
+
+import heapq
+import struct
+import zlib
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader
+
+from voodoo.errors import RecordingError, reading
+from voodoo.stored import MOST_BYTES, MOST_METADATA
+from voodoo.unpacking import Unpacking
+
+_MAGIC = b"\x89MCAP0\r\n"
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
+_ATTACHMENT = 0x09
+_MOST_OF_ALL_CHANNELS = 16 * MOST_METADATA
+"""Largest size of all schemas and channels [bytes]."""
+_SMALLEST_MESSAGE = 31
+_MOST_LOST = 1_000_000
+"""Largest number of messages that a damaged chunk is taken to have had, because the index may be damaged as well."""
+DAMAGED = "in a damaged chunk"
+"""Reason of messages that are left out."""
+
+Item = tuple[Connection, int, bytes | RecordingError]
+"""Connection, time [ns] and bytes of a message, or why it cannot be read."""
+
+
+class McapFile(McapReader):
+    """Reads an MCAP file; messages in a damaged chunk are errors, and those in other chunks are read.
+
+    Args:
+        path: the file.
+        unpacking: limits chunks.
+    """
+
+    def __init__(self, path: Path, unpacking: Unpacking) -> None:
+        """Read nothing yet."""
+        super().__init__(path)
+        self._file, self._unpacking = path, unpacking
+        self._chunks: frozenset[int] = frozenset()
+
+    def open(self) -> None:
+        """Check the file, and read its summary."""
+        self._chunks = check_mcap(self._file)
+        super().open()
+
+    def meta_scan(self) -> None:
+        """Read messages that are in no chunk, for a summary."""
+        self._refuse_unindexed()
+        super().meta_scan()
+
+    def _refuse_unindexed(self) -> None:
+        if self._chunks:
+            raise RecordingError(
+                f"{self._file}: expected an index of the chunks, found none (`mcap recover {self._file} --output "
+                "FILE.mcap` makes one)"
+            )
+
+    def messages(  # type: ignore[override]
+        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
+    ) -> Iterator[Item]:
+        """Messages in the order of their time."""
+        if not self.chunks:
+            self._refuse_unindexed()
+            yield from super().messages(connections, start, stop)
+            return
+        wanted = {item.id: item for item in connections}
+        first = -1 if start is None else start
+        # The first item of every chunk is its start, so that a chunk is unpacked only when its time has come.
+        sources = [
+            self._of_chunk(chunk, wanted, first)
+            for chunk in self.chunks
+            if first <= chunk.message_end_time and any(chunk.channel_count.get(one, 0) for one in wanted)
+        ]
+        for _, _, item in heapq.merge(*sources, key=lambda entry: entry[:2]):
+            if item is not None:
+                yield item
+
+    def _of_chunk(
+        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int
+    ) -> Iterator[tuple[int, int, Item | None]]:
+        yield chunk.message_start_time, 0, None
+        found: list[tuple[int, int, bytes]] = []
+        lost: RecordingError | None = None
+        try:
+            with reading(self._file, f"a sound chunk at byte {chunk.chunk_start_offset}"):
+                for one, time, data in _messages(self._content(chunk)):
+                    if one in wanted and first <= time:
+                        found.append((time, one, data))
+        except RecordingError as error:
+            lost = RecordingError(str(error), reason=DAMAGED)
+        found.sort(key=lambda entry: entry[0])
+        for time, one, data in found:
+            yield time, chunk.chunk_start_offset, (wanted[one], time, data)
+        if lost is None:
+            return
+        most = min(_MOST_LOST, chunk.uncompressed_size // _SMALLEST_MESSAGE)
+        for one, connection in wanted.items():
+            count = chunk.channel_count.get(one, 0) - sum(entry[1] == one for entry in found)
+            for _ in range(min(count, most)):
+                yield chunk.message_end_time, chunk.chunk_start_offset, (connection, chunk.message_end_time, lost)
+
+    def _content(self, chunk: ChunkInfo) -> bytes:
+        """The records in a chunk."""
+        if chunk.chunk_start_offset not in self._chunks:
+            raise ValueError("found no chunk there")
+        assert self.bio is not None
+        self.bio.seek(chunk.chunk_start_offset + 9)
+        # See the MCAP specification, "Chunk".
+        _, _, size, checksum, words = struct.unpack("<QQQII", self.bio.read(32))
+        compression = self.bio.read(min(words, 16)).decode()
+        (packed,) = struct.unpack("<Q", self.bio.read(8))
+        if packed > chunk.chunk_length or packed > MOST_BYTES:
+            raise ValueError(f"expected at most {min(chunk.chunk_length, MOST_BYTES)} bytes, found {packed}")
+        content = self.bio.read(packed)
+        if compression:
+            content = self._unpacking.unpack(content, compression, declared=size)
+        if len(content) != size:
+            raise ValueError(f"expected {size} bytes, found {len(content)}")
+        if checksum and zlib.crc32(content) != checksum:
+            raise RecordingError(
+                f"{self._file}: expected a sound chunk at byte {chunk.chunk_start_offset}, found a wrong checksum"
+            )
+        return content
+
+
+def _messages(content: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Channel, time [ns] and bytes of the messages in a chunk."""
+    at = 0
+    while at < len(content):
+        code, length = struct.unpack_from("<BQ", content, at)
+        at += 9
+        if at + length > len(content):
+            raise ValueError(f"expected {len(content) - at} bytes at most in a record, found {length}")
+        if code == _MESSAGE:
+            channel, _, time, _ = struct.unpack_from("<HIQQ", content, at)
+            yield channel, time, content[at + 22 : at + length]
+        at += length
+
+
+@dataclass
+class _Found:
+    """What is in a file: where its chunks and the end of the data are, and the size of all schemas and channels."""
+
+    chunks: set[int] = field(default_factory=set)
+    ends: set[int] = field(default_factory=lambda: {0})
+    described: int = 0
+
+
+def check_mcap(path: Path) -> frozenset[int]:
+    """Check that the records of an MCAP file are consecutive up to its footer, of plausible size, and the summary is valid.
+
+    A reader that skips records by their length would silently skip a damaged length, and one that reads them as a whole
+    would fill the memory. See the MCAP specification, "Records" and "Footer".
+
+    Returns:
+        where the chunks begin.
+
+    Raises:
+        RecordingError: names the offset.
+    """
+    size = path.stat().st_size
+    found = _Found()
+    with reading(path, "a readable file"), path.open("rb") as file:
+        if file.read(8) != _MAGIC:
+            raise RecordingError(f"{path}: expected an MCAP file, found other bytes at its start")
+        position = 8
+        while True:
+            head = file.read(9)
+            if len(head) < 9:
+                raise RecordingError(f"{path}: expected a complete MCAP file, found it cut off at byte {size}")
+            code, length = struct.unpack("<BQ", head)
+            if position + 9 + length > size:
+                raise RecordingError(
+                    f"{path}: expected a complete MCAP file, found a record of {length} bytes at byte {position} of "
+                    f"{size}: cut off or damaged"
+                )
+            if code == _FOOTER:
+                break
+            _check_record(path, code, length, position, found)
+            position += 9 + length
+            file.seek(position)
+        footer = file.read(length)
+        if length != 20 or file.read() != _MAGIC:
+            raise RecordingError(f"{path}: expected an MCAP footer at byte {position}, found damage")
+        summary_start, _, summary_crc = struct.unpack("<QQI", footer)
+        if summary_start not in found.ends:
+            raise RecordingError(f"{path}: expected the summary behind the data, found it at byte {summary_start}")
+        if summary_crc:
+            _check_summary(path, position + 25, summary_start, summary_crc)
+    return frozenset(found.chunks)
+
+
+def _check_record(path: Path, code: int, length: int, position: int, found: _Found) -> None:
+    most = {_CHUNK: MOST_BYTES, _MESSAGE: MOST_BYTES, _MESSAGE_INDEX: MOST_BYTES, _ATTACHMENT: 2**63}
+    if length > most.get(code, MOST_METADATA):
+        raise RecordingError(
+            f"{path}: expected a record of {most.get(code, MOST_METADATA)} bytes at most, found {length} bytes at byte "
+            f"{position}"
+        )
+    if code == _CHUNK:
+        found.chunks.add(position)
+    elif code == _DATA_END:
+        found.ends.add(position + 9 + length)
+    elif code in (_SCHEMA, _CHANNEL):
+        found.described += length
+        if found.described > _MOST_OF_ALL_CHANNELS:
+            raise RecordingError(
+                f"{path}: expected schemas and channels of {_MOST_OF_ALL_CHANNELS} bytes at most, found more"
+            )
+
+
+def _check_summary(path: Path, end: int, start: int, expected: int) -> None:
+    checksum = 0
+    with path.open("rb") as file:
+        file.seek(start)
+        left = end - start
+        while left > 0:
+            part = file.read(min(left, 2**20))
+            checksum, left = zlib.crc32(part, checksum), left - len(part)
+            if not part:
+                break
+    if checksum != expected:
+        raise RecordingError(f"{path}: expected a sound MCAP summary, found a wrong checksum")
