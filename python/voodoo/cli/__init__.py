@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from typing import Annotated
 
 import typer
@@ -18,6 +19,7 @@ from voodoo.cli.ik import ik_command
 from voodoo.cli.init import init_command
 from voodoo.cli.live import live_command
 from voodoo.cli.show import body_command, config_command, info_command
+from voodoo.cli.terminal import Escaped
 from voodoo.cli.track import track_command
 
 app = typer.Typer(
@@ -31,8 +33,9 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the `voodoo` command."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # file names may contain any bytes
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # file names may contain any bytes
+            stream.reconfigure(errors="backslashreplace")
     app()
 
 
@@ -47,6 +50,7 @@ def _show_version(expected: bool) -> None:
 
 @app.callback()
 def voodoo_command(
+    context: typer.Context,
     show_version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
     ] = False,
@@ -56,6 +60,8 @@ def voodoo_command(
     Try voodoo demo first; then voodoo info RECORDING and
     voodoo track RECORDING --out pose.csv --overlay look.mp4.
     """
+    context.with_resource(redirect_stdout(Escaped(sys.stdout)))
+    context.with_resource(redirect_stderr(Escaped(sys.stderr)))
 
 
 # In the order of `voodoo --help`.

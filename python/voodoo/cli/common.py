@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
 from voodoo.cli.options import NUMBERS, TOPICS
+from voodoo.cli.terminal import Escaped
 from voodoo.errors import VoodooError
 
 if TYPE_CHECKING:
@@ -78,10 +79,11 @@ def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    console = Console(file=getattr(sys.stderr, "stream", sys.stderr))  # whose commands are Rich's own
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:
-        yield from progress.track(items, total=total, description=words)
+        with redirect_stderr(Escaped(sys.stderr)):  # Rich writes lines above the bar
+            yield from progress.track(items, total=total, description=words)
 
 
 def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:

@@ -99,7 +99,7 @@ BackgroundOption = Annotated[
         help="Images of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
     ),
 ]
-NUMBERS = ("rate", "meters_per_unit", "tf_max_age")
+NUMBERS = ("rate", "meters_per_unit", "tf_max_age", "unpacked_gb")
 """Options of loaders that are numbers."""
 
 LoaderNumberOption = Annotated[
@@ -108,7 +108,7 @@ LoaderNumberOption = Annotated[
         "--option",
         metavar="NAME=NUMBER",
         help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit (16-bit depth of bags, 0.001), "
-        "tf_max_age (bags, 0.5 s); repeatable.",
+        "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
     ),
 ]
 UseOption = Annotated[

@@ -1,0 +1,34 @@
+"""Escapes text on its way to a terminal: names and texts in files of others may hold commands for it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+_COMMANDS = re.compile(r"[^\n\t\x20-\x7e\xa0-\u2027\u202f-\u2065\u206a-\U0010ffff]")
+"""Control characters, and those that reverse the direction of text or end a line."""
+
+
+def escaped(text: str) -> str:
+    """The text with commands for a terminal written as in a Python string, e.g. \\x1b."""
+    return _COMMANDS.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
+
+
+class Escaped:
+    """A text stream that escapes everything that is written to it.
+
+    Args:
+        stream: where to.
+    """
+
+    def __init__(self, stream: Any) -> None:  # noqa: ANN401 - any object like a text file
+        """Write nothing yet."""
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        return int(self.stream.write(escaped(text)))
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        """Everything else is the stream's."""
+        return getattr(self.stream, name)
