@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from os import PathLike, fspath
 from pathlib import Path
+from types import FunctionType
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 class VoodooError(ValueError):
@@ -44,6 +49,32 @@ class RecordingError(VoodooError):
 
 class DetectorWarning(UserWarning):
     """A detector failed, and the tracker's step continued without it. The warning names the exception."""
+
+
+def one_thread(kind: type[T]) -> type[T]:
+    """A class whose methods raise a VoodooError when another thread is in one of them; without it, it is PyO3's RuntimeError."""
+    for name, value in list(vars(kind).items()):
+        if isinstance(value, property) and value.fget is not None:
+            setattr(kind, name, property(_alone(value.fget), value.fset, value.fdel, value.__doc__))
+        elif isinstance(value, FunctionType) and not name.startswith("__"):
+            setattr(kind, name, _alone(value))
+    return kind
+
+
+def _alone(function: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(function)
+    def alone(*args: Any, **options: Any) -> Any:  # noqa: ANN401
+        try:
+            return function(*args, **options)
+        except RuntimeError as error:
+            if str(error) not in ("Already borrowed", "Already mutably borrowed"):
+                raise
+            raise VoodooError(
+                f"{function.__qualname__}: expected one thread at a time, found another one at work; each thread needs a "
+                "tracker of its own, or a lock"
+            ) from None
+
+    return alone
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
-from voodoo.errors import BodyError, ConfigError, MeasurementError
+from voodoo.errors import BodyError, ConfigError, MeasurementError, one_thread
 from voodoo.model.body import Body, checked_joints
 
 __all__ = ["Followed", "People", "PeopleEstimate", "Person"]
@@ -58,6 +58,7 @@ class PeopleEstimate:
         return len(self.persons)
 
 
+@one_thread
 class People:
     """Tracks all persons, each with a persistent number.
 

@@ -12,7 +12,7 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
-from voodoo.errors import BodyError, ConfigError, MeasurementError
+from voodoo.errors import BodyError, ConfigError, MeasurementError, one_thread
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.model.joint import number_of
 
@@ -35,6 +35,7 @@ class RegionLines(NamedTuple):
     sigmas: npt.NDArray[np.float32]
 
 
+@one_thread
 class Tracker:
     """Tracks one body through frames.
 

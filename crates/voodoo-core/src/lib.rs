@@ -167,6 +167,7 @@ mod solver;
 mod terms;
 #[cfg(test)]
 mod testing;
+mod threads;
 mod tracker;
 mod uncertainty;
 mod visibility;

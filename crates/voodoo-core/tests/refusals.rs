@@ -199,6 +199,9 @@ fn bad_bodies_are_refused_by_key() {
     let site = |name: &str, limb, position| Site { name: name.into(), limb, position };
     assert!(Body::new("thing", with_joint(|_| {}), vec![site("s", 1, Vec3::ZERO)]).is_ok());
     assert_eq!(Body::new("thing", vec![], vec![]).unwrap_err(), BodyError::Empty);
+    let many = vec![Body::human(1.75, HumanModel::Papers).unwrap().limbs()[0].clone(); 1_001];
+    let error = Body::new("thing", many, vec![]).unwrap_err().to_string();
+    assert_eq!(error, "body: expected at most 1,000 limbs and 10,000 sites, found 1001 and 0");
     refused(vec![limb("", None)], vec![], "a name");
     refused(vec![limb("a", None), limb("a", Some(0))], vec![], "limbs.a");
     refused(vec![limb("a", None), limb("b", None)], vec![], "limbs.b.parent");

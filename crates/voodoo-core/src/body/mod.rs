@@ -64,6 +64,11 @@ pub struct Site {
     pub position: Vec3,
 }
 
+/// Largest number of limbs: pairs of limbs are compared, and a million pairs take seconds.
+const MOST_LIMBS: usize = 1_000;
+/// Largest number of sites.
+const MOST_SITES: usize = 10_000;
+
 /// A tree of limbs; a parent always precedes its children.
 ///
 /// ```
@@ -185,6 +190,13 @@ impl Body {
     fn check(&self) -> Result<(), BodyError> {
         if self.limbs.is_empty() {
             return Err(BodyError::Empty);
+        }
+        if self.limbs.len() > MOST_LIMBS || self.sites.len() > MOST_SITES {
+            return Err(BodyError::Value {
+                key: "body".into(),
+                expected: "at most 1,000 limbs and 10,000 sites",
+                found: format!("{} and {}", self.limbs.len(), self.sites.len()),
+            });
         }
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {

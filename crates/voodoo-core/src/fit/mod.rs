@@ -7,7 +7,6 @@ mod motion;
 pub(crate) use context::{Context, Matched, Setting};
 pub(crate) use motion::{Motion, REFERENCE_RATE, UNKNOWN_MOTION};
 
-use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::association::assignment::{Assignment, match_limb};
@@ -21,6 +20,7 @@ use crate::error::TrackError;
 use crate::math::Pose;
 use crate::regions;
 use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
+use crate::threads::Threads;
 
 /// First step of a frame that uses the depth contour: in earlier steps, it would push thin limbs off their points (method section
 /// 8).
@@ -38,17 +38,7 @@ pub(crate) struct Fit {
     /// Whether color edges are searched for over a larger distance.
     far: bool,
     band_weights: Vec<f64>,
-    threads: Option<ThreadPool>,
-}
-
-/// Starts the threads of a configuration; `None` for a single one.
-pub(crate) fn thread_pool(config: &Config) -> Result<Option<ThreadPool>, TrackError> {
-    match config.threads {
-        1 => Ok(None),
-        count => rayon::ThreadPoolBuilder::new().num_threads(count).build().map(Some).map_err(|error| {
-            TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
-        }),
-    }
+    threads: Threads,
 }
 
 impl Fit {
@@ -63,7 +53,7 @@ impl Fit {
             regions: regions::ColorRegions::default(),
             far: false,
             band_weights: Vec::new(),
-            threads: thread_pool(config)?,
+            threads: Threads::new(config)?,
         })
     }
 
@@ -274,7 +264,7 @@ impl Fit {
                 match_visible_side(&limbs[index].shape, &poses[index], candidates, gate.distance, matches);
             }
         };
-        match threads {
+        match threads.pool() {
             // Each limb is processed by one thread in a fixed order, so the result does not depend on the number of threads.
             Some(pool) => pool.install(|| correspondences.limbs.par_iter_mut().enumerate().for_each(work)),
             None => correspondences.limbs.iter_mut().enumerate().for_each(work),

@@ -16,18 +16,17 @@ use crate::body::{Body, Model};
 use crate::config::Config;
 use crate::detect::{BoundDetector, Detect, DetectError, Detected, DetectionQuery, Surroundings, fit_body};
 use crate::error::TrackError;
-use crate::fit::thread_pool;
 use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
 use crate::observation::ownership::NO_OWNER;
 use crate::relocalize::SAME_PERSON;
+use crate::threads::Threads;
 use crate::tracker::Tracker;
 use clothes::Clothes;
 pub use options::PeopleOptions;
 use person::Person;
 use pixel_assignment::{PixelAssignment, PredictedBody};
-use rayon::ThreadPool;
 use rayon::prelude::*;
 use scene_model::SceneModel;
 use tentative_tracks::{TentativeTrack, TentativeTracks};
@@ -71,13 +70,13 @@ pub struct People {
     detector: BoundDetector,
     last_detection: Option<f64>,
     stamp: Option<f64>,
-    threads: Option<ThreadPool>,
+    threads: Threads,
 }
 
 impl People {
     /// Returns a tracker of no persons. Every new person gets a copy of `prototype`.
     pub fn new(prototype: Body, config: Config, options: PeopleOptions) -> Result<Self, TrackError> {
-        let threads = thread_pool(&config)?;
+        let threads = Threads::new(&config)?;
         Ok(Self {
             prototype,
             config: Config { threads: 1, ..config },
@@ -196,7 +195,7 @@ impl People {
                 person.update(frame, ownership);
             }
         };
-        match &self.threads {
+        match self.threads.pool() {
             // Each person is processed by a single thread, so the result does not depend on the number of threads.
             Some(pool) => pool.install(|| self.persons.par_iter_mut().enumerate().for_each(work)),
             None => self.persons.iter_mut().enumerate().for_each(work),

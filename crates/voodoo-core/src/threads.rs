@@ -1,0 +1,54 @@
+//! The threads of a tracker.
+
+use std::{mem, process};
+
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+
+use crate::config::Config;
+use crate::error::TrackError;
+
+/// Threads that share the work of a step.
+#[derive(Debug)]
+pub(crate) struct Threads {
+    count: usize,
+    /// `None`: the calling thread does everything.
+    pool: Option<ThreadPool>,
+    /// The process in which they run.
+    process: u32,
+}
+
+impl Threads {
+    /// Starts the threads of a configuration.
+    pub(crate) fn new(config: &Config) -> Result<Self, TrackError> {
+        let pool = started(config.threads).map_err(|error| {
+            TrackError::measurement("threads", "a number of threads the system can start", error.to_string())
+        })?;
+        Ok(Self { count: config.threads, pool, process: process::id() })
+    }
+
+    /// The threads, `None` for a single one. A forked process has none of its parent's threads, and waiting for them would never
+    /// end: it starts its own; if the system cannot, the calling thread does everything, with the same result.
+    pub(crate) fn pool(&mut self) -> Option<&ThreadPool> {
+        if self.process != process::id() {
+            mem::forget(self.pool.take());
+            self.pool = started(self.count).ok().flatten();
+            self.process = process::id();
+        }
+        self.pool.as_ref()
+    }
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        if self.process != process::id() {
+            mem::forget(self.pool.take());
+        }
+    }
+}
+
+fn started(count: usize) -> Result<Option<ThreadPool>, ThreadPoolBuildError> {
+    match count {
+        1 => Ok(None),
+        count => ThreadPoolBuilder::new().num_threads(count).build().map(Some),
+    }
+}
