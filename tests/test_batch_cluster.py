@@ -51,6 +51,36 @@ def rows_of(out):
         return {row["recording"]: row for row in csv.DictReader(file)}
 
 
+INTRUDER = """
+import sys, psutil, distributed
+process = psutil.Process(int(sys.argv[1]))
+family = [process, *process.children(recursive=True)]
+ports = {c.laddr.port for one in family for c in one.net_connections() if c.status == psutil.CONN_LISTEN}
+assert ports
+for port in sorted(ports):
+    for scheme, keys in (("tcp", None), ("tls", distributed.Security.temporary())):
+        try:
+            client = distributed.Client(f"{scheme}://127.0.0.1:{port}", timeout=1, security=keys, set_as_default=False)
+            print("IN", port, client.submit(lambda: 7).result(timeout=3))
+        except (OSError, TimeoutError) as error:
+            print("out", port, type(error).__name__)
+"""
+
+
+def test_nobody_else_can_use_the_workers(python, recordings, tmp_path):
+    with subprocess.Popen(
+        command(python, recordings, tmp_path / "o", "--workers", 1), stderr=subprocess.DEVNULL
+    ) as batch:
+        while not list((tmp_path / "o").glob("frames/*")):
+            assert batch.poll() is None
+            time.sleep(0.1)
+        done = subprocess.run(
+            [python, "-c", INTRUDER, str(batch.pid)], capture_output=True, text=True, timeout=120, check=False
+        )
+        batch.kill()
+    assert "out" in done.stdout and "IN" not in done.stdout, done.stdout + done.stderr
+
+
 def test_the_parts_that_need_the_extra(python):
     done = subprocess.run(
         [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", ROOT / "tests" / "test_batch.py"],
