@@ -16,6 +16,7 @@ import scipy.io
 
 import voodoo
 from bag_writer import Messages, write_bag
+from mcap_writer import write_mcap
 from scene import standing_joints
 from voodoo import ik
 from voodoo.export.track import Track
@@ -88,6 +89,18 @@ def storage(name: str) -> Callable[[Path], None]:
         part.rename(folder / f"b{part.suffix}")
         (written / "metadata.yaml").unlink()
         written.rmdir()
+
+    return make
+
+
+def chunked(**how: Any) -> Callable[[Path], None]:
+    """An MCAP file of several chunks."""
+
+    def make(folder: Path) -> None:
+        m = Messages()
+        info = [("/d/depth/camera_info", 10.0, m.camera_info(10.0, width=16, height=12))]
+        images = [[("/d/depth/image", 10.0 + k / 30, m.image(10.0 + k / 30, DEPTH, "16UC1"))] for k in range(4)]
+        write_mcap(folder / "b.mcap", [info, *images], **how)
 
     return make
 
@@ -193,6 +206,8 @@ MAP = (
 )
 SAMPLES: dict[str, Sample] = {
     "mcap": Sample(storage("mcap"), ("b.mcap",), inside("b.mcap")),
+    "mcap packed": Sample(chunked(), ("b.mcap",), inside("b.mcap")),
+    "mcap plain": Sample(chunked(compression="", checksum=False), ("b.mcap",), inside("b.mcap")),
     "db3": Sample(storage("sqlite3"), ("b.db3",), inside("b.db3")),
     "metadata.yaml": Sample(lambda f: void(bag(f)), ("b/metadata.yaml",), inside("b"), text=True),
     "ros1 bag": Sample(lambda f: void(bag(f, ros=1)), ("b.bag",), inside("b.bag")),

@@ -29,7 +29,16 @@ def _record(code, body):
 
 
 def write_mcap(
-    path, chunks, *, compression="zstd", checksum=True, filler=0, declared=None, definitions=None, indexed=True
+    path,
+    chunks,
+    *,
+    compression="zstd",
+    checksum=True,
+    filler=0,
+    declared=None,
+    definitions=None,
+    indexed=True,
+    repeated=1,
 ):
     """Write a file.
 
@@ -42,6 +51,7 @@ def write_mcap(
         declared: a false size of the unpacked chunks.
         definitions: message type -> what the file says of it.
         indexed: write a summary.
+        repeated: how often every chunk is in the index.
 
     Returns:
         position and length of every chunk's compressed data.
@@ -89,7 +99,7 @@ def write_mcap(
             out.write(_record(3, struct.pack("<H", one) + _text(kind) + _text("ros2msg") + _text(text)))
         for topic, (one, schema) in channels.items():
             out.write(_record(4, struct.pack("<HH", one, schema) + _text(topic) + _text("cdr") + _text(b"")))
-        for entry in index:
+        for entry in index * repeated:
             out.write(_record(8, entry))
         times = [round(time * 1e9) for entries in chunks for _, time, _ in entries]
         table = b"".join(struct.pack("<HQ", *entry) for entry in counts.items())

@@ -88,6 +88,14 @@ def test_a_wrong_checksum_is_the_reason_told(tmp_path):
     assert "found none" not in run("info", path).stderr
 
 
+def test_a_file_without_an_index_and_one_that_names_chunks_twice_are_refused(tmp_path):
+    path = tmp_path / "x.mcap"
+    write_mcap(path, chunks(2), indexed=False)
+    refused(run("info", path), "x.mcap: expected an index of the chunks, found none (`mcap recover")
+    write_mcap(path, chunks(2), repeated=1000)
+    refused(run("info", path), "x.mcap: expected every chunk once in the index, found one again")
+
+
 @pytest.mark.parametrize("compression", [None, Writer1.CompressionFormat.BZ2, Writer1.CompressionFormat.LZ4])
 def test_a_damaged_chunk_of_ros1_costs_its_messages(tmp_path, compression):
     path = tmp_path / "x.bag"

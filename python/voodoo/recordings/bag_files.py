@@ -77,6 +77,16 @@ class Ros1File(Reader):
         super().__init__(path)
         self._unpacking = unpacking
         self._last: tuple[int, bytes | Exception] = (-1, b"")
+        self._size, self._indexed = path.stat().st_size, 0
+
+    def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
+        """Read the index of a connection in a chunk; a hostile file has many chunks with one index."""
+        assert self.bio is not None
+        before = self.bio.tell()
+        super().read_index_data(pos, indexes)
+        self._indexed += self.bio.tell() - before
+        if self._indexed > self._size:
+            raise ValueError("expected an index of its own for each chunk, found one again")
 
     @property
     def metadata(self) -> ReaderMetadata:
@@ -152,6 +162,14 @@ class BagFolder(DirectoryReader):
                 with reading(part, "a file of zstd"):
                     count_zstd(part, self._unpacking)
         super().open()
+        for item in self.connections:
+            if [type(value) for value in (item.topic, item.msgtype, item.digest, item.msgcount)] != [
+                str,
+                str,
+                str,
+                int,
+            ]:
+                raise RecordingError(f"{yaml}: expected names and numbers of topics, found {item[:3]!r:.100}")
         names = [PurePath(storage.path).name for storage in self.storages]  # type: ignore[attr-defined]
         if len(set(names)) != len(names):
             raise RecordingError(f"{yaml}: expected every file once, found {', '.join(sorted(names))[:300]}")

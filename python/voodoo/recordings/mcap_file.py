@@ -18,7 +18,7 @@ from voodoo.unpacking import Unpacking
 
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
-_ATTACHMENT = 0x09
+_ATTACHMENT, _METADATA = 0x09, 0x0C
 _MOST_OF_ALL_CHANNELS = 16 * MOST_METADATA
 """Largest size of all schemas and channels [bytes]."""
 _SMALLEST_MESSAGE = 31
@@ -70,13 +70,16 @@ class McapFile(McapReader):
             self._refuse_unindexed()
             yield from super().messages(connections, start, stop)
             return
+        if len({chunk.chunk_start_offset for chunk in self.chunks}) != len(self.chunks):
+            raise RecordingError(f"{self._file}: expected every chunk once in the index, found one again")
         wanted = {item.id: item for item in connections}
         first = -1 if start is None else start
         # The first item of every chunk is its start, so that a chunk is unpacked only when its time has come.
         sources = [
             self._of_chunk(chunk, wanted, first)
             for chunk in self.chunks
-            if first <= chunk.message_end_time and any(chunk.channel_count.get(one, 0) for one in wanted)
+            if first <= chunk.message_end_time
+            and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
         ]
         for _, _, item in heapq.merge(*sources, key=lambda entry: entry[:2]):
             if item is not None:
@@ -198,7 +201,13 @@ def check_mcap(path: Path) -> frozenset[int]:
 
 
 def _check_record(path: Path, code: int, length: int, position: int, found: _Found) -> None:
-    most = {_CHUNK: MOST_BYTES, _MESSAGE: MOST_BYTES, _MESSAGE_INDEX: MOST_BYTES, _ATTACHMENT: 2**63}
+    most = {
+        _CHUNK: MOST_BYTES,
+        _MESSAGE: MOST_BYTES,
+        _MESSAGE_INDEX: MOST_BYTES,
+        _METADATA: MOST_BYTES,
+        _ATTACHMENT: 2**63,
+    }
     if length > most.get(code, MOST_METADATA):
         raise RecordingError(
             f"{path}: expected a record of {most.get(code, MOST_METADATA)} bytes at most, found {length} bytes at byte "
