@@ -163,12 +163,7 @@ class BagFolder(DirectoryReader):
                     count_zstd(part, self._unpacking)
         super().open()
         for item in self.connections:
-            if [type(value) for value in (item.topic, item.msgtype, item.digest, item.msgcount)] != [
-                str,
-                str,
-                str,
-                int,
-            ]:
+            if not (isinstance(item.topic, str) and isinstance(item.msgtype, str) and isinstance(item.msgcount, int)):
                 raise RecordingError(f"{yaml}: expected names and numbers of topics, found {item[:3]!r:.100}")
         names = [PurePath(storage.path).name for storage in self.storages]  # type: ignore[attr-defined]
         if len(set(names)) != len(names):

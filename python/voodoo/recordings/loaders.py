@@ -117,8 +117,6 @@ def open_recording(
         raise RecordingError(f"loader {loader!r}: expected one of {', '.join(LOADERS)}")
     if not path.exists():
         raise RecordingError(f"{path}: expected a recording, found no such file or folder")
-    if not path.is_dir():
-        check_stored(path, "a recording", most=MOST_RECORDED)
     name = guess_loader(path) if loader is None else loader
     known = options_of(name)
     if bare and "bare" in known:
@@ -149,6 +147,8 @@ def guess_loader(path: Path) -> str:
     """
     from voodoo.recordings.ros_bag import find_bag, zip_members
 
+    if path.exists() and not path.is_dir():
+        check_stored(path, "a recording", most=MOST_RECORDED)
     if path.is_file():
         if path.name.endswith("_depth.mat"):
             return "utd-mhad"

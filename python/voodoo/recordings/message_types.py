@@ -41,7 +41,7 @@ class MessageTypes:
             RecordingError: a type that is not one of ROS, or another definition of it; names the source and the topic.
         """
         kind, definition = str(connection.msgtype), connection.msgdef
-        key = (kind, definition.data, connection.digest)
+        key = (kind, definition.data, str(connection.digest))
         if key in self._checked:
             return
         where = f"{source}, topic {connection.topic}"
