@@ -39,6 +39,7 @@ def write_mcap(
     definitions=None,
     indexed=True,
     repeated=1,
+    quality="",
 ):
     """Write a file.
 
@@ -51,6 +52,7 @@ def write_mcap(
         declared: a false size of the unpacked chunks.
         definitions: message type -> what the file says of it.
         indexed: write a summary.
+        quality: the quality of service of every channel, in YAML.
         repeated: how often every chunk is in the index.
 
     Returns:
@@ -97,8 +99,9 @@ def write_mcap(
         for kind, one in schemas.items():
             text = (definitions or {}).get(kind) or ROS2.generate_msgdef(kind)[0]
             out.write(_record(3, struct.pack("<H", one) + _text(kind) + _text("ros2msg") + _text(text)))
+        metadata = _text("offered_qos_profiles") + _text(quality)
         for topic, (one, schema) in channels.items():
-            out.write(_record(4, struct.pack("<HH", one, schema) + _text(topic) + _text("cdr") + _text(b"")))
+            out.write(_record(4, struct.pack("<HH", one, schema) + _text(topic) + _text("cdr") + _text(metadata)))
         for entry in index * repeated:
             out.write(_record(8, entry))
         times = [round(time * 1e9) for entries in chunks for _, time, _ in entries]

@@ -3,6 +3,7 @@
 import importlib.metadata
 import json
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -11,13 +12,13 @@ from pathlib import Path
 import grimp
 import pytest
 
+import damage
 import voodoo
 from voodoo.children import children
 from voodoo.cli import app
 from voodoo.recordings import sample_path
 from voodoo.visualization.rerun_server import Server
 
-SAMPLE = str(sample_path())
 COMMANDS = {
     "eval": ["a", "b", "--use", "depth", "--jobs", "2"],
     "track": ["a", "--use", "depth", "--out", "o.csv"],
@@ -50,8 +51,11 @@ def trapped(tmp_path, monkeypatch):
     for name in names:
         if name.isidentifier():
             (folder / f"{name}.py").write_text(f"open({str(tmp_path)!r} + '/RAN_{name}', 'w')\n")
-    for name in ("a", "b"):
-        (folder / name).symlink_to(SAMPLE)
+    (folder / "b").symlink_to(folder / "a", target_is_directory=True)
+    entries = damage.sound()
+    damage.write(folder / "a" / "bag", entries[: damage.depth_rows(entries)[8]])
+    for name in ("init.json", "truth.csv"):
+        shutil.copy(sample_path() / name, folder / "a")
     (tmp_path / "voodoo_command.py").write_text("from voodoo.cli import main\nif __name__ == '__main__':\n    main()\n")
     monkeypatch.chdir(folder)
     monkeypatch.setenv("PYTHONPATH", str(Path(voodoo.__file__).parent.parent))

@@ -43,10 +43,9 @@ def test_names_of_files_are_escaped(tmp_path):
     path = tmp_path / f"x{COMMAND}.mcap"
     path.write_bytes(b"none")
     main = "from voodoo.cli import main; main()"
-    for word in (path, path.with_name(f"{COMMAND}no")):
-        done = subprocess.run([sys.executable, "-c", main, "info", word], capture_output=True, text=True, check=False)
-        assert done.returncode == 1 and r"\x1b]0;title" in done.stderr
-        assert commands_in(done.stdout + done.stderr) == []
+    done = subprocess.run([sys.executable, "-c", main, "info", path], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and r"\x1b]0;title" in done.stderr
+    assert commands_in(done.stdout + done.stderr) == []
 
 
 def test_ordinary_letters_stay():

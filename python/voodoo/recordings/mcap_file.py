@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import heapq
+import itertools
+import re
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,8 +22,10 @@ from voodoo.unpacking import Unpacking
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
 _ATTACHMENT, _METADATA = 0x09, 0x0C
-_MOST_OF_ALL_CHANNELS = 16 * MOST_METADATA
-"""Largest size of all schemas and channels [bytes]."""
+_MOST_OF_ALL = {_SCHEMA: 16 * MOST_METADATA, _CHANNEL: MOST_METADATA}
+"""Largest size of all schemas, and of all channels [bytes]."""
+_ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
+_MOST_NESTED, _MOST_COMMAS = 50, 10_000
 _SMALLEST_MESSAGE = 31
 _MOST_LOST = 1_000_000
 """Largest number of messages that a damaged chunk is taken to have had, because the index may be damaged as well."""
@@ -153,7 +158,15 @@ class _Found:
 
     chunks: set[int] = field(default_factory=set)
     ends: set[int] = field(default_factory=lambda: {0})
-    described: int = 0
+    described: Counter[int] = field(default_factory=Counter)
+
+
+def is_plain_yaml(text: str) -> bool:
+    """Whether a parser is safe with a text: a few lines that refer to each other describe billions of entries, and it takes
+    minutes for long lists in brackets."""
+    steps = (1 if letter in "[{" else -1 for letter in re.findall(r"[\[\]{}]", text))
+    nested = max(itertools.accumulate(steps), default=0)
+    return not _ANCHOR.search(text) and nested <= _MOST_NESTED and text.count(",") <= _MOST_COMMAS
 
 
 def check_mcap(path: Path) -> frozenset[int]:
@@ -187,6 +200,9 @@ def check_mcap(path: Path) -> frozenset[int]:
             if code == _FOOTER:
                 break
             _check_record(path, code, length, position, found)
+            quality = file.read(length).partition(b"offered_qos_profiles")[2] if code == _CHANNEL else b""
+            if not is_plain_yaml(quality[4:].decode("latin-1")):
+                raise RecordingError(f"{path}: expected a channel at byte {position}, found nested metadata")
             position += 9 + length
             file.seek(position)
         footer = file.read(length)
@@ -218,10 +234,10 @@ def _check_record(path: Path, code: int, length: int, position: int, found: _Fou
     elif code == _DATA_END:
         found.ends.add(position + 9 + length)
     elif code in (_SCHEMA, _CHANNEL):
-        found.described += length
-        if found.described > _MOST_OF_ALL_CHANNELS:
+        found.described[code] += length
+        if found.described[code] > _MOST_OF_ALL[code]:
             raise RecordingError(
-                f"{path}: expected schemas and channels of {_MOST_OF_ALL_CHANNELS} bytes at most, found more"
+                f"{path}: expected {_MOST_OF_ALL[code]} bytes of schemas or channels at most, found more"
             )
 
 
