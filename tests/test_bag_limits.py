@@ -179,6 +179,10 @@ def test_rows_in_the_log_of_a_recorder_that_was_killed_are_read(tmp_path):
     info = open_recording(path, use=("depth",)).info()
     assert {sensor.messages for sensor in info.sensors if sensor.kind == "depth"} == {8}
     assert {part.name: part.read_bytes() for part in path.parent.iterdir()} == before
+    with zipfile.ZipFile(tmp_path / "b.zip", "w") as archive:
+        for part in (path, log):
+            archive.write(part, part.name)
+    assert len(open_recording(tmp_path / "b.zip", use=("depth",))) == 8
 
 
 def test_an_unfinished_transaction_is_refused_by_name(tmp_path):

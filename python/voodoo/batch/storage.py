@@ -123,6 +123,9 @@ def on_disk(source: str) -> Iterator[Path]:
         target = Path(folder) / path.rstrip("/").rsplit("/", 1)[-1]
         with reading(source, "a recording that can be fetched"):
             files.get(path.rstrip("/"), str(target), recursive=bool(files.isdir(path)))
+            for beside in ("-wal", "-journal") if path.endswith(".db3") else ():
+                if files.exists(path + beside):  # of a recorder that was killed
+                    files.get(path + beside, str(target) + beside)
         yield target
 
 

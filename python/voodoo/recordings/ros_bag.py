@@ -275,7 +275,8 @@ def find_bag(folder: Path) -> Path:
 
 
 def _is_of_bag(name: str) -> bool:
-    return name == "metadata.yaml" or name.endswith(_BAG_SUFFIXES)
+    parts = (suffix + more for suffix in _BAG_SUFFIXES for more in ("", ".zstd", "-wal", "-journal"))
+    return name == "metadata.yaml" or name.endswith(tuple(parts))
 
 
 def zip_members(path: Path) -> list[str]:
