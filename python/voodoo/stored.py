@@ -45,7 +45,7 @@ def read_stored(
     check_stored(path, expected, most=most, error=error)
     with reading(path, expected, error=error):
         # Should the name have become a FIFO since, opening it does not wait.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with open(descriptor, "rb") as file:  # noqa: PTH123 - a descriptor
             return file.read(most)
 

@@ -18,7 +18,7 @@ from voodoo.batch.storage import Store, named
 from voodoo.batch.summary import DONE, Row, read_table, write_table
 from voodoo.batch.task import Job, Settings, do, failed
 from voodoo.children import children
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reading
 
 SUMMARY, SETTINGS = "summary.csv", "settings.json"
 _EVERY_S, _FRACTION = 2.0, 0.05
@@ -161,18 +161,20 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
             scratch = stack.enter_context(
                 tempfile.TemporaryDirectory(prefix="voodoo-dask-", ignore_cleanup_errors=True)
             )
-            place: Any = stack.enter_context(
-                distributed.LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    host="127.0.0.1",
-                    dashboard_address=None,
-                    security=_own_keys(distributed),
-                    local_directory=scratch,
-                    silence_logs=logging.CRITICAL,
+            keys = _own_keys(distributed)
+            with reading("batch", f"{workers} processes that start", error=VoodooError):
+                place: Any = stack.enter_context(
+                    distributed.LocalCluster(
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        processes=True,
+                        host="127.0.0.1",
+                        dashboard_address=None,
+                        security=keys,
+                        local_directory=scratch,
+                        silence_logs=logging.CRITICAL,
+                    )
                 )
-            )
         else:
             place = scheduler
         try:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import tempfile
+import weakref
 from collections.abc import Collection, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -28,6 +30,23 @@ DAMAGED = "in a damaged part of the file"
 """Reason of messages that are left out."""
 
 
+class _Copy:
+    """A copy of a file and its log, which exists as long as this object."""
+
+    def __init__(self, path: Path, log: Path) -> None:
+        folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self.path = folder / "bag.db3"
+        shutil.copyfile(path, self.path)
+        shutil.copyfile(log, self.path.with_name("bag.db3-wal"))
+
+
+@lru_cache(maxsize=1)
+def _copied(path: Path, log: Path, _state: tuple[int, ...]) -> _Copy:
+    """The copy of files in a state; a bag is opened several times."""
+    return _Copy(path, log)
+
+
 class SqliteFile:
     """Reads a .db3, with the interface of the storages of rosbags.
 
@@ -45,7 +64,7 @@ class SqliteFile:
         self.connections: list[Connection] = []
         self.metadata = ReaderMetadata(0, 2**63 - 1, 0, 0, None, None, None, None)
         self._base: sqlite3.Connection | None = None
-        self._copy: tempfile.TemporaryDirectory[str] | None = None
+        self._copy: _Copy | None = None
 
     def open(self) -> None:
         """Check the schema, and read topics and times.
@@ -63,11 +82,9 @@ class SqliteFile:
             raise
 
     def close(self) -> None:
-        """Close the file, and delete the copy if there is one."""
+        """Close the file."""
         if self._base is not None:
             self._base.close()
-        if self._copy is not None:
-            self._copy.cleanup()
         self._base = self._copy = None
 
     def _connected(self) -> sqlite3.Connection:
@@ -86,10 +103,10 @@ class SqliteFile:
         if log.exists():
             check_stored(log, "a log of SQLite", most=MOST_RECORDED)
             if log.stat().st_size:
-                self._copy = tempfile.TemporaryDirectory(prefix="voodoo-")
-                path, options = Path(self._copy.name, "bag.db3"), "mode=rw"
-                shutil.copyfile(self.path, path)
-                shutil.copyfile(log, path.with_name("bag.db3-wal"))
+                states = [part.stat() for part in (path, log)]
+                state = tuple(number for found in states for number in (found.st_ino, found.st_size, found.st_mtime_ns))
+                self._copy = _copied(path, log, state)
+                path, options = self._copy.path, "mode=rw"
         base = sqlite3.connect(f"file:{quote(str(path.absolute()))}?{options}", uri=True, check_same_thread=False)
         base.execute("PRAGMA trusted_schema=OFF")
         base.execute("PRAGMA query_only=ON")
