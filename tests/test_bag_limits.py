@@ -372,6 +372,12 @@ def test_only_regular_files_are_read(tmp_path, make):
     (bag / "metadata.yaml").unlink()
     make(bag / "metadata.yaml")
     assert run("info", bag).exit_code == 0  # its only file is enough
+    for storage in ("mcap", "sqlite3"):
+        bag = write_bag(tmp_path / storage, entries(2), storage=storage)
+        (part,) = [part for part in bag.iterdir() if part.suffix != ".yaml"]
+        part.unlink()
+        make(part)
+        refused(run("info", bag), part.name)
 
 
 def test_metadata_has_a_greatest_size_and_no_references(tmp_path):

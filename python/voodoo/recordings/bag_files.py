@@ -57,11 +57,11 @@ def bag_file(path: Path, unpacking: Unpacking) -> Any:  # noqa: ANN401 - rosbags
     """
     if path.is_dir():
         return BagFolder(path, unpacking)
-    check_stored(path, "a complete ROS bag", most=MOST_RECORDED)
     if path.suffix == ".mcap":
         return McapFile(path, unpacking)
     if path.suffix == ".db3":
         return SqliteFile(path)
+    check_stored(path, "a complete ROS bag", most=MOST_RECORDED)
     return Ros1File(path, unpacking)
 
 

@@ -16,7 +16,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader
 
 from voodoo.errors import RecordingError, reading
-from voodoo.stored import MOST_BYTES, MOST_METADATA
+from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -52,6 +52,7 @@ class McapFile(McapReader):
 
     def open(self) -> None:
         """Check the file, and read its summary."""
+        check_stored(self._file, "a complete ROS bag", most=MOST_RECORDED)
         self._chunks = check_mcap(self._file)
         super().open()
 
