@@ -56,7 +56,7 @@ def one_thread(kind: type[T]) -> type[T]:
     for name, value in list(vars(kind).items()):
         if isinstance(value, property) and value.fget is not None:
             setattr(kind, name, property(_alone(value.fget), value.fset, value.fdel, value.__doc__))
-        elif isinstance(value, FunctionType) and not name.startswith("__"):
+        elif isinstance(value, FunctionType):
             setattr(kind, name, _alone(value))
     return kind
 

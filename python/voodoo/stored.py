@@ -9,7 +9,9 @@ from pathlib import Path
 from voodoo.errors import RecordingError, VoodooError, reading
 
 MOST_BYTES = 2**28
-"""Largest size of an image, table or list [bytes]: a quarter of a gigabyte, more than any sensor writes into one file."""
+"""Largest size of an image or a file of numbers [bytes]: a quarter of a gigabyte, more than any sensor writes into one file."""
+MOST_TEXT = 2**26
+"""Largest size of a table or list as text [bytes]: each of its characters may become an entry of eight bytes."""
 MOST_METADATA = 2**20
 """Largest size of a configuration, a calibration, a pose, or what a bag says of itself [bytes]."""
 MOST_RECORDED = 2**40
@@ -51,7 +53,7 @@ def read_stored(
 
 
 def read_stored_text(
-    path: Path, expected: str, *, most: int = MOST_BYTES, error: type[VoodooError] = RecordingError
+    path: Path, expected: str, *, most: int = MOST_TEXT, error: type[VoodooError] = RecordingError
 ) -> str:
     """The text (UTF-8) of a file, see `check_stored`."""
     content = read_stored(path, expected, most=most, error=error)

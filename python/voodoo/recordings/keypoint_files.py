@@ -13,6 +13,9 @@ from voodoo.model.joint import short
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.stored import read_stored_text
 
+_MOST = 2**24
+"""Largest size of a file [bytes]: a thousand people have a tenth of it."""
+
 
 def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
     """People in an OpenPose JSON file (one image): one (K, 3) array of (u, v, confidence) each; empty without any.
@@ -23,7 +26,7 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
     count = layout_of(layout).count
     path = Path(path)
     with reading(path, "an OpenPose JSON file"):
-        content = json.loads(read_stored_text(path, "an OpenPose JSON file"))
+        content = json.loads(read_stored_text(path, "an OpenPose JSON file", most=_MOST))
     people = content.get("people") if isinstance(content, dict) else None
     if not isinstance(people, list):
         raise RecordingError(f"{path}: expected an object with a list of people, found {short(content)}")
