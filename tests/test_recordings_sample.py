@@ -267,7 +267,7 @@ def test_a_bag_directory_without_metadata_opens_by_its_only_file(copy, untouched
         (lambda text: text.replace("1700201000.066666667", "1700201000.000000001", 1), "rising stamps"),
         (lambda text: text.splitlines()[0], "at least one row"),
         (lambda text: text.replace("1.50315", "inf", 1), "finite"),
-        (lambda text: "\x00\xff", "header"),
+        (lambda text: "\x00\xff", "columns stamp_s"),
     ],
 )
 def test_a_damaged_truth_file_is_refused(copy, damage, words):
