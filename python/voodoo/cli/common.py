@@ -6,6 +6,7 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import typer
@@ -72,6 +73,28 @@ def refuse_both(name: str, value: object, **others: object) -> None:
 def states(result: Track) -> str:
     """Number of frames per status, e.g. "88 tracking, 2 lost"."""
     return ", ".join(f"{result.status.count(word)} {word}" for word in dict.fromkeys(result.status))
+
+
+def wrote(files: Sequence[Path]) -> str:
+    """The end of a message that names the written files; empty without any."""
+    return f"; wrote {' and '.join(map(str, files))}" if files else ""
+
+
+def refuse_missing(failures: Iterable[Exception | None], done: str) -> None:
+    """Raise an error if outputs are missing, which tells what there is; None: one that is not missing.
+
+    Raises:
+        VoodooError: names what is missing and why.
+    """
+    if found := [failure for failure in failures if failure is not None]:
+        raise VoodooError(f"not written: {'; '.join(map(reason, found))}. {done}")
+
+
+def reason(error: Exception) -> str:
+    """An error as words, which name its file."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
 
 
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, states
+from voodoo.cli.common import INTERRUPTED, clear_errors, refuse_missing, states
 from voodoo.errors import VoodooError
 
 
@@ -32,10 +32,11 @@ def demo_command(
         source = opened(sample_path(), None, None)
         tracker = start_tracker(source, init=AUTO)
         out.mkdir(parents=True, exist_ok=True)
-        result, seconds, sheet, interrupted = run(source, tracker, out / "overlay.mp4", sheet=6)
+        result, seconds, sheet, interrupted, failure = run(source, tracker, out / "overlay.mp4", sheet=6)
         if interrupted:
             raise typer.Exit(INTERRUPTED)
         result.save(out / "pose.csv")
+        refuse_missing([failure], f"wrote {out / 'pose.csv'}")
         save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
         if not result.found.any():
             raise VoodooError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")

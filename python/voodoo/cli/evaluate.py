@@ -70,6 +70,7 @@ def eval_command(
     from voodoo.evaluation.report import markdown, write_reports
     from voodoo.evaluation.search import find_recordings
     from voodoo.pipeline.start import AUTO
+    from voodoo.whole import check_outputs
 
     with clear_errors():
         if init not in (None, AUTO):
@@ -77,6 +78,8 @@ def eval_command(
         automatic = None if init is None else AUTO
         config_of(config)  # an invalid file is one error here instead of one per recording
         paths = find_recordings(recordings, only=only or ())
+        if out is not None:
+            check_outputs([out], (*paths, config, result))
         if result is not None:
             show_people([judged(paths, result, loader, frame)], out)
             return

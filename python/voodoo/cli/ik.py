@@ -14,8 +14,10 @@ from voodoo.cli.common import (
     print_interrupted,
     progressing,
     refuse_both,
+    refuse_missing,
     states,
     topics_of,
+    wrote,
 )
 from voodoo.cli.options import (
     BodyOption,
@@ -86,20 +88,22 @@ def ik_command(
     import numpy as np
 
     from voodoo.cli.running import opened
-    from voodoo.export.files import check_target
+    from voodoo.export.files import check_target, written
     from voodoo.export.files import save as export
     from voodoo.export.track import Track
     from voodoo.model.body import Body
     from voodoo.pipeline.ik import Positions, follow
     from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
+    from voodoo.whole import check_outputs
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         beginning = beginning_of(init)
         source = opened(recording, loader, frame, **topics_of(topic), **numbers_of(option))
-        written = out or [Path(f"{source.name}_ik.csv")]
-        for file in written:
-            check_target(file, inputs=(recording,) if targets is None else (recording, targets))
+        files = out or [Path(f"{source.name}_ik.csv")]
+        for file in files:
+            check_target(file)
+        check_outputs(files, (recording, targets, body, Path(init) if init else None))
         positions = Positions.of(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(
             source,
@@ -116,11 +120,16 @@ def ik_command(
         how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
         how["wrap"] = partial(progressing, words=source.name, total=len(source))
         result, errors = follow(source, tracker, positions, **how)
-        for file in written:
-            export(result, file, body=tracker.body, root_frame=source.root_frame)
+
+        def write(path: Path) -> list[Path]:
+            export(result, path, body=tracker.body, root_frame=source.root_frame)
+            return [path]
+
+        done, failed = written(files, write)
         for name, values in errors.items():
             if np.isfinite(values).any():
                 typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
-        message = f"{len(result)} frames, {states(result)}; wrote {' and '.join(map(str, written))}"
+        message = f"{len(result)} frames, {states(result)}{wrote(done)}"
+        refuse_missing(failed, message)
         print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
         typer.echo(message)

@@ -64,10 +64,13 @@ def init_command(
     from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
     from voodoo.recordings.left_out import LeftOut
     from voodoo.sensors.settings import FrontEndSettings
+    from voodoo.whole import appearing_whole, check_outputs
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         kinds, boxes = kinds_of(use), boxes_of(exclude)
+        if out is not None:
+            check_outputs([out], (recording, body, config))
         left_out = LeftOut()
         options = topics_of(topic) | numbers_of(option)
         source = opened(recording, loader, frame, bare=True, left_out=left_out, **options)
@@ -96,5 +99,6 @@ def init_command(
         if out is None:
             typer.echo(text)
         else:
-            out.write_text(text + "\n", encoding="utf-8")
+            with appearing_whole(out) as place:
+                place.write_text(text + "\n", encoding="utf-8")
             typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")

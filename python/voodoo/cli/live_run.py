@@ -41,6 +41,7 @@ from voodoo.sensors.settings import Box, FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
+from voodoo.whole import appearing_whole
 
 _STANDING = {
     "l_shoulder": (2.4, 0.19, 1.42),
@@ -153,10 +154,8 @@ def _check_states(session: Session, signals: Sequence[str], duration: float | No
 
 def write_report(path: Path, session: Session) -> None:
     """Write the report as JSON, atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(json.dumps(session.report(), indent=2) + "\n", encoding="utf-8")
-    part.replace(path)
+    with appearing_whole(path) as place:
+        place.write_text(json.dumps(session.report(), indent=2) + "\n", encoding="utf-8")
 
 
 def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:

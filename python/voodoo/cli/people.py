@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import typer
 
-from voodoo.cli.common import INTERRUPTED, progressing
+from voodoo.cli.common import INTERRUPTED, progressing, refuse_missing, wrote
 from voodoo.errors import VoodooError
 
 if TYPE_CHECKING:
@@ -81,20 +81,18 @@ def follow_people(
     source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
 ) -> None:
     """Track all persons in a recording, and write the requested outputs."""
+    from voodoo.export.files import written
     from voodoo.export.people_files import save_people
 
-    result, bodies, interrupted = _run(source, people, settings, outputs, left_out)
-    written = [
-        file
-        for target in outputs.targets
-        for file in save_people(result, target, bodies=bodies, root_frame=source.root_frame)
-    ]
-    written += [path for path in (outputs.overlay, outputs.save) if path is not None]
+    result, bodies, interrupted, failure = _run(source, people, settings, outputs, left_out)
+    done, failed = written(
+        outputs.targets, lambda path: save_people(result, path, bodies=bodies, root_frame=source.root_frame)
+    )
+    done += [path for path in (None if failure else outputs.overlay, outputs.save) if path is not None]
     rows = sum(len(track) for track in result.tracks.values())
     count = len(result.tracks)
-    message = f"{len(result)} frames, {count} {'person' if count == 1 else 'persons'} in {rows} rows"
-    if written:
-        message += f"; wrote {' and '.join(str(path) for path in written)}"
+    message = f"{len(result)} frames, {count} {'person' if count == 1 else 'persons'} in {rows} rows{wrote(done)}"
+    refuse_missing([*failed, failure], message)
     if interrupted:
         typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {message}", err=True)
         raise typer.Exit(INTERRUPTED)
@@ -107,6 +105,7 @@ class _Followed(NamedTuple):
     track: PeopleTrack
     bodies: dict[int, Body]
     interrupted: bool
+    failure: VoodooError | OSError | None
 
 
 def _run(
@@ -139,7 +138,8 @@ def _run(
             if not estimates:
                 raise
             interrupted = True
-    return _Followed(PeopleTrack.of(estimates, bodies=bodies), bodies, interrupted)
+    failure = None if writer is None else writer.failure
+    return _Followed(PeopleTrack.of(estimates, bodies=bodies), bodies, interrupted, failure)
 
 
 def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:

@@ -30,13 +30,14 @@ from voodoo.visualization.rerun_viewer import Viewer
 
 
 class Run(NamedTuple):
-    """Outcome of a run over a recording: the result, the time of every frame [s], the requested images, and whether it was
-    ended by Ctrl-C."""
+    """Outcome of a run over a recording: the result, the time of every frame [s], the requested images, whether it was ended by
+    Ctrl-C, and why images of `overlay` are missing."""
 
     track: Track
     seconds: list[float]
     pictures: list[Picture]
     interrupted: bool
+    failure: VoodooError | OSError | None
 
 
 def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
@@ -158,7 +159,8 @@ def run(
             f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
         )
     left = {} if left_out is None else left_out.counts
-    return Run(Track.of(estimates, body=tracker.body, left_out=left), seconds, pictures, interrupted)
+    failure = None if writer is None else writer.failure
+    return Run(Track.of(estimates, body=tracker.body, left_out=left), seconds, pictures, interrupted, failure)
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, print_message, refuse_both, states, topics_of
+from voodoo.cli.common import (
+    INTERRUPTED,
+    clear_errors,
+    numbers_of,
+    print_message,
+    refuse_both,
+    refuse_missing,
+    states,
+    topics_of,
+    wrote,
+)
 from voodoo.cli.options import (
     BackgroundOption,
     BodyOption,
@@ -139,7 +149,7 @@ def track_command(
         run,
         viewer_of,
     )
-    from voodoo.export.files import check_target
+    from voodoo.export.files import check_target, written
     from voodoo.export.files import save as export
     from voodoo.model.body import Body
     from voodoo.people import People
@@ -148,6 +158,7 @@ def track_command(
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.sensors.settings import FrontEndSettings
+    from voodoo.whole import check_outputs
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
@@ -184,7 +195,13 @@ def track_command(
             print_message(words)
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
-            check_target(target, inputs=(recording, *(with_ or ())))
+            check_target(target)
+        folders = [Path(word.partition("=")[2]) for word in keypoints or ()]
+        read = (recording, *others, *folders, body, config, detector, marker_map, background)
+        check_outputs(
+            [path for path in (*targets, overlay, save) if path is not None],
+            [*read, Path(init) if init else None],
+        )
         if several:
             followed = body_of(body, height=height, model=model)
             everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
@@ -212,11 +229,16 @@ def track_command(
                 draw_regions=draw_regions,
             )
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
-            result, _, _, interrupted = run(source, tracker, overlay, left_out=left_out, **how)
-        for target in targets:
-            export(result, target, body=tracker.body, root_frame=source.root_frame)
-        written = [str(path) for path in (*targets, overlay, save) if path is not None]
-        message = f"{len(result)} frames, {states(result)}; wrote {' and '.join(written)}"
+            result, _, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
+
+        def write(path: Path) -> list[Path]:
+            export(result, path, body=tracker.body, root_frame=source.root_frame)
+            return [path]
+
+        done, failed = written(targets, write)
+        done += [path for path in (None if failure else overlay, save) if path is not None]
+        message = f"{len(result)} frames, {states(result)}{wrote(done)}"
+        refuse_missing([*failed, failure], message)
         if interrupted:
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)

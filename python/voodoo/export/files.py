@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from voodoo.errors import VoodooError
 from voodoo.export.bvh import write_bvh
+from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import write_bag
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
 from voodoo.model.body import Body
+from voodoo.whole import appearing_whole
 
 FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
 """Suffixes; a path without one is a ROS 2 bag folder."""
 
 
-def check_target(path: Path, *, inputs: Sequence[Path] = ()) -> None:
-    """Reject a path that cannot or must not be written to, before the work starts.
+def check_target(path: Path) -> None:
+    """Reject a path that cannot be written to, before the work starts.
 
     Args:
         path: see FORMATS.
-        inputs: files that are read and must not be overwritten; marker files and bags can be both inputs and results.
 
     Raises:
-        VoodooError: another suffix, a bag folder that exists, one of the inputs, or a place where nothing can be written.
+        VoodooError: another suffix, a bag folder that exists, or a place where nothing can be written.
     """
-    if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
-        raise VoodooError(f"{path}: expected another file than what is read, found the same")
     if path.suffix not in FORMATS and not is_folder(path):
         raise VoodooError(
             f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
@@ -57,15 +55,32 @@ def is_bag(path: Path) -> bool:
 
 
 @contextmanager
-def bag_folder(path: Path) -> Iterator[Path]:
-    """The folder to write a bag to: `path`, or for .mcap a temporary one, whose only file is moved to `path` at the end."""
-    if path.suffix != ".mcap":
-        yield path
+def bag_folder(place: Path) -> Iterator[Path]:
+    """The folder to write a bag to: `place`, or for .mcap a temporary one, whose only file is moved to `place` at the end."""
+    if place.suffix != ".mcap":
+        yield place
         return
-    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-        bag = Path(folder) / path.stem
-        yield bag
-        shutil.move(next(bag.glob("*.mcap")), path)
+    bag = place.with_suffix("")
+    yield bag
+    next(bag.glob("*.mcap")).rename(place)
+    shutil.rmtree(bag)
+
+
+def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple[list[Path], list[Exception]]:
+    """Write each of several outputs, whatever becomes of the others; returns the files, and what failed.
+
+    Args:
+        paths: of the outputs.
+        write: writes one of them and returns its files.
+    """
+    done: list[Path] = []
+    failed: list[Exception] = []
+    for path in paths:
+        try:
+            done += write(path)
+        except (VoodooError, OSError) as error:
+            failed.append(error)
+    return done, failed
 
 
 def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
@@ -82,13 +97,14 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
         OSError: the file cannot be written.
     """
     check_target(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if path.suffix == ".bvh":
-        write_bvh(path, track, body)
-    elif path.suffix == ".trc":
-        write_trc(path, track)
-    elif is_bag(path):
-        with bag_folder(path) as folder:
-            write_bag(folder, track, body, root_frame=root_frame)
-    else:
+    if path.suffix in SUFFIXES:
         track.save(path)
+        return
+    with appearing_whole(path) as place:
+        if path.suffix == ".bvh":
+            write_bvh(place, track, body)
+        elif path.suffix == ".trc":
+            write_trc(place, track)
+        else:
+            with bag_folder(place) as folder:
+                write_bag(folder, track, body, root_frame=root_frame)

@@ -12,12 +12,13 @@ import numpy.typing as npt
 
 from voodoo.errors import VoodooError
 from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
-from voodoo.export.result_file import appearing_whole, check_suffix
+from voodoo.export.result_file import check_suffix
 from voodoo.export.track import Track, arrays_of, track_of_rows, tracks_of
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
 from voodoo.unpacking import stored_arrays
+from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -124,6 +125,7 @@ class PeopleTrack:
             OSError: the file cannot be written.
         """
         path = Path(path)
+        check_suffix(path)
         with appearing_whole(path) as part:
             if path.suffix == ".csv":
                 write_rows(part, self.rows())

@@ -11,6 +11,7 @@ from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import write_people_bag
 from voodoo.export.trc import write_trc
 from voodoo.model.body import Body
+from voodoo.whole import appearing_whole
 
 
 def save_people(result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], root_frame: str) -> list[Path]:
@@ -30,21 +31,21 @@ def save_people(result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], 
         OSError: a file cannot be written.
     """
     check_target(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix in (".bvh", ".trc"):
         written = []
         for one in result.tracks:
             own = path.with_name(f"{path.stem}_{one}{path.suffix}")
             track = result.unbroken(one)
-            if path.suffix == ".bvh":
-                write_bvh(own, track, bodies[one])
-            else:
-                write_trc(own, track)
+            with appearing_whole(own) as place:
+                if path.suffix == ".bvh":
+                    write_bvh(place, track, bodies[one])
+                else:
+                    write_trc(place, track)
             written.append(own)
         return written
     if is_bag(path):
         people = {str(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
-        with bag_folder(path) as folder:
+        with appearing_whole(path) as place, bag_folder(place) as folder:
             write_people_bag(folder, people, root_frame=root_frame)
     else:
         result.save(path)

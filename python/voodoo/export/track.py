@@ -15,10 +15,11 @@ from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading
 from voodoo.export.collected import angles_of_estimates, covariances_of
 from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
-from voodoo.export.result_file import appearing_whole, check_suffix
+from voodoo.export.result_file import check_suffix
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.unpacking import stored_arrays
+from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -231,6 +232,7 @@ class Track:
             OSError: the file cannot be written.
         """
         path = Path(path)
+        check_suffix(path)
         with appearing_whole(path) as part:
             if path.suffix == ".csv":
                 self._write_csv(part)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from voodoo.errors import VoodooError
-from voodoo.export.files import check_target, save
+from voodoo.export.files import check_target, save, written
 from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
 from voodoo.export.track import Track
@@ -71,29 +71,33 @@ class Files(Output):
         self._steps.clear()
 
     def close(self) -> None:
-        """Write the files.
+        """Write the files. The temporary folder goes only when all of them are written.
 
         Raises:
-            VoodooError: there were no frames.
-            OSError: a file cannot be written.
+            VoodooError: there were no frames, or a file cannot be written; names the folder that is kept then.
         """
-        try:
-            if self._steps:
-                self._put_away()
-            parts = sorted(self._folder.glob("*.npz"))
-            if not parts:
-                raise VoodooError("expected at least one frame to write, found none")
-            if self._several:
-                everybody = _joined_people([PeopleTrack.load(part) for part in parts])
-                for path in self._paths:
-                    self.written += save_people(everybody, path, bodies=self._bodies, root_frame=self._root())
-            else:
-                track = Track.joined([Track.load(part) for part in parts])
-                for path in self._paths:
-                    save(track, path, body=self._bodies[ONE], root_frame=self._root())
-                    self.written.append(path)
-        finally:
+        if self._steps:
+            self._put_away()
+        parts = sorted(self._folder.glob("*.npz"))
+        if not parts:
             shutil.rmtree(self._folder, ignore_errors=True)
+            raise VoodooError("expected at least one frame to write, found none")
+        if self._several:
+            everybody = _joined_people([PeopleTrack.load(part) for part in parts])
+
+            def write(path: Path) -> list[Path]:
+                return save_people(everybody, path, bodies=self._bodies, root_frame=self._root())
+        else:
+            track = Track.joined([Track.load(part) for part in parts])
+
+            def write(path: Path) -> list[Path]:
+                save(track, path, body=self._bodies[ONE], root_frame=self._root())
+                return [path]
+
+        self.written, failed = written(self._paths, write)
+        if failed:
+            raise VoodooError(f"{'; '.join(map(str, failed))}; all poses are kept in {self._folder}") from failed[0]
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
 def _joined_people(parts: Sequence[PeopleTrack]) -> PeopleTrack:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
@@ -9,17 +10,24 @@ import cv2
 
 from voodoo.errors import VoodooError, utf8_name
 from voodoo.visualization.ink import Picture
+from voodoo.whole import appearing_whole
 
 
 class PictureWriter:
     """Writes images of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
 
+    What cannot be written does not end the block: `failure` holds the first error, and nothing more is written. A film appears
+    when it is complete.
+
     Args:
         path: ends in .mp4 for a video; otherwise a folder, which is created if missing.
         rate_hz: frame rate of the video.
 
+    Attributes:
+        failure: why images are missing; None if there are all.
+
     Raises:
-        VoodooError: a suffix of another video or image format, a name that is not UTF-8, or a file that cannot be written.
+        VoodooError: a suffix of another video or image format, or a name that is not UTF-8.
     """
 
     def __init__(self, path: Path, *, rate_hz: float) -> None:
@@ -32,25 +40,29 @@ class PictureWriter:
         self._is_film = path.suffix.lower() == ".mp4"
         self._film: cv2.VideoWriter | None = None
         self._count = 0
+        self._appearing = ExitStack()
+        self._place = path
+        self.failure: VoodooError | OSError | None = None
         folder = path.parent if self._is_film else path
         if folder.exists() and not folder.is_dir():
             raise VoodooError(f"{folder}: expected a folder, found a file")
         folder.mkdir(parents=True, exist_ok=True)
 
     def write(self, picture: Picture) -> None:
-        """Add an image.
-
-        Raises:
-            VoodooError: it could not be written.
-        """
-        if self._is_film:
-            if self._film is None:
-                self._film = self._open(picture)
-            self._film.write(picture)
-        else:
-            file = self._path / f"frame_{self._count:06d}.png"
-            save_picture(file, picture)
-        self._count += 1
+        """Add an image."""
+        if self.failure is not None:
+            return
+        try:
+            if self._is_film:
+                if self._film is None:
+                    self._place = self._appearing.enter_context(appearing_whole(self._path))
+                    self._film = self._open(picture)
+                self._film.write(picture)
+            else:
+                save_picture(self._path / f"frame_{self._count:06d}.png", picture)
+            self._count += 1
+        except (VoodooError, OSError) as error:
+            self.failure = error
 
     def __enter__(self) -> PictureWriter:
         """Enter the context; files are opened with the first image."""
@@ -62,18 +74,27 @@ class PictureWriter:
         """Close the video and, without an error, check that it can be read."""
         if self._film is not None:
             self._film.release()
+            if error is None and self.failure is None:
+                try:
+                    self._check()
+                except VoodooError as failure:
+                    self.failure = failure
+        problem = error or self.failure
+        try:
+            self._appearing.__exit__(None if problem is None else type(problem), problem, None)
+        except (VoodooError, OSError) as failure:
             if error is None:
-                self._check()
+                self.failure = failure  # which names the film
 
     def _open(self, picture: Picture) -> cv2.VideoWriter:
         height, width = picture.shape[:2]
-        film = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*"mp4v"), self._rate_hz, (width, height))
+        film = cv2.VideoWriter(str(self._place), cv2.VideoWriter.fourcc(*"mp4v"), self._rate_hz, (width, height))
         if not film.isOpened():
             raise VoodooError(f"{self._path}: expected a file that can be written as MPEG-4, found that OpenCV cannot")
         return film
 
     def _check(self) -> None:
-        film = cv2.VideoCapture(str(self._path))
+        film = cv2.VideoCapture(str(self._place))
         try:
             count = int(film.get(cv2.CAP_PROP_FRAME_COUNT)) if film.isOpened() else 0
             readable, _ = film.read()

@@ -1,0 +1,153 @@
+"""Outputs appear when they are complete, never in the place of what is read, and independently of each other."""
+
+import errno
+import os
+import shutil
+from itertools import product
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import voodoo
+from voodoo.cli import app
+from voodoo.export.track import Track
+from voodoo.recordings import sample_path
+from voodoo.whole import appearing_whole, check_outputs
+
+OUTPUTS = {"--out", "--overlay", "--save", "--report", "--record"}
+"""Options of commands that name what is written."""
+COMMANDS = ("track", "live", "ik", "init", "eval")
+run = CliRunner().invoke
+
+
+def test_the_old_file_stays_until_the_new_one_is_complete_and_no_link_is_followed(tmp_path):
+    path, victim = tmp_path / "pose.csv", tmp_path / "victim"
+    path.write_text("old")
+    victim.write_text("victim")
+    (tmp_path / ".pose.csv.part").symlink_to(victim)
+    with pytest.raises(OSError, match=r"pose\.csv"), appearing_whole(path) as place:
+        place.write_text("half")
+        assert path.read_text() == "old"
+        raise OSError(errno.ENOSPC, "full")
+    assert path.read_text() == "old"
+    with appearing_whole(path) as place:
+        place.write_text("new")
+    assert path.read_text() == "new" and victim.read_text() == "victim"
+    assert {file.name for file in tmp_path.iterdir()} == {"pose.csv", "victim", ".pose.csv.part"}
+
+
+def test_a_folder_appears_whole_too(tmp_path):
+    with appearing_whole(tmp_path / "bag") as place:
+        place.mkdir()
+        (place / "a").write_text("a")
+        assert not (tmp_path / "bag").exists()
+    assert [file.name for file in (tmp_path / "bag").iterdir()] == ["a"]
+
+
+def test_two_processes_that_write_one_name_leave_one_whole_result(tmp_path):
+    path, texts = tmp_path / "pose.csv", ("a" * 100_000, "b" * 100_000)
+    child = os.fork()
+    for _ in range(30):
+        with appearing_whole(path) as place:
+            place.write_text(texts[0 if child else 1])
+        if child:
+            assert path.read_text() in texts
+    if not child:
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["pose.csv"]
+
+
+def test_outputs_are_apart_from_inputs_and_from_each_other(tmp_path):
+    recording, other = tmp_path / "walk", tmp_path / "other"
+    recording.mkdir()
+    (recording / "truth.csv").write_text("truth")
+    (tmp_path / "link").symlink_to(recording)
+    check_outputs([tmp_path / "pose.csv", tmp_path / "look.mp4", other], [recording, None, tmp_path / "realsense"])
+    for outputs, words in (
+        ([recording], "found the same"),
+        ([recording / "truth.csv"], "inside"),
+        ([tmp_path / "link" / "new.csv"], "inside"),
+        ([tmp_path], "found a folder with"),
+        ([other, tmp_path / "b" / ".." / "other"], "apart"),
+        ([other, other / "in.csv"], "apart"),
+    ):
+        with pytest.raises(voodoo.VoodooError, match=words):
+            check_outputs(outputs, [recording])
+
+
+def path_options(command: str) -> dict[str, bool]:
+    """The options of a command that name files, and whether they are written."""
+    commands = typer.main.get_command(app).commands
+    options = {}
+    for option in commands[command].params:
+        name = option.opts[0]
+        if name in OUTPUTS or (
+            name.startswith("--") and ("FILE" in (option.metavar or "") or "PATH" in (option.metavar or ""))
+        ):
+            options[name] = name in OUTPUTS
+    return options
+
+
+PAIRS = [
+    (command, one, other)
+    for command in COMMANDS
+    for one, other in product(path_options(command), repeat=2)
+    if path_options(command)[one] and one != other
+]
+
+
+def test_there_are_pairs_of_all_commands():
+    assert {command for command, *_ in PAIRS} == set(COMMANDS) and len(PAIRS) > 40
+
+
+@pytest.mark.parametrize(("command", "one", "other"), PAIRS)
+def test_no_option_replaces_what_another_one_reads_or_writes(command, one, other, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / ("mine.mp4" if "--overlay" in (one, other) else "mine.csv")
+    file.write_text("precious")
+    done = run(app, [command, str(sample_path()), one, str(file), other, str(file)])
+    assert done.exit_code != 0
+    assert file.read_text() == "precious"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_output_is_written_into_the_recording(command, tmp_path):
+    recording = tmp_path / "rec"
+    shutil.copytree(sample_path(), recording)
+    before = {file: file.read_bytes() for file in recording.rglob("*") if file.is_file()}
+    for option in (option for option, output in path_options(command).items() if output):
+        for target in ("truth.csv", "bag/bag.mcap", "new.csv"):
+            done = run(app, [command, str(recording), option, str(recording / target)])
+            assert done.exit_code != 0, (option, target)
+    assert {file: file.read_bytes() for file in recording.rglob("*") if file.is_file()} == before
+
+
+def full(*_, **__):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_film_or_format_that_fails_costs_no_other_output(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("voodoo.visualization.image_writer.PictureWriter._open", full)
+    monkeypatch.setattr("voodoo.export.files.write_bvh", full)
+    Path("old.bvh").write_text("old")
+    command = ["track", str(sample_path()), "--use", "depth"]
+    done = run(app, [*command, "--out", "old.bvh", "--out", "pose.csv", "--overlay", "look.mp4"])
+    assert done.exit_code == 1
+    assert "old.bvh" in done.stderr and "look.mp4" in done.stderr and "wrote pose.csv" in done.stderr
+    assert Path("old.bvh").read_text() == "old" and len(Path("pose.csv").read_text().splitlines()) == 91
+    assert {file.name for file in tmp_path.iterdir()} == {"old.bvh", "pose.csv"}
+
+
+def test_the_poses_of_a_session_are_kept_where_its_files_cannot_be_written(tmp_path, monkeypatch):
+    command = ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--out", str(tmp_path / "pose.csv")]
+    with monkeypatch.context() as patch:
+        patch.setattr("voodoo.live.spool.save", full)
+        done = run(app, command)
+    (folder,) = tmp_path.iterdir()
+    assert done.exit_code != 0 and str(folder) in done.stderr
+    parts = [Track.load(part) for part in sorted(folder.glob("*.npz"))]
+    assert sum(len(part) for part in parts) > 0
