@@ -382,7 +382,7 @@ def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path
     words = ("--with", "people", "--option", "rate=30", "--option", "tf_max_age=2")
     assert run("track", "bag", "--loader", "ros2", *words).exit_code == 0
     assert run.options == {"tf_max_age": 2.0}
-    assert opened == [("people", {"layout": "body25b", "rate": 30.0})]
+    assert opened == [("people", {"layout": None, "rate": 30.0})]
     assert run("track", "bag", "--loader", "ros2", *words[2:]).exit_code == 0
     assert run.options == {"tf_max_age": 2.0, "rate": 30.0}
 

@@ -18,6 +18,7 @@ from voodoo.export.joint_angles import joint_angles
 from voodoo.export.ros2 import frame_poses
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
+from voodoo.export.upright import lying_words
 from voodoo.pipeline.run import start_tracker
 from voodoo.pipeline.run import track as run_track
 from voodoo.recordings import sample_path
@@ -196,6 +197,76 @@ def test_bag_read_by_rosbags(tmp_path, tracked):
     assert {marker.type for marker in shapes[0][1].markers if marker.ns == "limbs"} == {3}  # cylinders
     with pytest.raises(VoodooError, match="does not exist"):
         write_bag(tmp_path / "bag", track, body, root_frame="odom")
+
+
+def seen_by_a_camera(track):
+    """The track in the optical frame of a level camera at the origin that looks along x."""
+    turn = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    limbs, both = track.world_from_limb.copy(), np.kron(np.eye(2), turn)
+    limbs[..., :3, :] = turn @ limbs[..., :3, :]
+    return replace(
+        track,
+        joints=track.joints @ turn.T,
+        world_from_limb=limbs,
+        covariance=turn @ track.covariance @ turn.T,
+        root_covariance=both @ track.root_covariance @ both.T,
+    )
+
+
+def messages_of(folder):
+    with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        return [(one.topic, reader.deserialize(raw, one.msgtype)) for one, _, raw in reader.messages()]
+
+
+@pytest.mark.parametrize(("frame", "optical"), [("camera_depth_optical_frame", None), ("oak", True)])
+def test_what_a_camera_sees_stands_in_every_format(tmp_path, tracked, frame, optical):
+    """Files of a track in an optical frame are those of the same track in a level frame."""
+    track, body = tracked
+    for place, one, root, how in (
+        (tmp_path / "level", track, "odom", None),
+        (tmp_path / "camera", seen_by_a_camera(track), frame, optical),
+    ):
+        for name in ("x.bvh", "x.trc", "bag"):
+            save(one, place / name, body=body, root_frame=root, optical=how)
+    for name in ("x.bvh", "x.trc"):
+        level, camera = (
+            [float(word) for line in (tmp_path / room / name).read_text().splitlines()[-2:] for word in line.split()]
+            for room in ("level", "camera")
+        )
+        np.testing.assert_allclose(camera, level, atol=2e-4)
+    level, camera = (messages_of(tmp_path / room / "bag") for room in ("level", "camera"))
+    assert [topic for topic, _ in camera] == [topic for topic, _ in level]
+    for (topic, there), (_, here) in zip(level, camera, strict=True):
+        if topic == "/tf":
+            link, *transforms = here.transforms
+            assert (link.header.frame_id, link.child_frame_id) == (frame, f"{frame}_upright")
+            q = link.transform.rotation
+            turn = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+            np.testing.assert_allclose(turn, [[0, -1, 0], [0, 0, -1], [1, 0, 0]], atol=1e-9)
+            for one, other in zip(transforms, there.transforms, strict=True):
+                assert one.header.frame_id == other.header.frame_id.replace("odom", f"{frame}_upright")
+                places = [(each.transform.translation, each.transform.rotation) for each in (one, other)]
+                a, b = ([t.x, t.y, t.z, q.x, q.y, q.z, q.w] for t, q in places)
+                np.testing.assert_allclose(np.abs(a), np.abs(b), atol=1e-6)  # q is -q
+        elif topic.endswith("/pose"):
+            assert here.header.frame_id == f"{frame}_upright"
+            np.testing.assert_allclose(here.pose.covariance, there.pose.covariance, atol=1e-9)
+        elif topic.endswith("/markers"):
+            assert {marker.header.frame_id for marker in here.markers} == {f"{frame}_upright"}
+            for one, other in zip(here.markers, there.markers, strict=True):
+                at = [(each.pose.position.x, each.pose.position.y, each.pose.position.z) for each in (one, other)]
+                np.testing.assert_allclose(*at, atol=1e-6)
+
+
+def test_a_body_that_lies_or_floats_is_doubted(tracked):
+    track, _ = tracked
+    assert lying_words(track, "odom") == ""
+    camera = seen_by_a_camera(track)
+    assert lying_words(camera, "oak_optical_frame") == ""
+    assert "stands along -Y of base_link" in lying_words(camera, "base_link")
+    high = replace(track, joints=track.joints + (0.0, 0.0, 4.0))
+    assert "above the floor, z = 0 of odom" in lying_words(high, "odom")
+    assert lying_words(high, "world") == ""  # nobody says that its z = 0 is the floor
 
 
 BY_FRAME = ("residual", "joints", "world_from_limb", "angles", "covariance", "root_covariance")

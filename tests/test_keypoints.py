@@ -167,6 +167,12 @@ def test_openpose_json(tmp_path):
     np.testing.assert_array_equal(person[1], [3, 4, 5])
     with pytest.raises(RecordingError, match="17 keypoints for coco17, found 25"):
         read_openpose_json(path, layout="coco17")
+    path.write_text(json.dumps({"people": [{"pose_keypoints_2d": [float("nan")] * 3 + flat[3:]}]}))
+    (person,) = read_openpose_json(path, layout=None)
+    np.testing.assert_array_equal(person[:2], [[0, 0, 0], [3, 4, 5]])  # what is not a number was not seen
+    path.write_text(json.dumps({"people": [{"pose_keypoints_2d": [0.0, 0.0, 0.9, *flat[3:]]}]}))
+    (person,) = read_openpose_json(path, layout=None)
+    np.testing.assert_array_equal(person[:2], [[0, 0, 0], [3, 4, 5]])  # nor what is at exact zeros
     path.write_text('{"people": [')
     with pytest.raises(RecordingError, match="OpenPose JSON"):
         read_openpose_json(path, layout="body25")

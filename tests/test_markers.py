@@ -3,13 +3,16 @@
 import re
 from pathlib import Path
 
+import c3d
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import voodoo
+from scene import standing_joints
 from voodoo.cli import app
 from voodoo.errors import BodyError, MeasurementError, RecordingError
+from voodoo.recordings import open_recording
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_markers, read_trc
 from voodoo.sensors.markers import add_markers, body_with_markers, marker_offset
@@ -51,6 +54,75 @@ def test_damaged_trc_is_refused(tmp_path, change, message):
     path.write_text(TRC.replace(*change))
     with pytest.raises(RecordingError, match=message):
         read_markers(path)
+
+
+def walking(axes, zeros=()):
+    """Rows (3, 12, 3) of a person's joints in a file whose axis `axes` [2] is up, 1 m from the origin; some are zeros."""
+    joints = standing_joints(voodoo.Body.human())
+    names = [f"{side}_{name}" for side in "lr" for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
+    places = np.array([joints[name] for name in names]) + (1.0, 0.5, 0.9)
+    rows = np.array([places + (0.02 * index, 0.0, 0.0) for index in range(3)])
+    for name in zeros:
+        rows[1:, names.index(name)] = 0.0
+    return names, rows[:, :, axes]
+
+
+def write_rows(path, names, rows):
+    markers = [("", "", *(f"X{i}\tY{i}\tZ{i}" for i in range(len(names))))]
+    lines = TRC.splitlines()[:2] + [f"50\t50\t{len(rows)}\t{len(names)}\tm\t50\t1\t{len(rows)}"]
+    lines += ["Frame#\tTime\t" + "\t\t\t".join(names), "\t".join(markers[0])]
+    lines += ["\t".join(map(str, (i, i / 50.0, *row.ravel()))) for i, row in enumerate(rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_zeros_were_not_seen(tmp_path):
+    path = write_rows(tmp_path / "x.trc", *walking([1, 2, 0], zeros=["l_knee", "r_wrist"]))
+    first, *others = (frame.measurements[0].positions for frame in open_recording(path))
+    assert len(first) == 12
+    assert all(first.keys() - other.keys() == {"l_knee", "r_wrist"} for other in others)
+
+
+def test_a_trc_whose_body_lies_is_doubted(tmp_path):
+    assert open_recording(write_rows(tmp_path / "up.trc", *walking([1, 2, 0]))).assumed == ()
+    (said,) = open_recording(write_rows(tmp_path / "lies.trc", *walking([0, 1, 2]))).assumed
+    assert "the body stands along its +Z" in said and "y_up = false" in said
+    told = open_recording(tmp_path / "lies.trc", markers=MarkerMap(y_up=False))
+    assert told.assumed == ()
+    assert upright(told) > 0.4
+
+
+def upright(recording):
+    """Height of the shoulders above the hips [m]."""
+    positions = next(iter(recording)).measurements[0].positions
+    return positions["l_shoulder"][2] - positions["l_hip"][2]
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+@pytest.mark.parametrize(
+    ("screen", "axes", "signs"),
+    [
+        ("+Z", [0, 1, 2], (1, 1, 1)),
+        ("+Y", [1, 2, 0], (1, 1, 1)),
+        ("+X", [2, 0, 1], (1, 1, 1)),
+        ("-Z", [0, 1, 2], (1, -1, -1)),
+        ("-Y", [1, 2, 0], (1, -1, -1)),
+        ("-X", [2, 0, 1], (-1, 1, -1)),
+    ],
+)
+def test_a_c3d_says_which_axis_is_up(tmp_path, screen, axes, signs):
+    names, rows = walking(axes)
+    writer = c3d.Writer(point_rate=50.0, point_units="m  ", gen_scale=-1.0)
+    writer.set_point_labels(names)
+    writer.set_screen_axis("+X" if screen[1] != "X" else "+Y", screen)
+    for row in rows * signs:
+        writer.add_frames([(np.column_stack([row, np.zeros((len(row), 2))]), np.zeros((0, 1)))])
+    with (tmp_path / "x.c3d").open("wb") as file:
+        writer.write(file)
+    recording = open_recording(tmp_path / "x.c3d")
+    assert f"up is {screen} of the file" in str(recording.info())
+    assert upright(recording) > 0.4
+    assert recording.start["joints"]["l_shoulder"][2] > 1.2
 
 
 def test_c3d_round_trip_with_the_library_that_defines_it(tmp_path):

@@ -55,6 +55,15 @@ def test_depth_images_in_the_order_of_their_names(folder):
     assert (info.loader, info.frames) == ("folder", 3) and info.duration == pytest.approx(1.339593)
 
 
+def test_a_root_frame_that_is_a_camera_is_said(folder):
+    assert open_recording(folder).info().camera_root
+    assert "(a camera, not level: y down, z forward)" in str(open_recording(folder).info())
+    pose = "[[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]]"
+    for root in ("", 'root_frame = "base_link"\n'):
+        (folder / "calibration.toml").write_text(f"{root}root_from_sensor = {pose}\n{CALIBRATION}")
+        assert not open_recording(folder).info().camera_root
+
+
 def test_the_list_file_counts_before_the_names(folder):
     (folder / "depth.txt").write_text(f"# timestamp filename\n1.0 depth/{STAMPS[2]}.png\n\n2.0 depth/{STAMPS[0]}.png\n")
     frames = list(open_recording(folder))

@@ -180,14 +180,28 @@ def test_keypoints_of_the_recordings_own_camera(run, tmp_path):
     with pytest.raises(RecordingError, match="'/rear'"):
         join(recording, keypoints={"/rear": tmp_path / "few"})
     keypoint_files(tmp_path / "all", recording)
+    (tmp_path / "all" / "0002.json").unlink()  # the others keep their images
     joined = join(recording, keypoints={COLOR: tmp_path / "all"})
     observed = [item for frame in Short(joined) for item in frame.measurements if isinstance(item, KeypointImage)]
-    assert observed and all(len(item.people) == 1 for item in observed)
+    assert observed and [len(item.people) for item in observed] == [index != 2 for index in range(len(observed))]
     assert f"{COLOR}/keypoints" in str(joined.info())
     tracker = start_tracker(joined)
     steps = list(track(Short(joined), tracker, settings=FrontEndSettings.of(joined, use=("depth", "keypoints"))))
     given, matched, residual = steps[-2].estimate.sources[f"{COLOR}/keypoints"]
     assert given >= 8 and matched >= 0.8 * given and residual < 0.05
+
+
+def test_keypoints_beside_the_person_in_depth_are_refused(tmp_path):
+    recording = open_recording(sample_path())
+    keypoint_files(tmp_path / "half", recording)
+    for file in (tmp_path / "half").iterdir():
+        content = json.loads(file.read_text())
+        rows = np.array(content["people"][0]["pose_keypoints_2d"]).reshape(-1, 3)
+        rows[:, :2] /= 2.0
+        content["people"][0]["pose_keypoints_2d"] = rows.ravel().tolist()
+        file.write_text(json.dumps(content))
+    with pytest.raises(RecordingError, match=r"on a person.*160x120 pixels \(0\.5 times"):
+        join(recording, keypoints={COLOR: tmp_path / "half"})
 
 
 def test_several_depth_cameras_count_by_their_names():

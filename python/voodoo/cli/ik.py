@@ -122,7 +122,8 @@ def ik_command(
         result, errors = follow(source, tracker, positions, **how)
 
         def write(path: Path) -> list[Path]:
-            export(result, path, body=tracker.body, root_frame=source.root_frame)
+            how: Any = {"root_frame": source.root_frame, "optical": source.info().camera_root}
+            export(result, path, body=tracker.body, **how)
             return [path]
 
         done, failed = written(files, write)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from voodoo.names import INPUTS, TOPIC_KINDS, HumanModel
+from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.recordings.loaders import LOADERS
 
 TOPICS = (*TOPIC_KINDS, "camera_info")
@@ -109,6 +110,14 @@ LoaderNumberOption = Annotated[
         metavar="NAME=NUMBER",
         help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit (16-bit depth of bags, 0.001), "
         "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
+    ),
+]
+LayoutOption = Annotated[
+    str | None,
+    typer.Option(
+        "--layout",
+        metavar="NAME",
+        help=f"Layout of all keypoints: {', '.join(LAYOUTS)}; by default told by their number and the shape of the persons.",
     ),
 ]
 UseOption = Annotated[

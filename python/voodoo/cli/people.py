@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import typer
 
-from voodoo.cli.common import INTERRUPTED, progressing, refuse_missing, wrote
+from voodoo.cli.common import INTERRUPTED, print_message, progressing, refuse_missing, wrote
 from voodoo.errors import VoodooError
 
 if TYPE_CHECKING:
@@ -81,13 +81,14 @@ def follow_people(
     source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
 ) -> None:
     """Track all persons in a recording, and write the requested outputs."""
-    from voodoo.export.files import written
+    from voodoo.export.files import upright_words, written
     from voodoo.export.people_files import save_people
 
     result, bodies, interrupted, failure = _run(source, people, settings, outputs, left_out)
-    done, failed = written(
-        outputs.targets, lambda path: save_people(result, path, bodies=bodies, root_frame=source.root_frame)
-    )
+    how: Any = {"root_frame": source.root_frame, "optical": source.info().camera_root}
+    done, failed = written(outputs.targets, lambda path: save_people(result, path, bodies=bodies, **how))
+    if turned := upright_words(done, **how):
+        print_message(turned)
     done += [path for path in (None if failure else outputs.overlay, outputs.save) if path is not None]
     rows = sum(len(track) for track in result.tracks.values())
     count = len(result.tracks)

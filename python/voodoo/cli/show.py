@@ -11,6 +11,7 @@ from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
 from voodoo.cli.options import (
     FrameOption,
     HeightOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -25,14 +26,16 @@ def info_command(
     frame: FrameOption = None,
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Print the contents of a recording: sensors, topics, frames, rates, root frame, reference and range of depths."""
     from voodoo.cli.running import opened
+    from voodoo.pipeline.inputs import loader_options
     from voodoo.recordings.depth_range import depth_range
     from voodoo.recordings.left_out import LeftOut
 
     with clear_errors():
-        options = topics_of(topic) | numbers_of(option)
+        options = topics_of(topic) | numbers_of(option) | loader_options(recording, loader, markers=None, layout=layout)
         source = opened(recording, loader, frame, left_out=LeftOut(), **options)
         typer.echo(str(source.info()))
         depth = depth_range(source)

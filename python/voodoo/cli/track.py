@@ -28,6 +28,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -39,7 +40,6 @@ from voodoo.cli.options import (
     UseOption,
     ViewOption,
 )
-from voodoo.recordings.keypoint_layouts import LAYOUTS
 
 if TYPE_CHECKING:
     from voodoo.export.track import Track
@@ -79,9 +79,7 @@ def track_command(
         list[str] | None,
         typer.Option(metavar="SENSOR=DIR", help="OpenPose JSON files, one for each image of SENSOR; repeatable."),
     ] = None,
-    layout: Annotated[
-        str, typer.Option(metavar="NAME", help=f"Layout of all keypoints: {', '.join(LAYOUTS)}.")
-    ] = "body25b",
+    layout: LayoutOption = None,
     marker_map: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="TOML that assigns the markers of .trc and .c3d files to sites."),
@@ -149,8 +147,9 @@ def track_command(
         run,
         viewer_of,
     )
-    from voodoo.export.files import check_target, written
+    from voodoo.export.files import check_target, upright_words, written
     from voodoo.export.files import save as export
+    from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
     from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
@@ -230,12 +229,14 @@ def track_command(
             )
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
             result, _, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
+        optical = source.info().camera_root
 
         def write(path: Path) -> list[Path]:
-            export(result, path, body=tracker.body, root_frame=source.root_frame)
+            export(result, path, body=tracker.body, root_frame=source.root_frame, optical=optical)
             return [path]
 
         done, failed = written(targets, write)
+        turned = upright_words(done, source.root_frame, optical=optical)
         done += [path for path in (None if failure else overlay, save) if path is not None]
         message = f"{len(result)} frames, {states(result)}{wrote(done)}"
         refuse_missing([*failed, failure], message)
@@ -243,6 +244,10 @@ def track_command(
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
         typer.echo(message)
+        if turned:
+            print_message(turned)
+        if doubt := lying_words(result, source.root_frame, optical=optical):
+            print_message(f"{source.name}: {doubt}")
         _print_warnings(source, result, left_out)
 
 

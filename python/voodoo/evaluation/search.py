@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import fnmatch
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.recordings.loaders import guess_loader
+from voodoo.recordings.order import natural
 
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3", ".zip")
 
@@ -39,7 +39,7 @@ def find_recordings(paths: Sequence[Path], *, only: Sequence[str] = ()) -> list[
 
 def _search(folder: Path) -> Iterator[Path]:
     if folder.is_dir():
-        for path in sorted(folder.iterdir(), key=lambda path: _natural(path.name)):
+        for path in sorted(folder.iterdir(), key=lambda path: natural(path.name)):
             if path.is_dir() or path.name.endswith("_depth.mat") or path.suffix in _RECORDING_SUFFIXES:
                 yield from [path] if _is_recording(path) else _search(path)
 
@@ -50,7 +50,3 @@ def _is_recording(path: Path) -> bool:
     except VoodooError:
         return False
     return True
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

@@ -14,7 +14,9 @@ from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import write_bag
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
+from voodoo.export.upright import upright
 from voodoo.model.body import Body
+from voodoo.model.standing import is_optical
 from voodoo.whole import appearing_whole
 
 FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
@@ -54,6 +56,14 @@ def is_bag(path: Path) -> bool:
     return path.suffix == ".mcap" or is_folder(path)
 
 
+def upright_words(paths: Sequence[Path], root_frame: str, *, optical: bool | None = None) -> str:
+    """Which of the files `save` turns upright, in one line; "" if none."""
+    turned = [str(path) for path in paths if path.suffix in (".bvh", ".trc") or is_bag(path)]
+    if not turned or not (is_optical(root_frame) if optical is None else optical):
+        return ""
+    return f"{', '.join(turned)}: turned upright, since the root frame {root_frame} is a camera's (y down, not level)"
+
+
 @contextmanager
 def bag_folder(place: Path) -> Iterator[Path]:
     """The folder to write a bag to: `place`, or for .mcap a temporary one, whose only file is moved to `place` at the end."""
@@ -83,14 +93,15 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
     return done, failed
 
 
-def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
+def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool | None = None) -> None:
     """Write a track: .csv, .npz, .bvh, .trc, .mcap, or a ROS 2 bag folder.
 
     Args:
         track: with limb poses.
         path: see FORMATS.
         body: in the sizes it was tracked with.
-        root_frame: frame of the track, for bags.
+        root_frame: frame of the track.
+        optical: whether that is a camera's optical frame; then .bvh, .trc and bags are turned upright. None: by its name.
 
     Raises:
         VoodooError: another suffix, or data that the format requires are missing.
@@ -102,9 +113,9 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str) -> None:
         return
     with appearing_whole(path) as place:
         if path.suffix == ".bvh":
-            write_bvh(place, track, body)
+            write_bvh(place, upright(track, root_frame, optical=optical)[0], body)
         elif path.suffix == ".trc":
-            write_trc(place, track)
+            write_trc(place, upright(track, root_frame, optical=optical)[0])
         else:
             with bag_folder(place) as folder:
-                write_bag(folder, track, body, root_frame=root_frame)
+                write_bag(folder, track, body, root_frame=root_frame, optical=optical)

@@ -21,6 +21,7 @@ from voodoo.errors import VoodooError
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
+from voodoo.export.upright import UPRIGHT_FROM_OPTICAL, upright
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
@@ -39,7 +40,14 @@ _SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
 
 
 def write_bag(
-    path: str | Path, track: Track, body: Body, *, root_frame: str, person: str = "voodoo", markers: bool = True
+    path: str | Path,
+    track: Track,
+    body: Body,
+    *,
+    root_frame: str,
+    person: str = "voodoo",
+    markers: bool = True,
+    optical: bool | None = None,
 ) -> None:
     """Write a new bag folder.
 
@@ -48,6 +56,8 @@ def write_bag(
     where these are known ellipsoids of one standard deviation about them). If the covariance is known,
     `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
     Searching frames have no transforms, no joint states and no pose; their markers delete those of the frame before.
+    If the root is a camera's optical frame, all of it is in the frame `<root_frame>_upright` with x forward and z up, which /tf
+    has as a child of the root frame.
 
     Args:
         path: the folder, which must not exist.
@@ -56,6 +66,7 @@ def write_bag(
         root_frame: frame of the track, e.g. "base_link".
         person: REP-155 id.
         markers: also write the markers.
+        optical: whether the root frame is a camera's optical frame; None: by its name.
 
     Raises:
         VoodooError: the folder exists, an empty name, stamps before zero (a bag has none), or a track without limb poses or
@@ -64,11 +75,17 @@ def write_bag(
     """
     if not person.isidentifier():
         raise VoodooError(f"person: expected a name, found {person!r}")
-    _write(path, [_Human(track, body, person, f"/humans/bodies/{person}")], root_frame, markers=markers)
+    human = _Human(track, body, person, f"/humans/bodies/{person}", root_frame, optical=optical)
+    _write(path, [human], markers=markers)
 
 
 def write_people_bag(
-    path: str | Path, people: Mapping[str, tuple[Track, Body]], *, root_frame: str, markers: bool = True
+    path: str | Path,
+    people: Mapping[str, tuple[Track, Body]],
+    *,
+    root_frame: str,
+    markers: bool = True,
+    optical: bool | None = None,
 ) -> None:
     """Write a new bag folder of several people.
 
@@ -80,19 +97,29 @@ def write_people_bag(
         people: REP-155 id -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
         markers: also write the markers.
+        optical: see `write_bag`.
 
     Raises:
         VoodooError: as `write_bag`.
         OSError: the bag cannot be written.
     """
-    humans = [_Human(track, body, name, f"/humans/bodies/body_{name}") for name, (track, body) in people.items()]
-    _write(path, humans, root_frame, markers=markers)
+    humans = [
+        _Human(track, body, name, f"/humans/bodies/body_{name}", root_frame, optical=optical)
+        for name, (track, body) in people.items()
+    ]
+    _write(path, humans, markers=markers)
 
 
 class _Human:
     """The messages of one person."""
 
-    def __init__(self, track: Track, body: Body, person: str, topic: str) -> None:
+    def __init__(
+        self, track: Track, body: Body, person: str, topic: str, root_frame: str, *, optical: bool | None = None
+    ) -> None:
+        if not root_frame:
+            raise VoodooError("root_frame: expected a name, found none")
+        self._given_root = root_frame
+        track, self.root = upright(track, root_frame, optical=optical)
         self.track, self.body, self.person, self.topic = track, body, person, topic
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
@@ -109,15 +136,19 @@ class _Human:
         kinds |= {f"{self.topic}/pose": _POSE} if np.isfinite(self.track.root_covariance).any() else {}
         return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
 
-    def messages(self, index: int, root_frame: str, *, markers: bool) -> dict[str, Any]:
+    def messages(self, index: int, *, markers: bool) -> dict[str, Any]:
         """Topic -> message of a frame; frames are asked for in order."""
         nanoseconds = round(float(self.track.stamps[index]) * 1e9)
-        header = _header(nanoseconds, root_frame)
+        header = _header(nanoseconds, self.root)
         messages: dict[str, Any] = {}
         if self._displayed[index]:
-            messages["/tf"] = _new(
-                _TF, transforms=_transforms(self.track, self._posed, index, root_frame, self.person, nanoseconds)
-            )
+            transforms = _transforms(self.track, self._posed, index, self.root, self.person, nanoseconds)
+            if self.root != self._given_root:
+                above = _header(nanoseconds, self._given_root)
+                transforms.insert(
+                    0, _transform(above, self.root, quaternions(UPRIGHT_FROM_OPTICAL.T).tolist(), (0.0, 0.0, 0.0))
+                )
+            messages["/tf"] = _new(_TF, transforms=transforms)
             messages[f"{self.topic}/joint_states"] = _new(
                 "sensor_msgs/msg/JointState",
                 header=_header(nanoseconds, f"body_{self.person}"),
@@ -135,12 +166,10 @@ class _Human:
         return messages
 
 
-def _write(path: str | Path, humans: Sequence[_Human], root_frame: str, *, markers: bool) -> None:
+def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None:
     path = Path(path)
     if path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    if not root_frame:
-        raise VoodooError("root_frame: expected a name, found none")
     kinds = {"/tf": _TF}
     for human in humans:
         kinds |= human.kinds(markers)
@@ -152,7 +181,7 @@ def _write(path: str | Path, humans: Sequence[_Human], root_frame: str, *, marke
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connect = {name: writer.add_connection(name, kind, typestore=_STORE) for name, kind in kinds.items()}
         for stamp, number, index in frames:
-            for name, message in humans[number].messages(index, root_frame, markers=markers).items():
+            for name, message in humans[number].messages(index, markers=markers).items():
                 writer.write(connect[name], round(stamp * 1e9), _STORE.serialize_cdr(message, message.__msgtype__))
 
 
@@ -193,20 +222,23 @@ def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, pers
     turns = quaternions(relative[:, :3, :3]).tolist()
     places = relative[:, :3, 3].tolist()
     result = []
-    for (name, (parent, _)), (x, y, z), (qx, qy, qz, qw) in zip(frames.items(), places, turns, strict=True):
-        result.append(
-            _new(
-                "geometry_msgs/msg/TransformStamped",
-                header=_header(nanoseconds, parent or root_frame),
-                child_frame_id=name,
-                transform=_new(
-                    "geometry_msgs/msg/Transform",
-                    translation=_new("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
-                    rotation=_new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-                ),
-            )
-        )
+    for (name, (parent, _)), place, turn in zip(frames.items(), places, turns, strict=True):
+        result.append(_transform(_header(nanoseconds, parent or root_frame), name, turn, place))
     return result
+
+
+def _transform(header: Any, child: str, turn: Sequence[float], place: Sequence[float]) -> Any:  # noqa: ANN401
+    (x, y, z), (qx, qy, qz, qw) = place, turn
+    return _new(
+        "geometry_msgs/msg/TransformStamped",
+        header=header,
+        child_frame_id=child,
+        transform=_new(
+            "geometry_msgs/msg/Transform",
+            translation=_new("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+            rotation=_new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+        ),
+    )
 
 
 def _body_pose(track: Track, posed: Skeleton, index: int, person: str) -> Any:  # noqa: ANN401
@@ -341,7 +373,7 @@ def instant(
     Args:
         estimate: of the frame; without a pose (status "searching") there are no transforms and no joint states.
         body: in its current sizes.
-        root_frame: frame of the estimate.
+        root_frame: frame of the estimate; if it is an optical frame by its name, see `write_bag`.
         person: REP-155 id.
         topic: begins the names of the person's topics, e.g. "/humans/bodies/body_1".
         markers: also make the markers.
@@ -350,8 +382,8 @@ def instant(
         VoodooError: a stamp before zero.
     """
     # Angles are not needed; if nobody was found, the names come from the body.
-    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, topic)
-    return human.messages(0, root_frame, markers=markers)
+    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, topic, root_frame)
+    return human.messages(0, markers=markers)
 
 
 def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition

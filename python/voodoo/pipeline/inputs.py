@@ -38,7 +38,7 @@ def join(
     recording: Recording,
     *,
     keypoints: Mapping[str, Path] | None = None,
-    layout: str = "body25b",
+    layout: str | None = None,
     others: Sequence[Path] = (),
     offset: float = 0.0,
     markers: MarkerMap | None = None,
@@ -51,7 +51,7 @@ def join(
     Args:
         recording: provides the frames.
         keypoints: sensor -> folder of OpenPose JSON files, one file for each image of the sensor.
-        layout: layout of those keypoints.
+        layout: layout of those keypoints; None: told by their number and the shape of the persons.
         others: further recordings of the scene, marker files among them.
         offset: [s] added to their stamps.
         markers: meaning of the markers in marker files.
@@ -61,7 +61,7 @@ def join(
     Raises:
         VoodooError: an input cannot be read, or the inputs do not belong together.
     """
-    layout_of(layout)
+    layout_of(layout or "body25b")
     if not math.isfinite(offset):
         raise VoodooError(f"offset: expected a finite number of seconds, found {offset}")
     if keypoints:
@@ -78,7 +78,7 @@ def loader_options(
     loader: str | None,
     *,
     markers: MarkerMap | None,
-    layout: str,
+    layout: str | None,
     numbers: Mapping[str, float] | None = None,
     use: Sequence[str] | None = None,
 ) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def _open(
     first: Recording,
     *,
     markers: MarkerMap | None,
-    layout: str,
+    layout: str | None,
     numbers: Mapping[str, float] | None,
     bare: bool,
     left_out: LeftOut | None,

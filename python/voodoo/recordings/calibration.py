@@ -89,7 +89,8 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
             raise RecordingError(f"{path}: color: expected a table, found {short(table)}")
         _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
         color = _camera(table, "color", f"{path}, [color]")
-    root_frame = content.get("root_frame", depth.sensor_frame)
+    unmoved = np.array_equal(depth.root_from_sensor, np.eye(4))
+    root_frame = content.get("root_frame", depth.sensor_frame if unmoved else "root")
     if not isinstance(root_frame, str):
         raise RecordingError(f"{path}: root_frame: expected a name, found {short(root_frame)}")
     return FolderCalibration(root_frame, float(factor), depth, color)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 from voodoo.model.camera import Camera
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.order import in_order
 from voodoo.recordings.pictures import decode_color
 from voodoo.stored import read_stored
 
@@ -43,7 +44,7 @@ def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str,
     names = [name for own in cameras.values() for name in set(own)]
     owner = {name: sensor for sensor, own in cameras.items() for name in own if name and names.count(name) == 1}
     found: dict[str, list[Path]] = {}
-    for file in sorted(item for item in folder.rglob("*") if item.suffix.lower() in PICTURES):
+    for file in in_order([item for item in folder.rglob("*") if item.suffix.lower() in PICTURES]):
         place = file.relative_to(folder)
         word = place.parts[0] if len(place.parts) > 1 else file.stem
         fit = [name for name in owner if re.fullmatch(rf"{re.escape(name)}([_.-].*)?", word)]

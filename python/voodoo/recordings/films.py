@@ -20,6 +20,7 @@ from voodoo.model.camera import Camera
 from voodoo.recordings.camera_files import PlacedCamera
 from voodoo.recordings.empty_scene import PICTURES
 from voodoo.recordings.folder import FrameClock
+from voodoo.recordings.order import in_order
 from voodoo.recordings.pictures import decode_color, picture_size
 from voodoo.stored import check_stored, read_stored
 
@@ -135,8 +136,8 @@ class PictureFolder(Pictures):
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The image files in a folder, sorted by name."""
-    return sorted(item for item in folder.iterdir() if item.suffix.lower() in PICTURES)
+    """The image files in a folder, in the order of their numbers."""
+    return in_order([item for item in folder.iterdir() if item.suffix.lower() in PICTURES])
 
 
 def _number(file: Path) -> str:

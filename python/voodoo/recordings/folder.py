@@ -58,7 +58,7 @@ class FolderRecording(Recording):
         model = "plumb_bob"            # or rational_polynomial, equidistant
         depth_factor = 5000.0          # units per meter
         sensor_frame = "camera_depth_optical_frame"
-        root_frame = "base_link"       # default: sensor_frame
+        root_frame = "base_link"       # default: sensor_frame, or "root" with a root_from_sensor
         root_from_sensor = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]]   # default: identity
         [color]                        # needed for rgb/ to be read; same keys but depth_factor and root_frame
         width = 640

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
+from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +14,16 @@ import numpy.typing as npt
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
-from voodoo.recordings.keypoint_files import read_openpose_json
+from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
+from voodoo.recordings.keypoint_depth import check_on_depth
+from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.order import by_image
 from voodoo.recordings.recording import Recording, RecordingInfo
+
+_CHECKED = 30
+"""Number of frames at the start whose keypoints are compared with calibration and depth."""
 
 
 class Joined(Recording):
@@ -35,7 +44,8 @@ class Joined(Recording):
     def __init__(self, first: Recording, others: Sequence[Recording], *, offset: float = 0.0) -> None:
         """Check that they overlap in time."""
         self.path, self.name, self.root_frame = first.path, first.name, first.root_frame
-        self.start, self.reference, self.assumed = first.start, first.reference, first.assumed
+        self.start, self.reference = first.start, first.reference
+        self.assumed = tuple(words for one in (first, *others) for words in one.assumed)
         self._first, self._others, self._offset = first, tuple(others), offset
         about = first.info()
         low, high = about.start_stamp, about.start_stamp + about.duration
@@ -103,36 +113,72 @@ class WithKeypoints(Recording):
 
     Args:
         recording: with color or depth images.
-        folders: sensor -> folder of OpenPose JSON files, one for each of its images, sorted by name.
-        layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
+        folders: sensor -> folder of OpenPose JSON files, one for each of its images, in the order of their numbers; if some are
+            missing, the numbers are those of the images, from 0 or 1.
+        layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS; None: told by their number and the shape of the persons.
         left_out: of the recording, see open_recording.
 
     Raises:
-        RecordingError: an unknown sensor, or another number of files than images.
+        RecordingError: an unknown sensor, another number of files than images, or keypoints and calibration do not fit.
         MeasurementError: an unknown layout.
     """
 
     def __init__(
-        self, recording: Recording, folders: Mapping[str, Path], *, layout: str, left_out: LeftOut | None = None
+        self,
+        recording: Recording,
+        folders: Mapping[str, Path],
+        *,
+        layout: str | None = None,
+        left_out: LeftOut | None = None,
     ) -> None:
         """List the files."""
-        layout_of(layout)
+        layout_of(layout or "body25b")
         self._left_out = left_out
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
         self.start, self.reference, self.assumed = recording.start, recording.reference, recording.assumed
-        self._recording, self._layout, self.complete = recording, layout, recording.complete
-        self._files: dict[str, list[Path]] = {}
+        self._recording, self.complete = recording, recording.complete
+        self._files: dict[str, list[Path | None]] = {}
         sensors = {item.name: item for item in recording.info().sensors if item.kind in ("color", "depth")}
         for name, folder in folders.items():
             if name not in sensors:
                 raise RecordingError(f"keypoints: expected one of {', '.join(sensors) or 'no cameras'}, found {name!r}")
-            files = sorted(folder.glob("*.json"))
-            if len(files) != sensors[name].messages:
+            files = list(folder.glob("*.json"))
+            images = by_image(files, sensors[name].messages)
+            if images is None:
                 raise RecordingError(
-                    f"{folder}: expected {sensors[name].messages} .json files, one for each image of {name}, found "
-                    f"{len(files)}"
+                    f"{folder}: expected {sensors[name].messages} .json files, one for each image of {name} or named by it, "
+                    f"found {len(files)}"
                 )
-            self._files[name] = files
+            self._files[name] = images
+        unread = None if left_out is None else LeftOut()
+        people = [
+            rows
+            for files in self._files.values()
+            for found in some_of(len(files), partial(_read, files, layout, unread), good=bool)
+            for rows in found
+        ]
+        self._layout, notes = taken_layout(people, layout)
+        self._said = (*notes, *self._checked())
+        self.assumed = (*self.assumed, *self._said)
+
+    def _checked(self) -> tuple[str, ...]:
+        """Check the keypoints of the first frames against calibration and depth."""
+        instants: list[list[KeypointImage]] = []
+        pairs: list[tuple[KeypointImage, DepthImage]] = []
+        before = deepcopy(vars(self._left_out)) if self._left_out is not None else {}
+        try:
+            for recorded in islice(self, _CHECKED):
+                images = [item for item in recorded.measurements if isinstance(item, KeypointImage)]
+                depths = [item for item in recorded.measurements if isinstance(item, DepthImage)]
+                pairs += [(image, depths[-1]) for image in images if depths]
+                if len(images) == len(self._files) and any(image.people for image in images):
+                    instants.append(sorted(images, key=lambda image: image.sensor))
+        except RecordingError:
+            pass  # reading the frames again reports it
+        if self._left_out is not None:
+            vars(self._left_out).update(before)
+        check_on_depth("keypoints", pairs)
+        return check_keypoints("keypoints", instants)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -150,28 +196,19 @@ class WithKeypoints(Recording):
                         # The numbers of images count those that were left out.
                         number = self._left_out.numbers.get((item.sensor, item.stamp), number)
                     count[item.sensor] = number + 1
-                    items += self._keypoints(item, self._files[item.sensor][number])
+                    items.append(self._keypoints(item, number))
                 items.append(item)
             yield RecordedFrame(recorded.stamp, tuple(items))
 
-    def _keypoints(self, item: ColorImage | DepthImage, file: Path) -> list[KeypointImage]:
-        try:
-            people = tuple(read_openpose_json(file, layout=self._layout))
-        except RecordingError as error:
-            if self._left_out is None:
-                raise
-            self._left_out.add_error(error)
-            return []
-        return [
-            KeypointImage(
-                sensor=f"{item.sensor}/keypoints",
-                stamp=item.stamp,
-                people=people,
-                layout=self._layout,
-                camera=item.camera,
-                root_from_sensor=item.root_from_sensor,
-            )
-        ]
+    def _keypoints(self, item: ColorImage | DepthImage, number: int) -> KeypointImage:
+        return KeypointImage(
+            sensor=f"{item.sensor}/keypoints",
+            stamp=item.stamp,
+            people=_read(self._files[item.sensor], self._layout, self._left_out, number),
+            layout=self._layout,
+            camera=item.camera,
+            root_from_sensor=item.root_from_sensor,
+        )
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""
@@ -189,4 +226,11 @@ class WithKeypoints(Recording):
             for sensor in about.sensors
             if sensor.name in self._files
         )
-        return replace(about, sensors=about.sensors + sensors)
+        return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, *self._said))
+
+
+def _read(
+    files: Sequence[Path | None], layout: str | None, left_out: LeftOut | None, index: int
+) -> tuple[FloatArray, ...]:
+    file = files[index]
+    return () if file is None else read_people(file, layout=layout, left_out=left_out)

@@ -10,20 +10,43 @@ import numpy as np
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.joint import short
-from voodoo.recordings.keypoint_layouts import layout_of
+from voodoo.recordings.keypoint_layouts import LAYOUTS, layout_of
+from voodoo.recordings.left_out import LeftOut
 from voodoo.stored import read_stored_text
 
 _MOST = 2**24
 """Largest size of a file [bytes]: a thousand people have a tenth of it."""
 
 
-def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
+def read_people(file: Path, *, layout: str | None, left_out: LeftOut | None) -> tuple[FloatArray, ...]:
+    """People in a keypoint file; an unreadable file is counted in `left_out` and has none, or is an error without it.
+
+    Raises:
+        RecordingError: see read_openpose_json.
+    """
+    try:
+        return tuple(read_openpose_json(file, layout=layout))
+    except RecordingError as error:
+        if left_out is None:
+            raise
+        left_out.add_error(error)
+        return ()
+
+
+def read_openpose_json(path: str | Path, *, layout: str | None) -> list[FloatArray]:
     """People in an OpenPose JSON file (one image): one (K, 3) array of (u, v, confidence) each; empty without any.
+
+    Args:
+        path: the file.
+        layout: name in LAYOUTS; None: any of them.
+
+    Returns:
+        Keypoints at exact zeros, and those that are not finite, were not detected: (0, 0, 0).
 
     Raises:
         RecordingError: unreadable, of another format, or with a number of keypoints that differs from the layout.
     """
-    count = layout_of(layout).count
+    counts = {layout.count for layout in LAYOUTS.values()} if layout is None else {layout_of(layout).count}
     path = Path(path)
     with reading(path, "an OpenPose JSON file"):
         content = json.loads(read_stored_text(path, "an OpenPose JSON file", most=_MOST))
@@ -37,13 +60,13 @@ def read_openpose_json(path: str | Path, *, layout: str) -> list[FloatArray]:
             continue
         if not isinstance(flat, list) or not all(isinstance(value, (int, float)) for value in flat):
             raise RecordingError(f"{path}, person {index}: expected a list of numbers pose_keypoints_2d")
-        if len(flat) != 3 * count:
-            raise RecordingError(
-                f"{path}, person {index}: expected {count} keypoints for {layout}, found {len(flat) / 3:g}"
+        if len(flat) / 3 not in counts:
+            expected = (
+                f"{' or '.join(map(str, sorted(counts)))} keypoints for {layout or 'one of ' + ', '.join(LAYOUTS)}"
             )
+            raise RecordingError(f"{path}, person {index}: expected {expected}, found {len(flat) / 3:g}")
         with reading(f"{path}, person {index}", "numbers pose_keypoints_2d"):
-            rows = np.array(flat, dtype=np.float64).reshape(count, 3)
-        if not np.isfinite(rows).all():
-            raise RecordingError(f"{path}, person {index}: expected finite keypoints, found others")
+            rows = np.array(flat, dtype=np.float64).reshape(-1, 3)
+        rows[~np.isfinite(rows).all(axis=1) | (rows[:, :2] == 0.0).all(axis=1)] = 0.0
         found.append(rows)
     return found

@@ -9,8 +9,12 @@ would count one error twice.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 
@@ -28,10 +32,14 @@ class SiteKeypoints:
 
 @dataclass(frozen=True)
 class Layout:
-    """The keypoints of a network: their number, and the sites computed from them."""
+    """The keypoints of a network: their number, the sites computed from them, and its midpoints.
+
+    A midpoint is the index of a keypoint and of the two between which the network places it.
+    """
 
     count: int
     parts: tuple[SiteKeypoints, ...]
+    midpoints: tuple[tuple[int, int, int], ...] = ()
 
 
 def _parts(left: Mapping[str, int], right: Mapping[str, int]) -> list[SiteKeypoints]:
@@ -77,6 +85,7 @@ LAYOUTS: dict[str, Layout] = {
             *_parts(_body_25({"arm": 5, "leg": 12}, toe=19), _body_25({"arm": 2, "leg": 9}, toe=22)),
             _ears(18, 17),
         ),
+        midpoints=((1, 2, 5), (8, 9, 12)),
     ),
     # OpenPose BODY_25B: COCO, then upper neck (17) and head top (18) of MPII, then feet
     "body25b": Layout(
@@ -123,9 +132,18 @@ LAYOUTS: dict[str, Layout] = {
             SiteKeypoints("vc7", {8: 1.0}, 0.05),
             SiteKeypoints("skull_tip", {10: 1.0}, 0.05),
         ),
+        midpoints=((0, 1, 4), (8, 11, 14)),
     ),
 }
 """Layout by name."""
+
+LIMBS = tuple(
+    (f"{side}_{above}", f"{side}_{below}")
+    for side in "lr"
+    for chain in (("shoulder", "elbow", "wrist"), ("shoulder", "hip", "knee", "ankle"))
+    for above, below in pairwise(chain)
+)
+"""Sites at the ends of limbs, and of the sides of the trunk; every layout has them."""
 
 
 def layout_of(name: str) -> Layout:
@@ -137,3 +155,37 @@ def layout_of(name: str) -> Layout:
     if name not in LAYOUTS:
         raise MeasurementError(f"layout {name!r}: expected one of {', '.join(LAYOUTS)}")
     return LAYOUTS[name]
+
+
+_MIDDLE, _DOUBT = 0.045, 0.01
+"""Distance of a keypoint from the middle of two others, by the size of the person, below which it is that middle. It is 0.02 and
+less for the midpoints of a network, 0.06 and more for other joints; the second number is the range in which both are possible."""
+
+
+def layout_by_shape(people: Sequence[npt.NDArray[np.float64]]) -> tuple[str | None, bool]:
+    """The likeliest layout of keypoints (K, 3), and whether it is certain.
+
+    It is told by the number of keypoints and, of two layouts with the same number, by whether the midpoints of one of them are
+    in the middle. None: no layout has this number.
+    """
+    people = [rows for rows in people if len(rows) == len(people[0])]
+    names = [name for name, layout in LAYOUTS.items() if people and layout.count == len(people[0])]
+    if len(names) < 2:
+        return next(iter(names), None), True
+    first, second = sorted(names, key=lambda name: not LAYOUTS[name].midpoints)
+    away = [value for rows in people if np.isfinite(value := _off_middle(rows, LAYOUTS[first].midpoints))]
+    if not away:
+        return second, False
+    middle = float(np.median(away))
+    return first if middle < _MIDDLE else second, abs(middle - _MIDDLE) > _DOUBT
+
+
+def _off_middle(rows: npt.NDArray[np.float64], midpoints: Sequence[tuple[int, int, int]]) -> float:
+    """Greatest distance of the midpoints from the middle of their two keypoints, by the size of the person; NaN: not seen."""
+    seen = rows[:, 2] > 0.0
+    used = np.array([each for each in midpoints if seen[list(each)].all()])
+    if not len(used):
+        return np.nan
+    middle, a, b = (rows[used[:, column], :2] for column in range(3))
+    size = float(np.linalg.norm(np.ptp(rows[seen, :2], axis=0)))
+    return float(np.linalg.norm(middle - (a + b) / 2.0, axis=1).max()) / size if size > 0.0 else np.nan

@@ -13,8 +13,9 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.joint import short
+from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
-from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_markers
+from voodoo.recordings.marker_trajectories import Z_UP_FROM, read_markers
 from voodoo.recordings.pose2sim import SITES
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
 
@@ -42,7 +43,8 @@ class MarkerMap(BaseModel):
         sites: marker name -> site name. Markers named like a site of the default human need no entry, nor do
             Pose2Sim's.
         limbs: marker name -> its place on a limb; it becomes a new site.
-        y_up: the file's axes are OpenSim's (Y up) and are turned to z up; False keeps them.
+        y_up: the file's axes are OpenSim's (Y up) and are turned to z up; False keeps them; None: as a .c3d says (Y_SCREEN), else
+            OpenSim's.
         sigma_m: standard deviation of a marker's position [m].
     """
 
@@ -50,7 +52,7 @@ class MarkerMap(BaseModel):
 
     sites: dict[str, str] = Field(default_factory=dict)
     limbs: dict[str, OnLimb] = Field(default_factory=dict)
-    y_up: bool = True
+    y_up: bool | None = None
     sigma_m: Annotated[FiniteFloat, Field(gt=0.0)] = 0.02
 
     @classmethod
@@ -90,14 +92,17 @@ class MarkerRecording(Recording):
         """Read the file."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
         self.map = markers or MarkerMap()
-        content = read_markers(path, world_from_file=Z_UP_FROM_Y_UP if self.map.y_up else None)
+        content = read_markers(path)
+        told = self.map.y_up is not None or content.up is not None
+        self._up = (content.up or "+Y") if self.map.y_up is None else "+Y" if self.map.y_up else "+Z"
         names = (
             {name: name for name in Body.human(model="full").site_names}
             | SITES
             | self.map.sites
             | {name: name for name in self.map.limbs}
         )
-        sites, self._positions = content.of(names)
+        sites, positions = content.of(names)
+        self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
         unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
         if unknown:
@@ -108,10 +113,20 @@ class MarkerRecording(Recording):
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
         self.start = None if bare else start
         self.reference = None
+        self.assumed = () if told else self._doubts(positions)
 
     def _at(self, index: int) -> dict[str, FloatArray]:
         rows = zip(self._sites, self._positions[index], strict=True)
         return {site: position for site, position in rows if np.isfinite(position).all()}
+
+    def _doubts(self, positions: FloatArray) -> tuple[str, ...]:
+        """What speaks against the axis that is taken for up."""
+        likely = standing_along(self._sites, positions)
+        if likely in ("", self._up):
+            return ()
+        remedy = "y_up = false in a --marker-map keeps the axes" if likely == "+Z" else "exchange the axes of the file"
+        words = f"{self._up} of the file is taken for up, but the body stands along its {likely}"
+        return (f"{self.path.name}: {words}; if that is up, {remedy}",)
 
     def __len__(self) -> int:
         """Number of instants."""
@@ -129,4 +144,5 @@ class MarkerRecording(Recording):
         rate = mean_rate(len(self), duration)
         detail = f"{len(self._sites)} markers"
         sensor = SensorInfo(self.path.name, "markers", FRAME, len(self), rate, detail)
-        return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration)
+        notes = (f"up is {self._up} of the file", *self.assumed)
+        return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration, notes=notes)

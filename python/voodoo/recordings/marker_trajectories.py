@@ -7,7 +7,7 @@ import io
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -25,6 +25,16 @@ X, Y).
 
 This is Pose2Sim's convention; it preserves handedness, but not the direction in which a person faces."""
 
+Z_UP_FROM: dict[str, FloatArray] = {
+    "+X": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    "+Y": Z_UP_FROM_Y_UP,
+    "+Z": np.eye(3),
+    "-X": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]),
+    "-Y": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+    "-Z": np.diag([1.0, -1.0, -1.0]),
+}
+"""Axis of a file that points up -> rotation to z up."""
+
 _METERS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
 
 
@@ -35,14 +45,16 @@ class MarkerTrajectories:
     Args:
         stamps: (F,) [s].
         names: M names as in the file.
-        positions: (F, M, 3) [m]; NaN = missing.
+        positions: (F, M, 3) [m]; NaN = missing, as are empty cells and exact zeros of the file.
         rate_hz: nominal rate [Hz].
+        up: the axis that points up, a key of Z_UP_FROM, if the file says so.
     """
 
     stamps: FloatArray
     names: tuple[str, ...]
     positions: FloatArray
     rate_hz: float
+    up: str | None = None
 
     def __repr__(self) -> str:
         """Counts and rate."""
@@ -147,6 +159,9 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         written = reader.get("POINT:UNITS")
         unit = "mm" if written is None else str(written.string_value).strip() or "mm"
         rate, first = float(reader.point_rate), int(reader.first_frame)
+        screen = reader.get("POINT:Y_SCREEN")
+        up = "" if screen is None else str(screen.string_value).strip().upper()
+        up = up if up[:1] in ("+", "-") else f"+{up}"
     count = len(frames[0]) if frames else 0
     names = names[:count]
     if not count or unit not in _METERS or not 0.0 < rate < math.inf or len(set(names)) != count:
@@ -158,7 +173,8 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     positions = table[:, :, :3] * _METERS[unit]
     positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not observed
     stamps = (first + np.arange(len(table))) / rate
-    return _trajectories(path, stamps, names, positions, rate, world_from_file)
+    found = _trajectories(path, stamps, names, positions, rate, world_from_file)
+    return replace(found, up=up if up in Z_UP_FROM else None)
 
 
 def _trajectories(
@@ -169,7 +185,8 @@ def _trajectories(
     rate: float,
     world_from_file: npt.ArrayLike | None,
 ) -> MarkerTrajectories:
-    positions[~np.isfinite(positions).all(axis=2)] = np.nan
+    # Exporters write zeros for markers that were not seen; none lies exactly in the origin.
+    positions[~np.isfinite(positions).all(axis=2) | (positions == 0.0).all(axis=2)] = np.nan
     if world_from_file is not None:
         turn = np.asarray(world_from_file, dtype=np.float64)
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from voodoo.errors import MeasurementError, RecordingError
-from voodoo.measurements import FloatArray, KeypointImage, RecordedFrame
+from voodoo.measurements import KeypointImage, RecordedFrame
 from voodoo.recordings.camera_files import read_camera_toml
-from voodoo.recordings.keypoint_files import read_openpose_json
+from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
+from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
+from voodoo.recordings.order import in_order, matched, numbers_of
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
@@ -40,30 +43,31 @@ class Pose2SimRecording(Recording):
     """A folder of Pose2Sim::
 
         Calib_*.toml                     cameras, see read_camera_toml; world Z up, meters; or in calibration/, ../calibration/
-        keypoints/cam01_json/*.json      OpenPose files, one per image, sorted by name; or pose/cam01_json as in Pose2Sim
+        keypoints/cam01_json/*.json      OpenPose files, one per image, numbered; or pose/cam01_json as in Pose2Sim
         *.trc                            optional: triangulated joints, Y up
 
-    Cameras and keypoint folders belong together in the order of their names. There is one frame for each image
-    number; it holds the keypoints of all cameras. Stamps are k / rate. The reference, and the start, are the .trc
-    with the shortest name (the unfiltered one): markerless triangulation from the same keypoints, `reference.exact`
-    is False.
+    Cameras and keypoint folders are paired by name (`cam01_json` is `cam_1`), else by number, else, if there are as many of both,
+    in the order of names; cameras without a folder are not used. There is one frame for each image number; it holds the
+    keypoints of all cameras that have this number. Stamps are k / rate. The keypoints are checked against the calibration.
+    The reference, and the start, are the .trc with the shortest name (the unfiltered one): markerless triangulation from
+    the same keypoints, `reference.exact` is False.
 
     Args:
         path: the folder.
-        layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS.
+        layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS; None: told by their number and the shape of the persons.
         rate: images per second; not in the folder (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
         bare: do not read the .trc.
         left_out: counts unreadable files, whose camera then has no detections; None: they are errors.
 
     Raises:
-        RecordingError: a part is missing or has another format.
+        RecordingError: a part is missing or has another format, or keypoints and calibration do not fit.
     """
 
     def __init__(
         self,
         path: Path,
-        layout: str = "body25b",
+        layout: str | None = None,
         rate: float = 60.0,
         cameras: tuple[str, ...] | None = None,
         *,
@@ -76,77 +80,139 @@ class Pose2SimRecording(Recording):
         self.root_frame = FRAME
         self._left_out = left_out
         try:
-            layout_of(layout)
+            layout_of(layout or "body25b")
         except MeasurementError as error:
             raise RecordingError(f"{path}: {error}") from error
-        self.layout = layout
         self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
         placed = read_camera_toml(calibration_of(path))
         folders = keypoint_folders(path)
-        if len(folders) != len(placed):
+        pairs = matched([camera.name for camera in placed], [folder.name.removesuffix("_json") for folder in folders])
+        if pairs is None:
             raise RecordingError(
-                f"{path}: expected a folder keypoints/*_json for each of {len(placed)} cameras, found {len(folders)}"
+                f"{path}: expected folders keypoints/*_json with the names of cameras or as many as cameras "
+                f"({', '.join(one.name for one in placed)}), found {', '.join(folder.name for folder in folders) or 'none'}"
             )
         names = [camera.name for camera in placed]
         unknown = sorted(set(cameras or ()) - set(names))
         if unknown or cameras == ():
             raise RecordingError(f"{path}: cameras: expected some of {', '.join(names)}, found {cameras}")
-        chosen = [pair for pair in zip(placed, folders, strict=True) if cameras is None or pair[0].name in cameras]
+        chosen = [(placed[a], folders[b]) for a, b in pairs if cameras is None or placed[a].name in cameras]
         self.cameras = tuple(camera for camera, _ in chosen)
-        self._files = [sorted(folder.glob("*.json")) for _, folder in chosen]
-        counts = {len(files) for files in self._files}
-        if len(counts) != 1 or counts == {0}:
-            raise RecordingError(f"{path}: expected as many keypoint files for every camera, found {sorted(counts)}")
+        self._folders = tuple(folder for _, folder in chosen)
+        self._files, self._notes = _rows_of(path, self._folders)
+        self._check(layout)
         self.reference = None if bare else read_triangulation(path, self.rate)
         self.start = None if self.reference is None else start_of(self.reference)
 
     def __len__(self) -> int:
         """Number of images of each camera."""
-        return len(self._files[0])
+        return len(self._files)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Keypoints of all cameras, image by image; see Recording."""
         for index in range(len(self)):
-            stamp = index / self.rate
-            yield RecordedFrame(
-                stamp,
-                tuple(
-                    KeypointImage(
-                        sensor=placed.name,
-                        stamp=stamp,
-                        people=self._people(files[index]),
-                        layout=self.layout,
-                        camera=placed.camera,
-                        root_from_sensor=placed.world_from_sensor,
-                    )
-                    for placed, files in zip(self.cameras, self._files, strict=True)
-                ),
-            )
+            yield RecordedFrame(index / self.rate, self._images(index, self.layout, self._left_out))
 
-    def _people(self, file: Path) -> tuple[FloatArray, ...]:
-        try:
-            return tuple(read_openpose_json(file, layout=self.layout))
-        except RecordingError as error:
-            if self._left_out is None:
-                raise
-            self._left_out.add_error(error)
-            return ()
+    def _images(self, index: int, layout: str | None, left_out: LeftOut | None) -> tuple[KeypointImage, ...]:
+        return tuple(
+            KeypointImage(
+                sensor=placed.name,
+                stamp=index / self.rate,
+                people=() if file is None else read_people(file, layout=layout, left_out=left_out),
+                layout=layout or "",
+                camera=placed.camera,
+                root_from_sensor=placed.world_from_sensor,
+            )
+            for placed, file in zip(self.cameras, self._files[index], strict=True)
+        )
+
+    def _check(self, asked: str | None) -> None:
+        """Tell the layout, and check the keypoints of some instants against the calibration."""
+        unread = None if self._left_out is None else LeftOut()
+        instants = some_of(
+            len(self),
+            lambda index: self._images(index, asked, unread),
+            good=lambda images: any(image.people for image in images),
+        )
+        people = [rows for instant in instants for image in instant for rows in image.people]
+        self.layout, notes = taken_layout(people, asked)
+        count = layout_of(self.layout).count
+        instants = [
+            tuple(
+                replace(image, people=tuple(rows for rows in image.people if len(rows) == count)) for image in instant
+            )
+            for instant in instants
+        ]
+        self.assumed = (*notes, *check_keypoints(self.path, instants))
 
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = (len(self) - 1) / self.rate
         rate = mean_rate(len(self), duration)
-        words, notes = (
-            f"{self.layout} keypoints",
-            "triangulated from the same keypoints: it tests consistency, not accuracy",
+        sensors = (
+            SensorInfo(
+                one.name,
+                "keypoints",
+                one.name,
+                len(self),
+                rate,
+                f"{self.layout} keypoints of {folder.relative_to(self.path)}",
+            )
+            for one, folder in zip(self.cameras, self._folders, strict=True)
         )
-        sensors = (SensorInfo(one.name, "keypoints", one.name, len(self), rate, words) for one in self.cameras)
-        return self._described("pose2sim", sensors, duration=duration, notes=(f"the reference is {notes}",))
+        notes = (*self.assumed, *self._notes)
+        if self.reference is not None:
+            kind = "the same keypoints: it tests consistency, not accuracy"
+            notes = (*notes, f"the reference is triangulated from {kind}")
+        return self._described("pose2sim", sensors, duration=duration, notes=notes)
+
+
+def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:
+    """The files of all cameras, image by image, and what should be said about their order.
+
+    Files with the same number belong together. They belong together in their order if names have no numbers, or if each camera
+    counts without gaps to the same number of images, but from different ones.
+
+    Raises:
+        RecordingError: no files, or another number of them for a camera and no numbers.
+    """
+    files = [in_order(list(folder.glob("*.json"))) for folder in folders]
+    counts = {len(each) for each in files}
+    numbered = [numbers_of(each) for each in files]
+    numbers = [each for each in numbered if each is not None]
+    if counts == {0} or (len(counts) > 1 and len(numbers) < len(files)):
+        raise RecordingError(
+            f"{path}: expected as many keypoint files for every camera, or numbers in their names, found {sorted(counts)} files"
+        )
+    if len(numbers) < len(files):
+        said = (
+            ()
+            if counts == {1}
+            else ("the names of keypoint files have no numbers: they are taken in the order of names",)
+        )
+        return list(zip(*files, strict=True)), said
+    gapless = all(max(each) - min(each) + 1 == len(each) for each in numbers if each)
+    if len(counts) == 1 and (gapless or all(each == numbers[0] for each in numbers)):
+        moved = len({each[0] for each in numbers}) > 1
+        said = (
+            ("the cameras' keypoint files begin with different numbers: they are paired in their order",)
+            if moved
+            else ()
+        )
+        return list(zip(*files, strict=True)), said
+    of = [dict(zip(each, own, strict=True)) for each, own in zip(numbers, files, strict=True)]
+    union = sorted({number for each in numbers for number in each})
+    lacking = ", ".join(f"{folder.name} {len(union) - len(own)}" for folder, own in zip(folders, files, strict=True))
+    return [tuple(each.get(number) for each in of) for number in union], (
+        f"keypoint files are paired by their numbers; of {len(union)} are missing: {lacking}",
+    )
 
 
 def keypoint_folders(path: Path) -> list[Path]:
     """The folders of keypoint files in a Pose2Sim folder, one per camera."""
-    return next((found for part in ("keypoints", "pose") if (found := sorted((path / part).glob("*_json")))), [])
+    return next(
+        (found for part in ("keypoints", "pose") if (found := in_order(list((path / part).glob("*_json"))))), []
+    )
 
 
 def calibrations(path: Path) -> list[Path]:

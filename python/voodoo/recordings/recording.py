@@ -15,6 +15,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.model.joint import short
+from voodoo.model.standing import is_optical
 from voodoo.recordings.people_truth import PeopleTruth
 
 
@@ -95,13 +96,19 @@ class RecordingInfo:
     reference: str = "none"
     notes: tuple[str, ...] = ()
 
+    @property
+    def camera_root(self) -> bool:
+        """Whether the root frame is a camera's optical frame, so that its axes are not level: y points down."""
+        images = (sensor.frame for sensor in self.sensors if sensor.kind in ("depth", "color"))
+        return is_optical(self.root_frame) or self.root_frame in images
+
     def __str__(self) -> str:
         """Several lines of text."""
         rate = "" if np.isnan(self.rate_hz) else f" at {self.rate_hz:.2f} Hz"
         lines = [
             f"{self.name}  ({self.loader}, {self.path})",
             f"  frames     {self.frames} in {self.duration:.3f} s{rate}, from {self.start_stamp:.6f} s",
-            f"  root frame {self.root_frame}",
+            f"  root frame {self.root_frame}{' (a camera, not level: y down, z forward)' if self.camera_root else ''}",
         ]
         width = max((len(sensor.name) for sensor in self.sensors), default=0)
         for sensor in self.sensors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -11,6 +10,7 @@ from voodoo.errors import RecordingError, reading
 from voodoo.model.camera import Camera
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
+from voodoo.recordings.order import natural
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     COLOR_CHANNELS,
@@ -154,7 +154,7 @@ class TopicFinder:
         names = self._pictures(names, channels=3) or self._pictures(names, channels=1)
         bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
         found: dict[str, TopicSource] = {}
-        for name in sorted(bases.values(), key=_natural):
+        for name in sorted(bases.values(), key=natural):
             try:
                 source = self._source(name, "color")
             except RecordingError as error:
@@ -236,8 +236,3 @@ class TopicFinder:
                 name, good=good or ((lambda message: stamp_of(message, source)) if stamped else None)
             )
         return self._first[name]
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    """Sort key: cam_2 comes before cam_10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from voodoo.recordings.empty_scene import (
 from voodoo.recordings.films import VIDEOS, PictureFolder, Pictures, Video, pictures_in
 from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.order import in_order, matched
 from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation, start_of
 from voodoo.recordings.recording import (
     Recording,
@@ -48,7 +48,8 @@ class VideosRecording(Recording):
         background/cam01_0.png       optional: images of the empty scene
         init.json, truth.csv, *.trc  optional: first pose, truth, triangulated joints to compare with
 
-    Videos and cameras are paired by name (`cam01` is `cam_01`), else, if their numbers are equal, in the order of names.
+    Videos and cameras are paired by name (`cam01` is `cam_1`), else by number, else, if there are as many of both, in the order
+    of names.
     There is one frame for each image of the first camera; images of the others within half an interval belong to it.
     All videos start at the same time: stamps of a video are k / rate.
 
@@ -162,7 +163,7 @@ def picture_sources(path: Path, *, anywhere: bool = True) -> list[Path]:
         if room == "." and not anywhere:
             found = [item for item in found if not item.is_dir()]
         if found:
-            return sorted(found, key=lambda item: _natural(item.stem))
+            return in_order(found)
     return []
 
 
@@ -178,12 +179,9 @@ def _matched(path: Path, placed: Sequence[PlacedCamera], sources: Sequence[Path]
     Raises:
         RecordingError: neither the names nor the numbers match.
     """
-    by_name = {_plain(source.stem): source for source in sources}
-    pairs = [(camera, by_name[_plain(camera.name)]) for camera in placed if _plain(camera.name) in by_name]
-    if len(pairs) == len(sources) == len(by_name):
-        return pairs
-    if len(placed) == len(sources):
-        return list(zip(sorted(placed, key=lambda camera: _natural(camera.name)), sources, strict=True))
+    pairs = matched([camera.name for camera in placed], [source.stem for source in sources])
+    if pairs is not None:
+        return [(placed[camera], sources[source]) for camera, source in pairs]
     raise RecordingError(
         f"{path}: expected a video for each camera, by its name or as many as there are cameras "
         f"({', '.join(camera.name for camera in placed)}), found {', '.join(source.name for source in sources)}"
@@ -211,12 +209,3 @@ def _chosen(
             f"{', '.join(unknown) or 'none'}"
         )
     return [known[name] for name in dict.fromkeys(expected)]
-
-
-def _plain(name: str) -> str:
-    """Normalize a name: cam01 and CAM_01 are the same."""
-    return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]

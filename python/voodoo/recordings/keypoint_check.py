@@ -1,0 +1,280 @@
+"""Whether the keypoints of several cameras fit their calibration, and if not, the likely reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations, permutations
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+
+from voodoo.errors import RecordingError
+from voodoo.measurements import FloatArray, KeypointImage
+from voodoo.model.camera import Camera
+from voodoo.recordings.keypoint_layouts import LAYOUTS, layout_by_shape
+
+T = TypeVar("T")
+Instant: TypeAlias = Sequence[KeypointImage]
+"""The keypoints of all cameras at one time."""
+Change: TypeAlias = Callable[[FloatArray, tuple[int, int]], FloatArray]
+
+WRONG_M, RIGHT_M = 0.10, 0.05
+"""Median distance between the rays of two cameras to one keypoint: above the first the calibration does not fit, below the second
+an explanation is accepted. It is 2 to 3 cm in sound recordings, and 15 cm and more with every mistake below."""
+_SPREADS_M = (0.1, 1.5)
+"""Median distance of a person's keypoints from their center, which is 0.4 m of a standing adult: other units are outside."""
+_CONFIDENT = 0.3
+_FEWEST = 20
+"""Distances that a judgment needs."""
+_FEWEST_OF_A_PERSON = 5
+_PARALLEL = 0.05
+"""Sine of the angle between two rays below which their distance says nothing."""
+_OUTSIDE, _MOST_OUTSIDE = 0.05, 0.1
+"""Networks guess joints a little outside of a picture: by this share of its size, and this share of the keypoints."""
+_INSTANTS = 8
+_UNITS = {1000.0: "millimeters", 100.0: "centimeters", 1.0 / 0.3048: "feet", 1.0 / 0.0254: "inches"}
+_USUAL = (2.0, 1.5, 3.0, 4.0, 0.5, 2.0 / 3.0)
+_SIZES = (*_USUAL, *(float(factor) for factor in np.geomspace(0.2, 5.0, 66)))
+"""Factors from the pixels of the keypoints to those of the calibration that are tried: usual ones, then in steps of 5 %."""
+_ALIKE_M = 0.01
+"""Explanations whose distances differ by less are equally good; the first one, which is the more usual one, is named."""
+_TURNS: dict[str, Change] = {
+    "shares of the picture's width and height, not pixels": lambda at, size: at * size,
+    "of mirrored pictures": lambda at, size: np.column_stack([size[0] - 1 - at[:, 0], at[:, 1]]),
+    "of pictures turned by 180 degrees": lambda at, size: np.array(size) - 1 - at,
+    "of pictures turned by 90 degrees clockwise": lambda at, size: np.column_stack([at[:, 1], size[1] - 1 - at[:, 0]]),
+    "of pictures turned by 90 degrees counterclockwise": lambda at, size: np.column_stack(
+        [size[0] - 1 - at[:, 1], at[:, 0]]
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well the rays of several cameras meet.
+
+    Args:
+        distance: median distance between two cameras' rays of one keypoint [m]; NaN: too few to say.
+        spread: median distance of a person's keypoints from their center [m].
+    """
+
+    distance: float
+    spread: float
+
+
+def some_of(count: int, read: Callable[[int], T], *, good: Callable[[T], object]) -> list[T]:
+    """A few good items, spread over `count`; all are read only if few are good."""
+    step = max(count // _INSTANTS, 1)
+    found = []
+    for index in dict.fromkeys((*range(step // 2, count, step), *range(count))):
+        item = read(index)
+        if good(item):
+            found.append(item)
+        if len(found) == _INSTANTS:
+            break
+    return found
+
+
+def check_keypoints(where: object, instants: Sequence[Instant]) -> tuple[str, ...]:
+    """Compare keypoints with the calibration of their cameras.
+
+    Args:
+        where: named in errors.
+        instants: some instants of a recording with persons.
+
+    Returns:
+        What should be said: rays that meet badly, though not badly enough for an error.
+
+    Raises:
+        RecordingError: the rays of the cameras do not meet, the persons have no human size, or keypoints are outside their
+            pictures; names the likely reason.
+    """
+    found, outside = agreement(instants), _outside(instants)
+    wrong = found.distance > WRONG_M
+    # Where a person stands between level cameras, the rays of mirrored pictures meet, too, but not as well.
+    some = instants[::3]
+    other = _reading(some, sizes=_SIZES if wrong else _USUAL) if found.distance > _ALIKE_M else None
+    if wrong or (other is not None and other[0].distance < agreement(some).distance / 2.0):
+        met = f"expected keypoints at which the rays of two cameras meet, found {_long(found.distance)} between them"
+        beside = f" and {outside:.0%} of the keypoints outside of their pictures" if outside > _MOST_OUTSIDE else ""
+        if other is not None:
+            reason = f"{other[1]}: then they meet within {_long(other[0].distance)}"
+        else:
+            reason = _unit(found) or "do keypoints and calibration belong to the same pictures?"
+        raise RecordingError(f"{where}: {met} in the median{beside}; {reason}")
+    if np.isfinite(found.distance) and not _human(found):
+        size = f"persons whose keypoints are {_long(found.spread)} from their center, 0.4 m for an adult"
+        reason = _unit(found) or "is it in another unit?"
+        raise RecordingError(f"{where}: expected a calibration in meters, found {size}; {reason}")
+    if outside > _MOST_OUTSIDE:
+        reason = "do keypoints and calibration belong to pictures of the same size?"
+        raise RecordingError(
+            f"{where}: expected keypoints inside of their pictures, found {outside:.0%} outside; {reason}"
+        )
+    said = []
+    if found.distance > RIGHT_M:
+        said.append(f"two cameras' rays to a keypoint meet within {_long(found.distance)}; 3 cm would be usual")
+    for index, image in enumerate(instants[0] if instants else ()):
+        own = agreement(instants, only=index).distance
+        if len(instants[0]) > 2 and own > WRONG_M:
+            away = f"its rays pass those of the other cameras at {_long(own)}; do its keypoints fit its calibration?"
+            said.append(f"{image.sensor}: {away}")
+    return tuple(said)
+
+
+def taken_layout(people: Sequence[FloatArray], asked: str | None) -> tuple[str, tuple[str, ...]]:
+    """The layout of the keypoints (K, 3) of some persons, and what should be said about it.
+
+    `asked` is what the user says; None: it is told by the number of keypoints and the shape of the persons.
+    """
+    shape, certain = layout_by_shape(people)
+    if shape is None:
+        return asked or "body25b", ()
+    if asked is None:
+        fit = " and ".join(name for name, layout in LAYOUTS.items() if layout.count == len(people[0]))
+        said = f"{len(people[0])} keypoints fit {fit}, and the persons do not tell: taken for {shape}; --layout says another"
+        return shape, () if certain else (said,)
+    said = f"the layout is {asked}, as asked for, but the persons have the shape of {shape}"
+    return asked, (said,) if certain and shape != asked else ()
+
+
+def agreement(instants: Sequence[Instant], change: Change | None = None, *, only: int | None = None) -> Agreement:
+    """How well the rays meet, after a change of the pixels; `only`: the rays of one camera with those of the others."""
+    distances: list[FloatArray] = []
+    spreads: list[float] = []
+    for instant in instants:
+        rays = [[_rays(image, rows, change) for rows in image.people] for image in instant]
+        for pair in combinations(range(len(rays)), 2):
+            few, many = sorted((rays[index] for index in pair), key=len)
+            if only is not None and only not in pair:
+                continue
+            for one in few:
+                # Networks list people in any order: the other camera's person is the one whose rays pass nearest.
+                met = [_meeting(one, other) for other in many]
+                met = [each for each in met if len(each[0]) >= _FEWEST_OF_A_PERSON]
+                if met:
+                    away, places = min(met, key=lambda each: float(np.median(each[0])))
+                    distances.append(away)
+                    spreads.append(float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=1))))
+    gathered = np.concatenate(distances) if distances else np.empty(0)
+    if len(gathered) < _FEWEST:
+        return Agreement(np.nan, np.nan)
+    return Agreement(float(np.median(gathered)), float(np.median(spreads)))
+
+
+def _rays(image: KeypointImage, rows: FloatArray, change: Change | None) -> tuple[FloatArray, FloatArray]:
+    """Origin (3,) and directions (K, 3) of one person's keypoints in the root frame; NaN where there is none."""
+    pixels = rows[:, :2]
+    if change is not None:
+        pixels = change(pixels, (image.camera.width, image.camera.height))
+    ahead = np.column_stack([image.camera.undistorted(pixels), np.ones(len(rows))])
+    ahead[rows[:, 2] < _CONFIDENT] = np.nan
+    with np.errstate(over="ignore", invalid="ignore"):  # keypoints of damaged files are any numbers
+        turned = ahead @ image.root_from_sensor[:3, :3].T
+        return image.root_from_sensor[:3, 3], turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+def _meeting(
+    left: tuple[FloatArray, FloatArray], right: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Distances (N,) of the rays of N keypoints that both cameras see, and the points (N, 3) halfway between them.
+
+    Where they would meet behind a camera, the distance is that of its center.
+    """
+    (a, along_a), (b, along_b) = left, right
+    cosine = np.einsum("ij,ij->i", along_a, along_b)
+    crossing = 1.0 - cosine**2
+    used = crossing > _PARALLEL**2
+    along_a, along_b, cosine, crossing = along_a[used], along_b[used], cosine[used], crossing[used]
+    base = b - a
+    on_a = np.maximum((along_a @ base - cosine * (along_b @ base)) / crossing, 0.0)
+    on_b = np.maximum((cosine * (along_a @ base) - along_b @ base) / crossing, 0.0)
+    place_a, place_b = a + on_a[:, None] * along_a, b + on_b[:, None] * along_b
+    return np.linalg.norm(place_a - place_b, axis=1), (place_a + place_b) / 2.0
+
+
+def _reading(instants: Sequence[Instant], *, sizes: Sequence[float]) -> tuple[Agreement, str] | None:
+    """Another reading of the keypoints with which the rays meet best, in words; None: with none they do."""
+    tried = [(agreement(instants, change), words) for words, change in readings(instants[0][0].camera, sizes)]
+    for order in _orders(instants[0]):
+        tried.append((agreement(_exchanged(instants, order)), _order_words(instants[0], order)))
+    tried = [(each, words) for each, words in tried if _human(each) and each.distance < RIGHT_M]
+    least = min((each.distance for each, _ in tried), default=np.inf)
+    return next((one for one in tried if one[0].distance < least + _ALIKE_M), None)
+
+
+def readings(camera: Camera, sizes: Sequence[float] = _USUAL) -> Iterator[tuple[str, Change]]:
+    """What keypoints could be of, in words, and the change to pixels of the calibrated pictures."""
+    for words, change in _TURNS.items():
+        yield f"they are {words}", change
+    for factor in sizes:
+        size = f"{round(camera.width / factor)}x{round(camera.height / factor)} pixels"
+        yield (
+            f"they are of pictures of about {size} ({1.0 / factor:.2g} times the calibrated size)",
+            partial(_resized, by=factor),
+        )
+
+
+def _resized(at: FloatArray, _: tuple[int, int], *, by: float) -> FloatArray:
+    return (at + 0.5) * by - 0.5
+
+
+def _human(found: Agreement) -> bool:
+    return _SPREADS_M[0] < found.spread < _SPREADS_M[1]
+
+
+def _unit(found: Agreement) -> str:
+    if _human(found):
+        return ""
+    for units, name in _UNITS.items():
+        scaled = Agreement(found.distance / units, found.spread / units)
+        if _human(scaled) and scaled.distance < RIGHT_M:
+            return f"the calibration is in {name}: in meters they meet within {_long(scaled.distance)}"
+    return ""
+
+
+def _orders(cameras: Instant) -> Iterator[tuple[int, ...]]:
+    """Other assignments of keypoints to cameras: all of up to four cameras, exchanges of two and shifts of more."""
+    count = len(cameras)
+    same = tuple(range(count))
+    if count <= 4:
+        yield from (order for order in permutations(same) if order != same)
+        return
+    yield from (same[shift:] + same[:shift] for shift in range(1, count))
+    for a, b in combinations(same, 2):
+        yield tuple(b if item == a else a if item == b else item for item in same)
+
+
+def _exchanged(instants: Sequence[Instant], order: tuple[int, ...]) -> list[Instant]:
+    """The instants with the people of image `order[i]` in camera i."""
+    return [
+        [replace(image, people=instant[other].people) for image, other in zip(instant, order, strict=True)]
+        for instant in instants
+    ]
+
+
+def _order_words(cameras: Instant, order: tuple[int, ...]) -> str:
+    pairs = [
+        f"{cameras[other].sensor}'s for {image.sensor}"
+        for image, other in zip(cameras, order, strict=True)
+        if image is not cameras[other]
+    ]
+    return f"they are of other cameras, {', '.join(pairs)}"
+
+
+def _outside(instants: Sequence[Instant]) -> float:
+    """Share of the confident keypoints that lie outside of their pictures."""
+    out = []
+    for image in (image for instant in instants for image in instant):
+        for rows in image.people:
+            size = np.array([image.camera.width, image.camera.height])
+            at = rows[rows[:, 2] >= _CONFIDENT, :2] / size
+            out.append(((at < -_OUTSIDE) | (at > 1.0 + _OUTSIDE)).any(axis=1))
+    gathered = np.concatenate(out) if out else np.empty(0)
+    return float(gathered.mean()) if len(gathered) else 0.0
+
+
+def _long(meters: float) -> str:
+    return f"{meters * 100:.1f} cm" if meters < 1.0 else f"{meters:.1f} m"
