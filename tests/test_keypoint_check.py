@@ -165,6 +165,20 @@ def test_a_missing_file_shifts_no_other(tmp_path):
     assert "of 12 are missing: cam0_json 0, cam1_json 1" in str(recording.info())
 
 
+def test_times_that_differ_between_cameras_are_taken_in_order(tmp_path):
+    folder = write_folder(tmp_path)
+    for number in range(3):
+        for file in (folder / "keypoints" / f"cam{number}_json").iterdir():
+            file.rename(
+                file.with_name(f"{1700000000000 + 33 * int(file.stem) ** 2 + 34 * int(file.stem) + number}.json")
+            )
+    recording = open_recording(folder)
+    assert across(recording) == [instant[0].people[0][11, 0] for instant in instants(12)]
+    assert "they are paired in their order" in str(recording.info())
+    with pytest.raises(RecordingError, match="cameras: expected some of cam_0"):
+        open_recording(folder, cameras=("cam_7",))
+
+
 @pytest.mark.parametrize(
     ("names", "folders", "lost"),
     [

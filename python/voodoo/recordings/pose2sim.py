@@ -37,6 +37,8 @@ SITES = {
 """Pose2Sim's marker names for BODY_25B (its neck is the upper neck) and our sites."""
 
 FRAME = "world"
+_MOST_MISSING = 1.5
+"""Numbers of all cameras' keypoint files, by those of the camera with most, above which they are no common image numbers."""
 
 
 class Pose2SimRecording(Recording):
@@ -92,7 +94,7 @@ class Pose2SimRecording(Recording):
                 f"{path}: expected folders keypoints/*_json with the names of cameras or as many as cameras "
                 f"({', '.join(one.name for one in placed)}), found {', '.join(folder.name for folder in folders) or 'none'}"
             )
-        names = [camera.name for camera in placed]
+        names = [placed[camera].name for camera, _ in pairs]
         unknown = sorted(set(cameras or ()) - set(names))
         if unknown or cameras == ():
             raise RecordingError(f"{path}: cameras: expected some of {', '.join(names)}, found {cameras}")
@@ -170,17 +172,19 @@ class Pose2SimRecording(Recording):
 def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:
     """The files of all cameras, image by image, and what should be said about their order.
 
-    Files with the same number belong together. They belong together in their order if names have no numbers, or if each camera
-    counts without gaps to the same number of images, but from different ones.
+    Files with the same number belong together. They belong together in their order if names have no numbers, if each camera
+    counts without gaps to the same number of images, but from different ones, or if few numbers are common (times).
 
     Raises:
-        RecordingError: no files, or another number of them for a camera and no numbers.
+        RecordingError: no files, or another number of them for a camera and no common numbers.
     """
     files = [in_order(list(folder.glob("*.json"))) for folder in folders]
     counts = {len(each) for each in files}
     numbered = [numbers_of(each) for each in files]
     numbers = [each for each in numbered if each is not None]
-    if counts == {0} or (len(counts) > 1 and len(numbers) < len(files)):
+    union = sorted({number for each in numbers for number in each})
+    common = len(numbers) == len(files) and len(union) <= _MOST_MISSING * max(counts, default=0)
+    if counts == {0} or (len(counts) > 1 and not common):
         raise RecordingError(
             f"{path}: expected as many keypoint files for every camera, or numbers in their names, found {sorted(counts)} files"
         )
@@ -192,16 +196,11 @@ def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | Non
         )
         return list(zip(*files, strict=True)), said
     gapless = all(max(each) - min(each) + 1 == len(each) for each in numbers if each)
-    if len(counts) == 1 and (gapless or all(each == numbers[0] for each in numbers)):
-        moved = len({each[0] for each in numbers}) > 1
-        said = (
-            ("the cameras' keypoint files begin with different numbers: they are paired in their order",)
-            if moved
-            else ()
-        )
+    if len(counts) == 1 and (gapless or not common or all(each == numbers[0] for each in numbers)):
+        differ = any(each != numbers[0] for each in numbers)
+        said = ("the cameras' keypoint files have different numbers: they are paired in their order",) if differ else ()
         return list(zip(*files, strict=True)), said
     of = [dict(zip(each, own, strict=True)) for each, own in zip(numbers, files, strict=True)]
-    union = sorted({number for each in numbers for number in each})
     lacking = ", ".join(f"{folder.name} {len(union) - len(own)}" for folder, own in zip(folders, files, strict=True))
     return [tuple(each.get(number) for each in of) for number in union], (
         f"keypoint files are paired by their numbers; of {len(union)} are missing: {lacking}",
