@@ -43,7 +43,6 @@ def test_trc_units_axes_and_missing_markers(tmp_path):
     [
         (("PathFileType", "Path"), "first line"),
         (("\tmm\t", "\tyd\t"), "Units"),
-        (("100\t100\t2", "100\t100\t3"), "3 frames"),
         (("4\t5\t6", "4\tfive\t6"), "line 7"),
         (("2\t0.01", "2\t0.00"), "rising"),
         (("\tB\t", "\tA\t"), "different"),
@@ -54,6 +53,63 @@ def test_damaged_trc_is_refused(tmp_path, change, message):
     path.write_text(TRC.replace(*change))
     with pytest.raises(RecordingError, match=message):
         read_markers(path)
+
+
+def in_spaces(text):
+    full = text.replace("1\t0.00\t1\t2\t3\t\t\t", "1\t0.00\t1\t2\t3\t4\t5\t6")
+    return "\n".join(" ".join(line.split()) for line in full.splitlines()).encode()
+
+
+@pytest.mark.parametrize(
+    "dress",
+    [
+        lambda text: b"\xef\xbb\xbf" + text.encode(),
+        lambda text: text.encode("utf-16"),
+        lambda text: text.replace("x.trc", "Müller.trc").encode("cp1252"),
+        lambda text: text.replace("\t", ",").encode(),
+        in_spaces,
+        lambda text: text.replace("0.01", "0,01").encode(),
+        lambda text: text.replace("\tmm\t", "\tMillimeters\t").encode(),
+        lambda text: text.replace("\tmm\t", "\tMM\t").encode(),
+    ],
+)
+def test_a_trc_in_other_dress_is_the_same(tmp_path, dress):
+    path = tmp_path / "x.trc"
+    path.write_bytes(dress(TRC))
+    markers = read_markers(path)
+    assert (markers.names, markers.rate_hz, markers.remarks) == (("A", "B"), 100.0, ())
+    np.testing.assert_allclose(markers.stamps, [0.0, 0.01])
+    np.testing.assert_allclose(markers.positions[1], [[0.001, 0.002, 0.003], [0.004, 0.005, 0.006]])
+
+
+def test_rows_that_are_missing_are_told(tmp_path):
+    path = write_rows(tmp_path / "x.trc", *walking([1, 2, 0]))
+    path.write_text(path.read_text().replace("50\t50\t3\t", "50\t50\t40\t"))
+    recording = open_recording(path)
+    assert len(recording) == 3
+    assert recording.assumed == ("x.trc: 3 frames, where its header says 40",)
+
+
+def test_one_subject_before_all_names_is_left_out_and_two_are_not(tmp_path):
+    names, rows = walking([1, 2, 0])
+    path = write_rows(tmp_path / "x.trc", [f"P01:{name}" for name in names], rows)
+    assert set(next(iter(open_recording(path))).measurements[0].positions) == set(names)
+    write_rows(path, [f"P0{index % 2}:{name}" for index, name in enumerate(names)], rows)
+    with pytest.raises(RecordingError, match=r"sites.*P00:l_shoulder.*--marker-map: \[sites\]"):
+        open_recording(path)
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+@pytest.mark.parametrize("units", ["m m m", "M  "])
+def test_a_c3d_may_write_its_unit_once_for_every_marker(tmp_path, units):
+    names, rows = walking([0, 1, 2])
+    writer = c3d.Writer(point_rate=50.0, point_units=units, gen_scale=-1.0)
+    writer.set_point_labels(names)
+    for row in rows:
+        writer.add_frames([(np.column_stack([row, np.zeros((len(row), 2))]), np.zeros((0, 1)))])
+    with (tmp_path / "x.c3d").open("wb") as file:
+        writer.write(file)
+    np.testing.assert_allclose(read_markers(tmp_path / "x.c3d").positions, rows, atol=1e-6)
 
 
 def walking(axes, zeros=()):

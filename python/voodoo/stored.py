@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 from pathlib import Path
@@ -55,7 +56,23 @@ def read_stored(
 def read_stored_text(
     path: Path, expected: str, *, most: int = MOST_TEXT, error: type[VoodooError] = RecordingError
 ) -> str:
-    """The text (UTF-8) of a file, see `check_stored`."""
+    """The text of a file, see `check_stored` and `text_of`."""
     content = read_stored(path, expected, most=most, error=error)
     with reading(path, expected, error=error):
-        return content.decode("utf-8")
+        return text_of(content)
+
+
+def text_of(content: bytes) -> str:
+    """Text in UTF-8 or UTF-16 with or without a byte order mark; else in Windows' Western code page.
+
+    Raises:
+        UnicodeDecodeError: it is no text.
+    """
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        if b"\0" in content:
+            raise
+        return content.decode("cp1252")

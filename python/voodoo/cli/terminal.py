@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from typing import Any
 
-_COMMANDS = re.compile(r"[^\n\t\x20-\x7e\xa0-\u2027\u202f-\u2065\u206a-\U0010ffff]")
+_COMMANDS = r"[^\n\t\x20-\x7e\xa0-\u2027\u202f-\u2065\u206a-\U0010ffff]"
 """Control characters, and those that reverse the direction of text or end a line."""
 
 
 def escaped(text: str) -> str:
     """The text with commands for a terminal written as in a Python string, e.g. \\x1b."""
-    return _COMMANDS.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
+    if text.replace("\n", "").replace("\t", "").isprintable():
+        return text  # and the pattern, which takes long to compile, is not needed
+    return re.sub(_COMMANDS, lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
 
 
 class Escaped:

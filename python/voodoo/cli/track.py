@@ -174,6 +174,10 @@ def track_command(
         options = topics_of(topic) | loader_options(recording, loader, **about)
         if background is not None:
             options["background"] = background
+        folders = [Path(word.partition("=")[2]) for word in keypoints or ()]
+        start = Path(init) if init else None
+        read = (recording, *others, *folders, body, config, detector, marker_map, background, start)
+        check_outputs([path for path in (*(out or ()), overlay, save) if path is not None], read)
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
@@ -195,12 +199,7 @@ def track_command(
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target)
-        folders = [Path(word.partition("=")[2]) for word in keypoints or ()]
-        read = (recording, *others, *folders, body, config, detector, marker_map, background)
-        check_outputs(
-            [path for path in (*targets, overlay, save) if path is not None],
-            [*read, Path(init) if init else None],
-        )
+        check_outputs([path for path in (*targets, overlay, save) if path is not None], read)
         if several:
             followed = body_of(body, height=height, model=model)
             everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)

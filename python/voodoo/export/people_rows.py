@@ -70,7 +70,7 @@ def read_rows(path: Path) -> PeopleRows:
         VoodooError: another header, an invalid cell, decreasing stamps, or two rows of a person at one stamp.
     """
     check_stored(path, "a result of voodoo track --people", most=MOST_RECORDED)
-    with reading(path, "a result of voodoo track --people"), path.open(newline="", encoding="utf-8") as file:
+    with reading(path, "a result of voodoo track --people"), path.open(newline="", encoding="utf-8-sig") as file:
         header, *rows = list(csv.reader(file)) or [[]]
     first = next((i for i, cell in enumerate(header) if cell.endswith("_rad")), len(header))
     names = tuple(cell.removesuffix("_x") for cell in header[4:first:3])
@@ -145,7 +145,7 @@ def is_people_file(path: Path) -> bool:
             return "persons" in content
     check_stored(path, "a result of voodoo track", most=MOST_RECORDED)
     try:
-        with path.open(encoding="utf-8") as file:
+        with path.open(encoding="utf-8-sig") as file:
             return file.readline().startswith(",".join(FIRST[:2]) + ",")
     except (OSError, UnicodeDecodeError):
         return False

@@ -278,7 +278,7 @@ class Track:
 
     @classmethod
     def _read_csv(cls, path: Path) -> Track:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             header, *rows = list(csv.reader(file)) or [[]]
         first = 3
         while first + 3 <= len(header) and header[first : first + 3] == [

@@ -12,11 +12,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING
 
 from voodoo.errors import MeasurementError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 _JOINT_SPREAD = {"shoulder": 0.03, "elbow": 0.02, "wrist": 0.02, "hip": 0.04, "knee": 0.02, "ankle": 0.02, "toe": 0.05}
 
@@ -168,6 +170,8 @@ def layout_by_shape(people: Sequence[npt.NDArray[np.float64]]) -> tuple[str | No
     It is told by the number of keypoints and, of two layouts with the same number, by whether the midpoints of one of them are
     in the middle. None: no layout has this number.
     """
+    import numpy as np  # not for the names of the layouts, which are in the help of every command
+
     people = [rows for rows in people if len(rows) == len(people[0])]
     names = [name for name, layout in LAYOUTS.items() if people and layout.count == len(people[0])]
     if len(names) < 2:
@@ -182,6 +186,8 @@ def layout_by_shape(people: Sequence[npt.NDArray[np.float64]]) -> tuple[str | No
 
 def _off_middle(rows: npt.NDArray[np.float64], midpoints: Sequence[tuple[int, int, int]]) -> float:
     """Greatest distance of the midpoints from the middle of their two keypoints, by the size of the person; NaN: not seen."""
+    import numpy as np
+
     seen = rows[:, 2] > 0.0
     used = np.array([each for each in midpoints if seen[list(each)].all()])
     if not len(used):

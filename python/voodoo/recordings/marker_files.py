@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from voodoo.errors import RecordingError
+from voodoo.errors import RecordingError, shortened
 from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.joint import short
@@ -102,6 +102,12 @@ class MarkerRecording(Recording):
             | {name: name for name in self.map.limbs}
         )
         sites, positions = content.of(names)
+        if not sites:
+            known = ", ".join(name for name in content.names if name)
+            raise RecordingError(
+                f"{path}: expected markers named like sites (l_wrist, ...), found {shortened(known)}; name their sites in a "
+                f'file for --marker-map: [sites] "{content.names[0]}" = "l_wrist", ...'
+            )
         self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
         unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
@@ -113,7 +119,7 @@ class MarkerRecording(Recording):
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
         self.start = None if bare else start
         self.reference = None
-        self.assumed = () if told else self._doubts(positions)
+        self.assumed = (*content.remarks, *(() if told else self._doubts(positions)))
 
     def _at(self, index: int) -> dict[str, FloatArray]:
         rows = zip(self._sites, self._positions[index], strict=True)

@@ -36,6 +36,7 @@ Z_UP_FROM: dict[str, FloatArray] = {
 """Axis of a file that points up -> rotation to z up."""
 
 _METERS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
+_SPELLED = {"milli": "mm", "centi": "cm", "deci": "dm", "": "m"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +49,7 @@ class MarkerTrajectories:
         positions: (F, M, 3) [m]; NaN = missing, as are empty cells and exact zeros of the file.
         rate_hz: nominal rate [Hz].
         up: the axis that points up, a key of Z_UP_FROM, if the file says so.
+        remarks: what is unusual about the file.
     """
 
     stamps: FloatArray
@@ -55,6 +57,7 @@ class MarkerTrajectories:
     positions: FloatArray
     rate_hz: float
     up: str | None = None
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Counts and rate."""
@@ -91,7 +94,8 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     """Read a .trc file (OpenSim, Motion Analysis).
 
     Args:
-        path: the file; tab separated, two header lines with values, two lines of column names, then frames.
+        path: the file: two header lines with values, two lines of column names, then frames, in columns that are separated by
+            tabs, commas or spaces. Between tabs, numbers may have decimal commas.
         world_from_file: (3, 3) rotation applied to every position, e.g. Z_UP_FROM_Y_UP; None keeps the file's axes.
 
     Raises:
@@ -103,25 +107,33 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     lines = read_stored_text(path, "a readable .trc file").splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise RecordingError(f"{path}: expected a .trc file (PathFileType ... in the first line), found another")
-    header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
+    separator = next((mark for mark in ("\t", ",") if mark in lines[1]), None)
+
+    def cells_of(line: str) -> list[str]:
+        cells = [cell.strip() for cell in line.split(separator)]
+        return [cell.replace(",", ".") for cell in cells] if separator == "\t" else cells
+
+    header = dict(zip(cells_of(lines[1]), cells_of(lines[2]), strict=False))
     try:
         rate, frames, markers = float(header["DataRate"]), int(header["NumFrames"]), int(header["NumMarkers"])
-        unit = _METERS[header["Units"].strip()]
+        unit = _meters(header["Units"])
     except (KeyError, ValueError) as error:
         raise RecordingError(
-            f"{path}, line 3: expected DataRate, NumFrames, NumMarkers and Units (m, cm, mm), found {header}"
+            f"{path}, line 3: expected DataRate, NumFrames, NumMarkers and Units (m, cm, mm), found "
+            f"{shortened(lines[2].strip())!r}"
         ) from error
     if not (rate > 0.0 and math.isfinite(rate)):
         raise RecordingError(f"{path}, line 3: expected a DataRate above zero, found {rate}")
-    names = tuple(cell for cell in lines[3].split("\t")[2:] if cell.strip())
+    names = tuple(cell for cell in (cell.strip() for cell in lines[3].split(separator)[2:]) if cell)
     if len(names) != markers or len(set(names)) != markers:
         raise RecordingError(f"{path}, line 4: expected {markers} different marker names, found {len(set(names))}")
     rows = [(number, line) for number, line in enumerate(lines[5:], start=6) if line.strip()]
-    if len(rows) != frames:
-        raise RecordingError(f"{path}: expected {frames} frames as its header says, found {len(rows)}")
-    table = np.full((frames, 2 + 3 * markers), np.nan)
+    if not rows:
+        raise RecordingError(f"{path}: expected {frames} frames as its header says, found none")
+    remarks = () if len(rows) == frames else (f"{path.name}: {len(rows)} frames, where its header says {frames}",)
+    table = np.full((len(rows), 2 + 3 * markers), np.nan)
     for row, (number, line) in zip(table, rows, strict=True):
-        cells = [cell.strip() for cell in line.split("\t")]
+        cells = cells_of(line)
         while len(cells) > len(row) and not cells[-1]:
             cells.pop()
         if len(cells) > len(row) or len(cells) < 2:
@@ -133,8 +145,27 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     stamps = table[:, 1].copy()
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any():
         raise RecordingError(f"{path}: expected rising times in the second column, found others")
-    positions = table[:, 2:].reshape(frames, markers, 3) * unit
-    return _trajectories(path, stamps, names, positions, rate, world_from_file)
+    positions = table[:, 2:].reshape(len(rows), markers, 3) * unit
+    return replace(_trajectories(path, stamps, names, positions, rate, world_from_file), remarks=remarks)
+
+
+def _meters(unit: str) -> float:
+    """Meters of a unit, as a symbol or spelled out, in any case.
+
+    Raises:
+        KeyError: an unknown unit.
+    """
+    word = unit.strip().lower()
+    for ending in ("meters", "metres", "meter", "metre"):
+        if word.endswith(ending):
+            return _METERS[_SPELLED[word.removesuffix(ending)]]
+    return _METERS[word]
+
+
+def _one_unit(written: str) -> str:
+    """The unit of all points, where it may be written once for each."""
+    words = {word.lower() for word in written.split()}
+    return words.pop() if len(words) == 1 else written.strip() or "mm"
 
 
 def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
@@ -157,7 +188,7 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         frames = [points[:, :5].astype(np.float64) for _, points, _ in reader.read_frames(copy=False)]
         names = tuple(str(name).strip() for name in reader.point_labels)
         written = reader.get("POINT:UNITS")
-        unit = "mm" if written is None else str(written.string_value).strip() or "mm"
+        unit = "mm" if written is None else _one_unit(str(written.string_value))
         rate, first = float(reader.point_rate), int(reader.first_frame)
         screen = reader.get("POINT:Y_SCREEN")
         up = "" if screen is None else str(screen.string_value).strip().upper()
@@ -192,4 +223,11 @@ def _trajectories(
         if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
             raise RecordingError(f"{path}: world_from_file: expected a (3, 3) rotation, found {turn.tolist()}")
         positions = positions @ turn.T
-    return MarkerTrajectories(stamps, names, positions, rate)
+    return MarkerTrajectories(stamps, _without_subject(names), positions, rate)
+
+
+def _without_subject(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names without the name of the subject before a colon, if all that have one have the same."""
+    subjects = {name.rpartition(":")[0] for name in names if ":" in name}
+    own = tuple(name.rpartition(":")[2] for name in names)
+    return own if len(subjects) == 1 and len(set(own)) == len(own) else names

@@ -72,7 +72,8 @@ class RosRecording(Recording):
         camera_info_topic: calibration of the depth image, by default `camera_info` beside it.
         root_frame: by default odom, else map, if base_link moves in it; else base_link, else world, if the transforms of
             the bag have it; else the frame of the first sensor.
-        meters_per_unit: of 16-bit depth images; None: the value in a bag of librealsense's recorder, else 0.001.
+        meters_per_unit: of depth images; None: of 16-bit ones the value in a bag of librealsense's recorder, else 0.001, and of
+            float ones 1.
         tf_max_age: maximum age of a changing transform [s].
         background: folder of images of the empty scene, instead of the one beside the bag.
         unpacked_gb: largest size of an unpacked archive, chunk or message [GB]; None: 2, and 200 times the size of the file.
@@ -125,6 +126,7 @@ class RosRecording(Recording):
         sources = finder.find(use)
         self._unused = finder.unused
         self._units = {s.topic: self._unit(s.topic, scale, given=meters_per_unit is not None) for s in sources}
+        self._float_unit = 1.0 if meters_per_unit is None else scale
         self._tree = TransformTree(path, max_age=max_age)
         self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
@@ -370,7 +372,7 @@ class RosRecording(Recording):
             raise RecordingError(f"{where}: expected a calibrated camera, found none")
         if source.kind == "depth":
             image = (compressed_depth_image if compressed else depth_image)(message, camera, where)
-            scale = self._units[source.topic] if image.dtype.kind == "u" else 1.0
+            scale = self._units[source.topic] if image.dtype.kind == "u" else self._float_unit
             return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
 
         decode = partial(color_image, message, camera, where, compressed=compressed)
