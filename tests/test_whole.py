@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 
 import voodoo
 from voodoo.cli import app
+from voodoo.evaluation.tables import write_sequences
 from voodoo.export.track import Track
-from voodoo.recordings import sample_path
+from voodoo.recordings import open_recording, sample_path
 from voodoo.whole import appearing_whole, check_outputs
 
 OUTPUTS = {"--out", "--overlay", "--save", "--report", "--record"}
@@ -151,3 +152,20 @@ def test_the_poses_of_a_session_are_kept_where_its_files_cannot_be_written(tmp_p
     assert done.exit_code != 0 and str(folder) in done.stderr
     parts = [Track.load(part) for part in sorted(folder.glob("*.npz"))]
     assert sum(len(part) for part in parts) > 0
+
+
+def test_a_recording_that_cannot_be_put_in_its_place_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr("voodoo.live.recorder.move_whole", full)
+    take = tmp_path / "take.mcap"
+    done = run(app, ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--record", str(take)])
+    (folder,) = tmp_path.iterdir()
+    assert done.exit_code == 1 and f"{take}: " in done.stderr and str(folder) in done.stderr
+    assert len(open_recording(folder / "take")) > 0
+
+
+def test_a_table_of_an_evaluation_that_fails_leaves_the_old_one(tmp_path):
+    table = tmp_path / "sequences.csv"
+    table.write_text("old")
+    with pytest.raises(OSError, match=r"sequences\.csv"):
+        write_sequences(table, (full() for _ in range(1)))
+    assert table.read_text() == "old"

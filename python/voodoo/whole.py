@@ -27,16 +27,25 @@ def appearing_whole(path: Path) -> Iterator[Path]:
     try:
         place = folder / path.name
         yield place
-        for written in (place, *place.rglob("*")) if place.is_dir() else (place,):
-            _sync(written)
-        os.replace(place, path)  # noqa: PTH105 - the replacement must be atomic
-        _sync(path.parent)
+        move_whole(place, path)
     except OSError as error:
         if error.errno is None:
             raise
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def move_whole(place: Path, path: Path) -> None:
+    """Give a complete file or folder its name, once it is on the disk; if that fails, it stays where it is.
+
+    Raises:
+        OSError: it cannot be moved, or is on another file system.
+    """
+    for written in (place, *place.rglob("*")) if place.is_dir() else (place,):
+        _sync(written)
+    os.replace(place, path)  # noqa: PTH105 - the replacement must be atomic
+    _sync(path.parent)
 
 
 def _sync(path: Path) -> None:

@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from voodoo.evaluation.people import ABSENT_S, IN_VIEW, JOINTS_IN_VIEW, MATCH_M, PeopleScore, together
+from voodoo.whole import appearing_whole
 
 _HEADER = (
     "recording",
@@ -53,12 +54,13 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     table, text = folder / "people.csv", folder / "people.md"
     names = [item.name for item in fields(PeopleScore)]
-    with table.open("w", newline="", encoding="utf-8") as file:
+    with appearing_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*names, *_DERIVED])
         for score in scores:
             writer.writerow([_cell(getattr(score, name)) for name in (*names, *_DERIVED)])
-    text.write_text(people_markdown(scores), encoding="utf-8")
+    with appearing_whole(text) as part:
+        part.write_text(people_markdown(scores), encoding="utf-8")
     return [table, text]
 
 

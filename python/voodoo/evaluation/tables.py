@@ -10,13 +10,14 @@ from pathlib import Path
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import FrameTable, Score
 from voodoo.evaluation.summary import MEANS, SUMMARY, TOGETHER, Summary
+from voodoo.whole import appearing_whole
 
 
 def write_sequences(path: Path, scores: Sequence[Score]) -> None:
     """A row for each recording."""
     header = ["name", "failure", "frames", "exact", "tracking_class", "best_lag", *MEANS, *TOGETHER.values()]
     header += [f"error_{name}_m" for name in metrics.JOINTS] + ["selection", "lost_joints", "path"]
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         for score in scores:
@@ -29,7 +30,7 @@ def write_sequences(path: Path, scores: Sequence[Score]) -> None:
 
 def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
     """A row for each kind of comparison."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["kind", "sequences", "failures", "class_0", "class_1", "class_2", "class_average", *SUMMARY])
         for item in summaries:
@@ -41,7 +42,7 @@ def write_frames(path: Path, table: FrameTable) -> None:
     """A row for each frame of a recording."""
     header = ["stamp_s", "status", "mean_error_m", *(f"{name}_error_m" for name in metrics.JOINTS)]
     header += ["lost_joints", "depth_within_5cm", "silhouette_iou", "step_s"]
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         for index, stamp in enumerate(table.stamps):

@@ -21,6 +21,7 @@ from voodoo.live.session import Output
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
 from voodoo.model.rotations import quaternions
+from voodoo.whole import move_whole
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
@@ -111,12 +112,19 @@ class Recorder(Output):
         self._writer.write(self._topics[topic], self._at, cdr(message))
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the file.
+
+        Raises:
+            VoodooError: it cannot be written; names the folder in which the recording is kept then.
+        """
         try:
             self._writer.close()
-            shutil.move(next((self._folder / self._path.stem).glob("*.mcap")), self._path)
-        finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            move_whole(next((self._folder / self._path.stem).glob("*.mcap")), self._path)
+        except OSError as error:
+            raise VoodooError(
+                f"{self._path}: {error.strerror or error}; what was recorded is in {self._folder}"
+            ) from error
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
