@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -102,12 +102,6 @@ class MarkerRecording(Recording):
             | {name: name for name in self.map.limbs}
         )
         sites, positions = content.of(names)
-        if not sites:
-            known = ", ".join(name for name in content.names if name)
-            raise RecordingError(
-                f"{path}: expected markers named like sites (l_wrist, ...), found {shortened(known)}; name their sites in a "
-                f'file for --marker-map: [sites] "{content.names[0]}" = "l_wrist", ...'
-            )
         self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
         unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
@@ -117,13 +111,20 @@ class MarkerRecording(Recording):
             raise RecordingError(f"{path}: expected one marker for each site, found {', '.join(sorted(sites))}")
         first = {name: at for name, at in self._at(0).items() if name not in self.map.limbs}
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
-        self.start = None if bare else start
+        self.start = None if bare or not first else start
         self.reference = None
-        self.assumed = (*content.remarks, *(() if told else self._doubts(positions)))
+        self.assumed = (*content.remarks, *self._unnamed(content.names), *(() if told else self._doubts(positions)))
 
     def _at(self, index: int) -> dict[str, FloatArray]:
         rows = zip(self._sites, self._positions[index], strict=True)
         return {site: position for site, position in rows if np.isfinite(position).all()}
+
+    def _unnamed(self, names: Sequence[str]) -> tuple[str, ...]:
+        """What to do if no marker stands for a site."""
+        if self._sites or not names:
+            return ()
+        words = f"no marker is named like a site (l_wrist, ...): {shortened(', '.join(names))}"
+        return (f'{self.path.name}: {words}; name their sites for --marker-map: [sites] "{names[0]}" = "l_wrist", ...',)
 
     def _doubts(self, positions: FloatArray) -> tuple[str, ...]:
         """What speaks against the axis that is taken for up."""
@@ -139,7 +140,13 @@ class MarkerRecording(Recording):
         return len(self._stamps)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
-        """The markers, instant by instant."""
+        """The markers, instant by instant.
+
+        Raises:
+            RecordingError: no marker stands for a site.
+        """
+        if not self._sites:
+            raise RecordingError(f"{self.path.name}: expected markers of the body, found none")
         for index, stamp in enumerate(self._stamps):
             item = MarkerSet(self.path.name, float(stamp), self._at(index), self.map.sigma_m)
             yield RecordedFrame(float(stamp), (item,))
