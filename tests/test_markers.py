@@ -97,7 +97,7 @@ def test_one_subject_before_all_names_is_left_out_and_two_are_not(tmp_path):
     write_rows(path, [f"P0{index % 2}:{name}" for index, name in enumerate(names)], rows)
     (said,) = open_recording(path).assumed
     assert "no marker is named like a site" in said and "P00:l_shoulder" in said and "--marker-map: [sites]" in said
-    assert CliRunner().invoke(app, ["track", str(path)]).exit_code == 1
+    assert CliRunner().invoke(app, ["track", str(path), "--out", str(tmp_path / "pose.csv")]).exit_code == 1
 
 
 @pytest.mark.filterwarnings("ignore:No analog data")
