@@ -115,7 +115,8 @@ def live_command(
         several, limit = limit_of(people)
         for target in out or ():
             check_target(target)
-        read = (*map(Path, sources), body, config, detector, Path(init) if init else None)
+        given = (Path(source.removeprefix("grow:")) for source in sources)
+        read = (*given, *(calibration or ()), body, config, detector, Path(init) if init else None)
         check_outputs([path for path in (*(out or ()), record, report) if path is not None], read)
         wishes = Wishes(
             beginning=no_starts(init) if several else beginning_of(init),
