@@ -105,6 +105,13 @@ def reading(source: object, expected: str, *, error: type[VoodooError] = Recordi
         raise error(f"{source}: expected {expected}, found damage: {type(cause).__name__}: {found}") from cause
 
 
+def reason(error: Exception) -> str:
+    """An error as words, which name its file."""
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
 def shortened(text: str, *, most: int = 300) -> str:
     """Shortened text for a message, since content of a file may have megabytes."""
     return text if len(text) <= most else text[: most - 3] + "..."

@@ -18,6 +18,7 @@ from voodoo.cli.evaluate import eval_command
 from voodoo.cli.ik import ik_command
 from voodoo.cli.init import init_command
 from voodoo.cli.live import live_command
+from voodoo.cli.paths import Checked
 from voodoo.cli.show import body_command, config_command, info_command
 from voodoo.cli.terminal import Escaped
 from voodoo.cli.track import track_command
@@ -65,13 +66,13 @@ def voodoo_command(
 
 
 # In the order of `voodoo --help`.
-app.command("track", short_help="Track the body through a recording: a row a frame.")(track_command)
-app.command("live", short_help="Track what a camera, ROS 2 or a played recording measures.")(live_command)
-app.command("demo", short_help="Track the bundled recording and draw what is found.")(demo_command)
-app.command("init", short_help="Find the first pose and write it, to edit and give back.")(init_command)
-app.command("ik", short_help="Find postures from a few known sites and silhouettes.")(ik_command)
-app.command("eval", short_help="Measure the tracker on recordings with a truth.")(eval_command)
-app.command("batch", short_help="Track a thousand recordings, one task each.")(batch_command)
-app.command("info", short_help="Say what is in a recording.")(info_command)
-app.command("config", short_help="Print the default configuration as commented TOML.")(config_command)
-app.command("body", short_help="Print a body as TOML: the default human, or a file.")(body_command)
+app.command("track", cls=Checked, short_help="Track the body through a recording: a row a frame.")(track_command)
+app.command("live", cls=Checked, short_help="Track what a camera, ROS 2 or a played recording measures.")(live_command)
+app.command("demo", cls=Checked, short_help="Track the bundled recording and draw what is found.")(demo_command)
+app.command("init", cls=Checked, short_help="Find the first pose and write it, to edit and give back.")(init_command)
+app.command("ik", cls=Checked, short_help="Find postures from a few known sites and silhouettes.")(ik_command)
+app.command("eval", cls=Checked, short_help="Measure the tracker on recordings with a truth.")(eval_command)
+app.command("batch", cls=Checked, short_help="Track a thousand recordings, one task each.")(batch_command)
+app.command("info", cls=Checked, short_help="Say what is in a recording.")(info_command)
+app.command("config", cls=Checked, short_help="Print the default configuration as commented TOML.")(config_command)
+app.command("body", cls=Checked, short_help="Print a body as TOML: the default human, or a file.")(body_command)

@@ -60,7 +60,7 @@ def batch_command(
     """
     from voodoo._core import __version__
     from voodoo.batch.run import Batch, run
-    from voodoo.batch.storage import find_sources, local_path
+    from voodoo.batch.storage import find_sources, is_local, local_path
     from voodoo.batch.summary import DONE, FAILED
     from voodoo.batch.task import Settings
     from voodoo.cli.people import limit_of
@@ -68,6 +68,7 @@ def batch_command(
     from voodoo.config import Config
     from voodoo.errors import VoodooError
     from voodoo.pipeline.start import AUTO
+    from voodoo.whole import check_outputs
 
     with clear_errors():
         if init not in (None, AUTO):
@@ -85,6 +86,8 @@ def batch_command(
             version=__version__,
         )
         sources = find_sources(recordings, only=only or ())
+        if is_local(out):
+            check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
         batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings)
         before = len(sources) - len(batch.jobs)
         interrupted = False

@@ -13,7 +13,7 @@ import typer
 
 from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.cli.terminal import Escaped
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reason
 
 if TYPE_CHECKING:
     from voodoo.export.track import Track
@@ -90,13 +90,6 @@ def refuse_missing(failures: Iterable[Exception | None], done: str) -> None:
         raise VoodooError(f"not written: {'; '.join(map(reason, found))}. {done}")
 
 
-def reason(error: Exception) -> str:
-    """An error as words, which name its file."""
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
-
-
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     """Show a progress bar on stderr, if it is a terminal."""
     from rich.console import Console
@@ -148,7 +141,7 @@ def clear_errors() -> Iterator[None]:
     except MemoryError:
         _fail("expected enough memory for this recording, found too little")
     except OSError as error:
-        _fail(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
+        _fail(reason(error))
 
 
 def print_message(message: str) -> None:

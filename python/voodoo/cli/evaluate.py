@@ -79,7 +79,7 @@ def eval_command(
         config_of(config)  # an invalid file is one error here instead of one per recording
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
-            check_outputs([out], (*paths, config, result))
+            check_outputs([out], paths)
         if result is not None:
             show_people([judged(paths, result, loader, frame)], out)
             return

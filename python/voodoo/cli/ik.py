@@ -30,10 +30,12 @@ from voodoo.cli.options import (
     RecordingArgument,
     TopicOption,
 )
+from voodoo.cli.paths import check_paths
 from voodoo.errors import VoodooError
 
 
 def ik_command(
+    context: typer.Context,
     recording: RecordingArgument,
     targets: Annotated[
         Path | None,
@@ -94,7 +96,6 @@ def ik_command(
     from voodoo.model.body import Body
     from voodoo.pipeline.ik import Positions, follow
     from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
-    from voodoo.whole import check_outputs
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
@@ -103,7 +104,8 @@ def ik_command(
         files = out or [Path(f"{source.name}_ik.csv")]
         for file in files:
             check_target(file)
-        check_outputs(files, (recording, targets, body, Path(init) if init else None))
+        if not out:
+            check_paths(context, files)
         positions = Positions.of(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(
             source,
@@ -122,8 +124,8 @@ def ik_command(
         result, errors = follow(source, tracker, positions, **how)
 
         def write(path: Path) -> list[Path]:
-            how: Any = {"root_frame": source.root_frame, "optical": source.info().camera_root}
-            export(result, path, body=tracker.body, **how)
+            optical = source.info().camera_root
+            export(result, path, body=tracker.body, root_frame=source.root_frame, optical=optical)
             return [path]
 
         done, failed = written(files, write)

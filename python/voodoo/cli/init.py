@@ -64,13 +64,11 @@ def init_command(
     from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
     from voodoo.recordings.left_out import LeftOut
     from voodoo.sensors.settings import FrontEndSettings
-    from voodoo.whole import appearing_whole, check_outputs
+    from voodoo.whole import appearing_whole
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         kinds, boxes = kinds_of(use), boxes_of(exclude)
-        if out is not None:
-            check_outputs([out], (recording, body, config))
         left_out = LeftOut()
         options = topics_of(topic) | numbers_of(option)
         source = opened(recording, loader, frame, bare=True, left_out=left_out, **options)

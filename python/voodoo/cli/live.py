@@ -107,7 +107,6 @@ def live_command(
     from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
     from voodoo.export.files import check_target
     from voodoo.pipeline.start import beginning_of
-    from voodoo.whole import check_outputs
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
@@ -115,9 +114,6 @@ def live_command(
         several, limit = limit_of(people)
         for target in out or ():
             check_target(target)
-        given = (Path(source.removeprefix("grow:")) for source in sources)
-        read = (*given, *(calibration or ()), body, config, detector, Path(init) if init else None)
-        check_outputs([path for path in (*(out or ()), record, report) if path is not None], read)
         wishes = Wishes(
             beginning=no_starts(init) if several else beginning_of(init),
             body=body,

@@ -40,6 +40,7 @@ from voodoo.cli.options import (
     UseOption,
     ViewOption,
 )
+from voodoo.cli.paths import check_paths
 
 if TYPE_CHECKING:
     from voodoo.export.track import Track
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 
 
 def track_command(
+    context: typer.Context,
     recording: RecordingArgument,
     init: InitOption = None,
     body: BodyOption = None,
@@ -157,7 +159,6 @@ def track_command(
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.sensors.settings import FrontEndSettings
-    from voodoo.whole import check_outputs
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
@@ -174,10 +175,6 @@ def track_command(
         options = topics_of(topic) | loader_options(recording, loader, **about)
         if background is not None:
             options["background"] = background
-        folders = [Path(word.partition("=")[2]) for word in keypoints or ()]
-        start = Path(init) if init else None
-        read = (recording, *others, *folders, body, config, detector, marker_map, background, start)
-        check_outputs([path for path in (*(out or ()), overlay, save) if path is not None], read)
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
@@ -199,7 +196,8 @@ def track_command(
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target)
-        check_outputs([path for path in (*targets, overlay, save) if path is not None], read)
+        if not out:
+            check_paths(context, targets)
         if several:
             followed = body_of(body, height=height, model=model)
             everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)

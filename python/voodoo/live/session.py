@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reason
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.follow import Follower, Step, without_damaged
 from voodoo.live.latencies import Latencies
@@ -77,7 +77,7 @@ class _Lane:
             try:
                 output.close()
             except (VoodooError, OSError) as error:
-                self.error = self.error or error
+                self.error = _together([self.error, error])
 
 
 class Session:
@@ -174,10 +174,10 @@ class Session:
         return self.running
 
     def _raise(self) -> None:
-        for error in (self._error, *(lane.error for lane in self._lanes)):
-            if error is not None:
-                self.live.stop()
-                raise error
+        error = _together([self._error, *(lane.error for lane in self._lanes)])
+        if error is not None:
+            self.live.stop()
+            raise error
 
     def finish(self) -> None:
         """Stop, publish all pending steps, and finish files.
@@ -261,6 +261,15 @@ class Session:
         if any(source.get("kind") == "recording" for source in self.live.about()):
             return "when the frame was due"
         return "the stamp" if self.live.by_host_clock else "the fastest arrival: stamps are by another clock"
+
+
+def _together(errors: Sequence[BaseException | None]) -> BaseException | None:
+    """The only error, or one that tells all of them; None without any."""
+    found = [error for error in errors if error is not None]
+    expected = [error for error in found if isinstance(error, VoodooError | OSError)]
+    if len(found) < 2 or len(expected) < len(found):
+        return next((error for error in found if error not in expected), next(iter(found), None))
+    return VoodooError("; ".join(map(reason, expected)))
 
 
 def _milliseconds(latencies: Latencies) -> dict[str, float | None]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reason
 from voodoo.export.files import check_target, save, written
 from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
@@ -62,13 +62,15 @@ class Files(Output):
             self._put_away()
 
     def _put_away(self) -> None:
-        path = self._folder / f"{self._parts:08d}.npz"
-        if self._several:
-            PeopleTrack.of([step.people for step in self._steps], bodies=self._bodies).save(path)
-        else:
-            Track.of([step.estimates[ONE] for step in self._steps], body=self._bodies[ONE]).save(path)
+        self._part().save(self._folder / f"{self._parts:08d}.npz")
         self._parts += 1
         self._steps.clear()
+
+    def _part(self) -> Track | PeopleTrack:
+        """The steps that are in memory."""
+        if self._several:
+            return PeopleTrack.of([step.people for step in self._steps], bodies=self._bodies)
+        return Track.of([step.estimates[ONE] for step in self._steps], body=self._bodies[ONE])
 
     def close(self) -> None:
         """Write the files. The temporary folder goes only when all of them are written.
@@ -76,19 +78,19 @@ class Files(Output):
         Raises:
             VoodooError: there were no frames, or a file cannot be written; names the folder that is kept then.
         """
-        if self._steps:
-            self._put_away()
-        parts = sorted(self._folder.glob("*.npz"))
+        kind = PeopleTrack if self._several else Track
+        parts = [kind.load(part) for part in sorted(self._folder.glob("*.npz"))]
+        parts += [self._part()] if self._steps else []
         if not parts:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise VoodooError("expected at least one frame to write, found none")
         if self._several:
-            everybody = _joined_people([PeopleTrack.load(part) for part in parts])
+            everybody = _joined_people([part for part in parts if isinstance(part, PeopleTrack)])
 
             def write(path: Path) -> list[Path]:
                 return save_people(everybody, path, bodies=self._bodies, root_frame=self._root())
         else:
-            track = Track.joined([Track.load(part) for part in parts])
+            track = Track.joined([part for part in parts if isinstance(part, Track)])
 
             def write(path: Path) -> list[Path]:
                 save(track, path, body=self._bodies[ONE], root_frame=self._root())
@@ -96,7 +98,13 @@ class Files(Output):
 
         self.written, failed = written(self._paths, write)
         if failed:
-            raise VoodooError(f"{'; '.join(map(str, failed))}; all poses are kept in {self._folder}") from failed[0]
+            kept = f"the poses are kept in {self._folder}"
+            try:
+                if self._steps:
+                    self._put_away()
+            except OSError:
+                kept += f", without the last {len(self._steps)}"
+            raise VoodooError(f"{'; '.join(map(reason, failed))}; {kept}") from failed[0]
         shutil.rmtree(self._folder, ignore_errors=True)
 
 

@@ -13,6 +13,7 @@ from voodoo._core import Estimate
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView
+from voodoo.model.standing import is_optical
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
@@ -44,7 +45,7 @@ class Overlay:
     def __init__(self, recording: Recording) -> None:
         """Find the cameras in the first frames, because every image of a video has the same size."""
         self._frames = len(recording)
-        self._axes: Axes = "optical" if recording.root_frame.endswith("optical_frame") else "rep103"
+        self._axes: Axes = "optical" if is_optical(recording.root_frame) else "rep103"
         self._range: tuple[float, float] | None = None
         self._origin: float | None = None
         # Center of the view from above until a person is found.

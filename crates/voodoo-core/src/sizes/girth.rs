@@ -73,9 +73,8 @@ pub(super) struct GirthPrior {
 }
 
 impl GirthPrior {
-    /// The prior of a limb whose counterpart on the other side has the girth `counterpart`; `None` for a limb without one.
-    ///
-    /// Both limbs have the standard deviation `GIRTH_SIGMA` and the correlation `SYMMETRY`.
+    /// The prior of a limb given what was measured of its counterpart on the other side, if it has one. Both limbs have the standard
+    /// deviation `GIRTH_SIGMA` and the correlation `SYMMETRY`. `None` if the measurements are no numbers.
     pub(super) fn given(counterpart: Option<&Girth>) -> Option<Self> {
         let alone = Self { mean: Vector3::zeros(), information: Matrix3::identity() / (GIRTH_SIGMA * GIRTH_SIGMA) };
         let Some(counterpart) = counterpart else { return Some(alone) };

@@ -1,0 +1,61 @@
+"""What a command reads and writes, by its options."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+from voodoo.cli.common import clear_errors
+
+OUTPUTS = {"out", "overlay", "save", "report", "record"}
+"""Parameters of commands that name what is written; all others with a metavar of files are read."""
+SEARCHED = "RECORDING..."
+"""Metavar of folders in which recordings are searched for: the command checks the recordings that it finds."""
+_FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
+
+
+class Checked(TyperCommand):
+    """A command that begins only if nothing it writes is in the place of what it reads."""
+
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - Typer brings its own Click, or uses the installed one
+        """Check the options, then run the command."""
+        with clear_errors():
+            check_paths(ctx)
+        return super().invoke(ctx)
+
+
+def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
+    """Reject outputs of a command that would replace its inputs or each other.
+
+    Args:
+        context: of the command.
+        default: outputs that no option names.
+
+    Raises:
+        VoodooError: see `voodoo.whole.check_outputs`.
+    """
+    from voodoo.whole import check_outputs
+
+    outputs, inputs = list(default), []
+    for option in context.command.params:
+        if option.name is not None and option.metavar != SEARCHED and _FILES.search(option.metavar or ""):
+            words = list(_words(context.params.get(option.name)))
+            if option.name in OUTPUTS:
+                outputs += [Path(word) for word in words if "://" not in word]
+            else:
+                # Also the path in SENSOR=DIR and KIND:SOURCE.
+                inputs += [Path(part) for word in words for part in (word, *re.split("[=:]", word, maxsplit=1)[1:])]
+    check_outputs(outputs, inputs)
+
+
+def _words(value: object) -> Iterator[str]:
+    if isinstance(value, list | tuple):
+        for each in value:
+            yield from _words(each)
+    elif value is not None:
+        yield str(value)
