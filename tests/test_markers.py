@@ -61,7 +61,7 @@ def in_spaces(text):
 
 
 @pytest.mark.parametrize(
-    "dress",
+    "encode",
     [
         lambda text: b"\xef\xbb\xbf" + text.encode(),
         lambda text: text.encode("utf-16"),
@@ -73,9 +73,9 @@ def in_spaces(text):
         lambda text: text.replace("\tmm\t", "\tMM\t").encode(),
     ],
 )
-def test_a_trc_in_other_dress_is_the_same(tmp_path, dress):
+def test_other_encodings_separators_and_units_of_a_trc_are_read(tmp_path, encode):
     path = tmp_path / "x.trc"
-    path.write_bytes(dress(TRC))
+    path.write_bytes(encode(TRC))
     markers = read_markers(path)
     assert (markers.names, markers.rate_hz, markers.remarks) == (("A", "B"), 100.0, ())
     np.testing.assert_allclose(markers.stamps, [0.0, 0.01])

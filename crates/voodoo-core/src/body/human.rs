@@ -96,7 +96,7 @@ const ANSUR: Build = Build {
     arm: 0.0,
     skull: [0.0, 0.008, 0.0],
 };
-/// The mean of 120 bodies with 9 mm of clothes (MakeHuman, CC0), as printed by `scripts/calibrate_human`.
+/// The mean of 120 bodies (MakeHuman, CC0; `scripts/calibrate_human` prints it), 9 mm thicker for clothes.
 const MEASURED: Build = Build {
     pelvis: Surface { offsets: [[0.012, 0.0], [0.012, 0.0]], axes: [0.077, 0.116, 0.063, 0.094] },
     thorax: Surface { offsets: [[0.030, 0.0], [0.009, 0.0]], axes: [0.062, 0.104, 0.080, 0.104] },
