@@ -1,10 +1,8 @@
 //! Girths from the edges of color regions, where no depth is available.
 
-use nalgebra::{Matrix2, SMatrix, SVector};
+use nalgebra::Matrix3;
 
-use super::girth::{
-    ALIKE, GIRTH_SIGMA, GIRTH_STEPS, GirthFit, REMEMBERED, SHIFT_SIGMA, TIP_FACTORS, girth_row, kernel,
-};
+use super::girth::{GIRTH_STEPS, Girth, GirthPrior, GirthSystem, TIP_FACTORS, kernel};
 use crate::association::correspondence::RegionPair;
 use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
@@ -23,115 +21,50 @@ const TIP_SIGMA: f64 = 0.03;
 /// Prior relative standard deviation of a limb's length where the lengths of the others are known.
 const PROPORTION_SIGMA: f64 = 0.05;
 
-/// Estimate of the surface of one limb: shift and girth.
-#[derive(Clone, Copy, Debug)]
-struct ColorGirth {
-    information: SMatrix<f64, 5, 5>,
-    total: GirthFit,
-}
-
-impl Default for ColorGirth {
-    fn default() -> Self {
-        let sigmas = SVector::from([SHIFT_SIGMA, SHIFT_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA, GIRTH_SIGMA]);
-        Self {
-            information: SMatrix::from_diagonal(&sigmas.map(|sigma: f64| 1.0 / (sigma * sigma))),
-            total: GirthFit::default(),
-        }
-    }
-}
-
 /// Returns the weight of an edge.
 fn weight(pair: &RegionPair) -> f64 {
     kernel(pair.distance) * pair.information / LINES_ALIKE
 }
 
-/// Normal equations for shift and girth of a limb.
-struct GirthSystem {
-    h: SMatrix<f64, 5, 5>,
-    g: SVector<f64, 5>,
-}
-
-/// Returns the normal equations of a limb's edges; `None` without edges.
-fn girth_system<'a>(
+/// Returns the normal equations of a limb's edges.
+fn system<'a>(
     shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     pairs: impl Iterator<Item = &'a RegionPair>,
-) -> Option<GirthSystem> {
-    let (mut h, mut g) = (SMatrix::zeros(), SVector::zeros());
+) -> GirthSystem {
+    let mut system = GirthSystem::default();
     for pair in pairs {
         let foot = working_from_limb.inverse_transform_point(pair.x);
         let n = working_from_limb.inverse_transform_vector(pair.normal);
-        let girth = girth_row(shape, foot, n);
-        let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
-        let weight = weight(pair);
-        h += weight * row * row.transpose();
-        g += weight * pair.distance * row;
+        system.add(shape, foot, n, pair.distance, weight(pair));
     }
-    (h.trace() > 0.0).then_some(GirthSystem { h, g })
+    system
 }
 
-impl ColorGirth {
-    /// Fits the surface of a limb whose pose is known to its edges in the first frame: one Gauss-Newton step, with a prior that
-    /// pulls the changes made so far towards zero.
-    fn start(&mut self, GirthSystem { h, g }: &GirthSystem) -> Option<GirthFit> {
-        let [e0, e1, e2] = self.total.factors.map(|factor| factor - 1.0);
-        let so_far = SVector::from([self.total.shift.x, self.total.shift.y, e0, e1, e2]);
-        self.take((h + self.information).cholesky()?.solve(&(g - self.information * so_far)))
-    }
-
-    /// Returns the factor by which a limb with a free distal end is longer, from the edges along the rim of that end.
-    fn tip<'a>(
-        &self,
-        shape: &TaperedEllipticCylinder,
-        working_from_limb: &Pose,
-        pairs: impl Iterator<Item = &'a RegionPair>,
-    ) -> f64 {
-        let (mut h, mut g) = (1.0 / (TIP_SIGMA * TIP_SIGMA), 0.0);
-        for pair in pairs {
-            let foot = working_from_limb.inverse_transform_point(pair.x);
-            let along = working_from_limb.inverse_transform_vector(pair.normal).z;
-            if foot.z < shape.length() * 0.999 {
-                continue;
-            }
-            let weight = weight(pair);
-            h += weight * along * along;
-            g += weight * along * pair.distance;
+/// Returns the factor by which a limb with a free distal end is longer, from the edges along the rim of that end.
+fn tip<'a>(
+    shape: &TaperedEllipticCylinder,
+    working_from_limb: &Pose,
+    pairs: impl Iterator<Item = &'a RegionPair>,
+) -> f64 {
+    let (mut h, mut g) = (1.0 / (TIP_SIGMA * TIP_SIGMA), 0.0);
+    for pair in pairs {
+        let foot = working_from_limb.inverse_transform_point(pair.x);
+        let along = working_from_limb.inverse_transform_vector(pair.normal).z;
+        if foot.z < shape.length() * 0.999 {
+            continue;
         }
-        1.0 + g / (h * shape.length())
+        let weight = weight(pair);
+        h += weight * along * along;
+        g += weight * along * pair.distance;
     }
-
-    /// Updates the girth of a tracked limb. The lateral offset of its axis in this frame is eliminated, and the shift of the
-    /// surface relative to the joints is kept.
-    fn follow(&mut self, GirthSystem { h, g }: &GirthSystem) -> Option<GirthFit> {
-        let alike = ALIKE / f64::from(GIRTHS_EVERY);
-        let (h, g) = (h / alike, g / alike);
-        let aside = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() / (AXIS_SIGMA * AXIS_SIGMA * alike);
-        let mixed = h.fixed_view::<3, 2>(2, 0);
-        let inverse = aside.try_inverse()?;
-        let own = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
-        let pull = g.fixed_rows::<3>(2) - mixed * inverse * g.fixed_rows::<2>(0);
-        let mut information = self.information.fixed_view::<3, 3>(2, 2) * (1.0 - f64::from(GIRTHS_EVERY) / REMEMBERED);
-        information += own;
-        let step = information.cholesky()?.solve(&pull);
-        self.information.fixed_view_mut::<3, 3>(2, 2).copy_from(&information);
-        self.take(SVector::from([0.0, 0.0, step[0], step[1], step[2]]))
-    }
-
-    fn take(&mut self, step: SVector<f64, 5>) -> Option<GirthFit> {
-        if !step.iter().all(|value| value.is_finite()) {
-            return None;
-        }
-        let factors = [2, 3, 4].map(|index: usize| 1.0 + step[index]);
-        let (total, done) = self.total.followed_by(&GirthFit { shift: Vec3::new(step[0], step[1], 0.0), factors });
-        self.total = total;
-        Some(done)
-    }
+    1.0 + g / (h * shape.length())
 }
 
 /// Estimates of the surfaces of all limbs; empty where depth determines them.
 #[derive(Debug, Default)]
 pub(super) struct ColorGirths {
-    limbs: Vec<ColorGirth>,
+    limbs: Vec<Girth>,
     /// Frames since the last girth update.
     frames: u32,
 }
@@ -147,21 +80,23 @@ impl ColorGirths {
         if !setting.observation.candidates.is_empty() || setting.observation.frame().colors.is_empty() {
             return;
         }
-        (self.limbs, self.frames) = (vec![ColorGirth::default(); poses.len()], 0);
+        (self.limbs, self.frames) = (vec![Girth::default(); poses.len()], 0);
         equalize_pairs(model, poses);
         for _ in 0..GIRTH_STEPS {
             fit.match_single_edges(setting.with_model(model), poses);
-            for (limb, color_girth) in self.limbs.iter_mut().enumerate() {
+            for limb in 0..self.limbs.len() {
                 let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
                 let part = &model.body.limbs()[limb];
                 if part.match_caps[1] {
-                    let longer = color_girth.tip(&part.shape, &poses[limb], pairs.clone());
+                    let longer = tip(&part.shape, &poses[limb], pairs.clone());
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
-                let system = girth_system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
-                let Some(step) = system.and_then(|system| color_girth.start(&system)) else {
+                let system = system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
+                let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
+                if system.is_empty() {
                     continue;
-                };
+                }
+                let Some(step) = self.limbs[limb].start(&system, &prior) else { continue };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
@@ -177,11 +112,13 @@ impl ColorGirths {
             return;
         }
         fit.match_single_edges(setting.with_model(model), poses);
-        for (limb, color_girth) in self.limbs.iter_mut().enumerate() {
+        for limb in 0..self.limbs.len() {
             let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-            let system = girth_system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
-            if let Some(step) = system.and_then(|system| color_girth.follow(&system)) {
-                model.body.change_girth(limb, step.shift, step.axes());
+            let system = system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
+            let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
+            let frames = f64::from(GIRTHS_EVERY);
+            if let Some(axes) = self.limbs[limb].follow(&system, AXIS_SIGMA, frames, Matrix3::zeros(), &prior) {
+                model.body.change_girth(limb, Vec3::ZERO, axes);
             }
         }
     }

@@ -3,10 +3,11 @@
 //! before, such as a trunk behind hanging arms. Two edges on opposite sides of a limb determine its width wherever the limb is; a
 //! single edge does so only as precisely as the limb's axis is known.
 
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use crate::association::contour::DepthEdge;
 use crate::association::correspondence::LimbMatches;
+use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::shape::TaperedEllipticCylinder;
 
@@ -16,8 +17,8 @@ pub(super) const GIRTH_STEPS: usize = 6;
 pub(super) const TIP_FACTORS: [f64; 2] = [0.8, 1.25];
 /// Standard deviation of the shift of a limb's surface relative to its joints (meters), and of its relative girth: the variation
 /// between persons, clothes and definitions of joint centers that anthropometry leaves.
-pub(super) const SHIFT_SIGMA: f64 = 0.03;
-pub(super) const GIRTH_SIGMA: f64 = 0.12;
+const SHIFT_SIGMA: f64 = 0.03;
+const GIRTH_SIGMA: f64 = 0.12;
 /// Correlation of the relative girths of a limb and its counterpart on the other side.
 const SYMMETRY: f64 = 0.9;
 /// Standard deviation of a surface point about the model, meters, and the maximum number of independent points on a limb: errors
@@ -27,11 +28,11 @@ const INDEPENDENT: f64 = 30.0;
 /// Standard deviation of a depth-contour edge, meters: approximately a pixel.
 const EDGE_SIGMA: f64 = 0.01;
 /// Lateral standard deviation of a tracked limb's axis, across the line of sight, meters.
-const ASIDE_SIGMA: f64 = 0.01;
+pub(super) const ASIDE_SIGMA: f64 = 0.01;
 /// Number of successive frames that have the information of one, because their edge errors are correlated.
 pub(crate) const ALIKE: f64 = 10.0;
 /// Time constant of the girth estimate in frames: older information fades because clothes move.
-pub(super) const REMEMBERED: f64 = 100.0;
+const REMEMBERED: f64 = 100.0;
 /// Minimum number of matched points for a girth step.
 const ENOUGH: usize = 15;
 
@@ -53,7 +54,7 @@ impl Default for GirthFit {
 
 /// Returns the derivatives of the surface displacement at `foot` along `n` (limb frame) with respect to the three relative girth
 /// changes.
-pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
+fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) -> Vector3<f64> {
     let t = (foot.z / shape.length()).clamp(0.0, 1.0);
     let distal = |near: f64, far: f64| t * far / ((1.0 - t) * near + t * far).max(1e-6);
     let (a, b) = (n.x * foot.x, n.y * foot.y);
@@ -63,6 +64,60 @@ pub(super) fn girth_row(shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3) ->
 /// Cauchy weight of a distance, meters.
 pub(super) fn kernel(distance: f64) -> f64 {
     1.0 / (1.0 + (distance / (2.0 * POINT_SIGMA)).powi(2))
+}
+
+/// Normal equations of a limb's surface: its shift perpendicular to the axis, and the logarithms of its three factors.
+///
+/// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb frame),
+/// contributes the equation `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct GirthSystem {
+    h: SMatrix<f64, 5, 5>,
+    g: SVector<f64, 5>,
+}
+
+/// The same equations without the shift.
+struct WithoutShift {
+    information: Matrix3<f64>,
+    pull: Vector3<f64>,
+    /// The shift for no change of the factors, and its derivative with respect to them.
+    shift: Vector2<f64>,
+    shift_by_factors: Matrix2x3<f64>,
+}
+
+impl GirthSystem {
+    /// Adds a point at a signed distance from its closest point `foot` with the normal `n`.
+    pub(super) fn add(&mut self, shape: &TaperedEllipticCylinder, foot: Vec3, n: Vec3, distance: f64, weight: f64) {
+        let girth = girth_row(shape, foot, n);
+        let row = SVector::from([n.x, n.y, girth.x, girth.y, girth.z]);
+        self.h += weight * row * row.transpose();
+        self.g += weight * distance * row;
+    }
+
+    /// Multiplies the information by a factor.
+    fn scale(&mut self, factor: f64) {
+        self.h *= factor;
+        self.g *= factor;
+    }
+
+    /// Whether nothing was added.
+    pub(super) fn is_empty(&self) -> bool {
+        self.h.trace() <= 0.0
+    }
+
+    /// Eliminates the shift, which is `so_far` from its mean and has the standard deviation `sigma`, meters.
+    fn without_shift(&self, sigma: f64, so_far: Vector2<f64>) -> Option<WithoutShift> {
+        let loose = 1.0 / (sigma * sigma);
+        let inverse = (self.h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() * loose).try_inverse()?;
+        let mixed = self.h.fixed_view::<3, 2>(2, 0);
+        let shift = inverse * (self.g.fixed_rows::<2>(0) - so_far * loose);
+        Some(WithoutShift {
+            information: self.h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose(),
+            pull: self.g.fixed_rows::<3>(2) - mixed * shift,
+            shift,
+            shift_by_factors: -inverse * mixed.transpose(),
+        })
+    }
 }
 
 /// Prior of a limb's girth: mean and information of the logarithms of the three factors.
@@ -75,13 +130,18 @@ pub(super) struct GirthPrior {
 impl GirthPrior {
     /// The prior of a limb given what was measured of its counterpart on the other side, if it has one. Both limbs have the standard
     /// deviation `GIRTH_SIGMA` and the correlation `SYMMETRY`. `None` if the measurements are no numbers.
-    pub(super) fn given(counterpart: Option<&Girth>) -> Option<Self> {
+    fn given(counterpart: Option<&Girth>) -> Option<Self> {
         let alone = Self { mean: Vector3::zeros(), information: Matrix3::identity() / (GIRTH_SIGMA * GIRTH_SIGMA) };
         let Some(counterpart) = counterpart else { return Some(alone) };
         let own = (1.0 - SYMMETRY * SYMMETRY) * GIRTH_SIGMA * GIRTH_SIGMA;
         let known = (counterpart.information + alone.information).try_inverse()?;
         let covariance = known * (SYMMETRY * SYMMETRY) + Matrix3::identity() * own;
         Some(Self { mean: SYMMETRY * (known * counterpart.measured), information: covariance.try_inverse()? })
+    }
+
+    /// The prior of a limb among the girths of all limbs.
+    pub(super) fn of(body: &Body, limb: usize, girths: &[Girth]) -> Option<Self> {
+        Self::given(body.roles().counterpart(limb).and_then(|other| girths.get(other)))
     }
 }
 
@@ -94,109 +154,86 @@ pub(crate) struct Girth {
     total: GirthFit,
 }
 
+/// Normal equations of a limb of known pose in the first frame, from its matches and edges; `None` with too few points. Weights are
+/// robust (Cauchy).
+pub(super) fn first_system(
+    shape: &TaperedEllipticCylinder,
+    matches: &LimbMatches,
+    working_from_limb: &Pose,
+    edges: &[DepthEdge],
+) -> Option<GirthSystem> {
+    let (points, _) = matches.accepted();
+    if points < ENOUGH {
+        return None;
+    }
+    let mut system = GirthSystem::default();
+    for index in (0..matches.weight.len()).filter(|index| matches.weight[*index] > 0.0) {
+        let distance = f64::from(matches.surface.signed_distance[index]);
+        let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
+        let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
+        system.add(shape, foot, n, distance, kernel(distance));
+    }
+    system.scale((INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA));
+    for edge in edges {
+        let distance = edge.reach - edge.rim;
+        system.add(shape, edge.foot, edge.side, distance, kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA));
+    }
+    Some(system)
+}
+
+/// Normal equations of a limb from the edges on its sides, and the information that keeps its thickness along the line of sight:
+/// the surface there was already measured.
+pub(super) fn side_system(
+    shape: &TaperedEllipticCylinder,
+    edges: impl Iterator<Item = DepthEdge>,
+) -> (GirthSystem, Matrix3<f64>) {
+    let (mut system, mut thickness) = (GirthSystem::default(), Vector3::zeros());
+    for edge in edges {
+        let wider = edge.reach - edge.rim;
+        system.add(shape, edge.foot, edge.side, wider, kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
+        let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
+        let t = edge.foot.z / shape.length();
+        let a = shape.a0() + t * (shape.a1() - shape.a0());
+        let b = shape.b0() + t * (shape.b1() - shape.b0());
+        let depth = (a * ahead.x).hypot(b * ahead.y);
+        let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
+        thickness += 0.5 * girth_row(shape, front, ahead);
+    }
+    (system, thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA))
+}
+
 impl Girth {
-    /// Fits the surface of a limb of known pose to the matches and edges of the first frame: one Gauss-Newton step for shift and
-    /// semi-axes. Returns the change since the last step; `None` for a limb with too few points.
-    ///
-    /// A point at signed distance `d`, whose closest point lies at `(x, y, z)`, `t = z / length`, with the normal `n` (limb
-    /// frame), contributes the equation `d = n . shift + n_x x e0 + n_y y e1 + (n_x x t a1 / a(t) + n_y y t b1 / b(t)) e2`, with
-    /// the relative changes `e`. Weights are robust (Cauchy).
-    pub(super) fn start(
-        &mut self,
-        shape: &TaperedEllipticCylinder,
-        matches: &LimbMatches,
-        working_from_limb: &Pose,
-        edges: &[DepthEdge],
-        prior: &GirthPrior,
-    ) -> Option<GirthFit> {
-        let (points, _) = matches.accepted();
-        if points < ENOUGH {
-            return None;
-        }
-        let mut h = SMatrix::<f64, 5, 5>::zeros();
-        let mut g = SVector::<f64, 5>::zeros();
-        let row = |foot: Vec3, n: Vec3| {
-            let girth = girth_row(shape, foot, n);
-            SVector::from([n.x, n.y, girth.x, girth.y, girth.z])
-        };
-        for index in 0..matches.weight.len() {
-            if matches.weight[index] <= 0.0 {
-                continue;
-            }
-            let distance = f64::from(matches.surface.signed_distance[index]);
-            let foot = working_from_limb.inverse_transform_point(matches.surface.points.get(index));
-            let n = working_from_limb.inverse_transform_vector(matches.surface.normals.get(index));
-            let row = row(foot, n);
-            let weight = kernel(distance);
-            h += weight * row * row.transpose();
-            g += weight * distance * row;
-        }
-        let information = (INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA);
-        h *= information;
-        g *= information;
-        for edge in edges {
-            let distance = edge.reach - edge.rim;
-            let row = row(edge.foot, edge.side);
-            let weight = kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA);
-            h += weight * row * row.transpose();
-            g += weight * distance * row;
-        }
-        // The shift is eliminated, and follows from the girths.
-        let so_far = Vector2::new(self.total.shift.x, self.total.shift.y);
-        let loose = 1.0 / (SHIFT_SIGMA * SHIFT_SIGMA);
-        let shift = h.fixed_view::<2, 2>(0, 0) + Matrix2::identity() * loose;
-        let pull = g.fixed_rows::<2>(0) - so_far * loose;
-        let inverse = shift.try_inverse()?;
-        let mixed = h.fixed_view::<3, 2>(2, 0);
+    /// Takes over what the first frame measured of a limb of known pose: one Gauss-Newton step for shift and semi-axes. Returns the
+    /// change since the last step.
+    pub(super) fn start(&mut self, system: &GirthSystem, prior: &GirthPrior) -> Option<GirthFit> {
+        let own = system.without_shift(SHIFT_SIGMA, Vector2::new(self.total.shift.x, self.total.shift.y))?;
         let before = self.changes();
-        self.information = h.fixed_view::<3, 3>(2, 2) - mixed * inverse * mixed.transpose();
-        self.measured = self.information * before + g.fixed_rows::<3>(2) - mixed * inverse * pull;
+        self.information = own.information;
+        self.measured = own.information * before + own.pull;
         let girths = self.most_likely(prior)? - before;
-        let shift = inverse * (pull - mixed.transpose() * girths);
-        self.change(shift, girths)
+        self.change(own.shift + own.shift_by_factors * girths, girths)
     }
 
-    /// Returns the factors of the semi-axes after one more frame, by a Kalman filter of the three relative changes. `edges` lie
-    /// on the sides of the limb. The lateral offset of its axis in this frame is eliminated, so edges on both sides give the most
-    /// information. The thickness along the line of sight is kept: the surface there was already measured.
+    /// Adds what later frames measured, by a Kalman filter, and returns the change of the semi-axes. The lateral offset of the axis
+    /// in these frames, of standard deviation `axis_sigma`, is eliminated, so edges on both sides give the most information.
+    ///
+    /// `frames` is the number of frames since the last update, and `kept` information for the girths that the limb has.
     pub(super) fn follow(
         &mut self,
-        shape: &TaperedEllipticCylinder,
-        edges: impl Iterator<Item = DepthEdge>,
+        system: &GirthSystem,
+        axis_sigma: f64,
+        frames: f64,
+        kept: Matrix3<f64>,
         prior: &GirthPrior,
     ) -> Option<[f64; 4]> {
-        let mut aside = Matrix2::identity() / (ASIDE_SIGMA * ASIDE_SIGMA * ALIKE);
-        let (mut mixed, mut pull) = (Matrix3x2::zeros(), Vector2::zeros());
-        let (mut h, mut g) = (Matrix3::zeros(), Vector3::zeros());
-        let mut thickness = Vector3::zeros();
-        for edge in edges {
-            let row = girth_row(shape, edge.foot, edge.side);
-            let side = Vector2::new(edge.side.x, edge.side.y);
-            let wider = edge.reach - edge.rim;
-            let weight = kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA * ALIKE);
-            h += weight * row * row.transpose();
-            g += weight * wider * row;
-            aside += weight * side * side.transpose();
-            mixed += weight * row * side.transpose();
-            pull += weight * wider * side;
-            let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
-            let t = edge.foot.z / shape.length();
-            let a = shape.a0() + t * (shape.a1() - shape.a0());
-            let b = shape.b0() + t * (shape.b1() - shape.b0());
-            let depth = (a * ahead.x).hypot(b * ahead.y);
-            let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
-            thickness += 0.5 * girth_row(shape, front, ahead);
-        }
-        let inverse = aside.try_inverse()?;
-        h -= mixed * inverse * mixed.transpose();
-        g -= mixed * inverse * pull;
-        h += thickness * thickness.transpose() / (EDGE_SIGMA * EDGE_SIGMA);
-        if h.trace() <= 0.0 {
+        if system.is_empty() {
             return None;
         }
-        let (kept, before) = (1.0 - 1.0 / REMEMBERED, self.changes());
-        self.information = self.information * kept + h;
-        self.measured = self.measured * kept + h * before + g;
+        let own = system.without_shift(axis_sigma, Vector2::zeros())?;
+        let (alike, remembered, before) = (ALIKE / frames, 1.0 - frames / REMEMBERED, self.changes());
+        let information = own.information / alike + kept;
+        self.information = self.information * remembered + information;
+        self.measured = self.measured * remembered + information * before + own.pull / alike;
         let girths = self.most_likely(prior)? - before;
         self.change(Vector2::zeros(), girths).map(|done| done.axes())
     }
@@ -262,6 +299,16 @@ impl GirthFit {
 mod tests {
     use super::*;
 
+    /// The factors of the semi-axes after a frame with these edges.
+    fn followed(
+        girth: &mut Girth,
+        shape: &TaperedEllipticCylinder,
+        edges: impl Iterator<Item = DepthEdge>,
+    ) -> Option<[f64; 4]> {
+        let (system, thickness) = side_system(shape, edges);
+        girth.follow(&system, ASIDE_SIGMA, 1.0, thickness, &GirthPrior::given(None)?)
+    }
+
     /// Edges of a limb viewed along x, whose rims lie `wider` outside the shape's and whose axis has a lateral offset of `aside`.
     fn sides(shape: &TaperedEllipticCylinder, wider: f64, aside: f64) -> Vec<[DepthEdge; 2]> {
         let edge = |t: f64, sign: f64| {
@@ -276,11 +323,11 @@ mod tests {
     fn girths_follow_the_contour_and_keep_their_thickness() {
         let truth = 0.20;
         let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
-        let (mut girth, prior) = (Girth::default(), GirthPrior::given(None).unwrap());
+        let mut girth = Girth::default();
         let mut after_one = 0.0;
         for frame in 0..60 {
             let found = sides(&shape, truth - 0.5 * (shape.b0() + shape.b1()), 0.02);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found.into_iter().flatten(), &prior).unwrap();
+            let [fa0, fb0, fa1, fb1] = followed(&mut girth, &shape, found.into_iter().flatten()).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
             if frame == 0 {
@@ -296,15 +343,15 @@ mod tests {
     #[test]
     fn edges_on_one_side_report_as_far_as_the_axis_is_known() {
         let mut shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
-        let (mut girth, prior) = (Girth::default(), GirthPrior::given(None).unwrap());
-        let both = Girth::default().follow(&shape, sides(&shape, 0.02, 0.0).into_iter().flatten(), &prior).unwrap();
+        let mut girth = Girth::default();
+        let both = followed(&mut Girth::default(), &shape, sides(&shape, 0.02, 0.0).into_iter().flatten()).unwrap();
         let one = |shape: &_| sides(shape, 0.02, 0.0).into_iter().map(|[left, _]| left).collect::<Vec<_>>();
-        let [_, after_one, ..] = girth.follow(&shape, one(&shape).into_iter(), &prior).unwrap();
+        let [_, after_one, ..] = followed(&mut girth, &shape, one(&shape).into_iter()).unwrap();
         assert!(1.0 < after_one && after_one < both[1], "one side tells less: {after_one}, both {}", both[1]);
         for _ in 0..100 {
             let wider = 0.2 - 0.5 * (shape.b0() + shape.b1());
             let found = sides(&shape, wider, 0.0).into_iter().map(|[left, _]| left);
-            let [fa0, fb0, fa1, fb1] = girth.follow(&shape, found, &prior).unwrap();
+            let [fa0, fb0, fa1, fb1] = followed(&mut girth, &shape, found).unwrap();
             let (a0, b0, a1, b1) = (shape.a0() * fa0, shape.b0() * fb0, shape.a1() * fa1, shape.b1() * fb1);
             shape = TaperedEllipticCylinder::new(0.3, a0, b0, a1, b1).unwrap();
         }
@@ -315,6 +362,6 @@ mod tests {
     #[test]
     fn girths_without_edges_stay() {
         let shape = TaperedEllipticCylinder::new(0.3, 0.1, 0.16, 0.1, 0.16).unwrap();
-        assert_eq!(Girth::default().follow(&shape, std::iter::empty(), &GirthPrior::given(None).unwrap()), None);
+        assert_eq!(followed(&mut Girth::default(), &shape, std::iter::empty()), None);
     }
 }

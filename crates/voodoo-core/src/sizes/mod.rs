@@ -14,7 +14,7 @@ use crate::math::{Pose, Vec3};
 use crate::solver::LENGTH_INFORMATION;
 use color_girth::ColorGirths;
 use equalize::{START_GATE, equalize_limb_lengths};
-use girth::{GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS};
+use girth::{ASIDE_SIGMA, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, side_system};
 use reported::ReportedLengths;
 
 /// Greatest relative change of a limb's length in one frame.
@@ -100,7 +100,7 @@ impl Sizes {
 
     /// Standard deviation of the mean radius of a limb, meters; NaN where it was given.
     pub(crate) fn girth_sigma(&self, body: &Body, limb: usize) -> f64 {
-        let known = self.girths.get(limb).zip(self.girth_prior(body, limb));
+        let known = self.girths.get(limb).zip(GirthPrior::of(body, limb, &self.girths));
         known.map_or(f64::NAN, |(girth, prior)| girth.sigma(&body.limbs()[limb].shape, &prior))
     }
 
@@ -168,9 +168,9 @@ impl Sizes {
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
                 let matches = &fit.correspondences().limbs[limb];
-                let Some(prior) = self.girth_prior(&model.body, limb) else { continue };
-                let girth = &mut self.girths[limb];
-                let Some(step) = girth.start(&shape, matches, &poses[limb], &edges_found, &prior) else { continue };
+                let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
+                let system = first_system(&shape, matches, &poses[limb], &edges_found);
+                let Some(step) = system.and_then(|system| self.girths[limb].start(&system, &prior)) else { continue };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
@@ -243,17 +243,13 @@ impl Sizes {
     /// Updates the girths with the depth-contour edges on the sides of each limb.
     fn refine_girths(&mut self, model: &mut Model, fit: &Fit, relied_on: impl Fn(usize) -> bool) {
         for limb in (0..self.girths.len()).filter(|limb| relied_on(*limb)) {
-            let Some(prior) = self.girth_prior(&model.body, limb) else { continue };
+            let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
             let shape = model.body.limbs()[limb].shape;
-            if let Some(axes) = self.girths[limb].follow(&shape, fit.contours().sides(limb), &prior) {
+            let (system, thickness) = side_system(&shape, fit.contours().sides(limb));
+            if let Some(axes) = self.girths[limb].follow(&system, ASIDE_SIGMA, 1.0, thickness, &prior) {
                 model.body.change_girth(limb, Vec3::ZERO, axes);
             }
         }
-    }
-
-    /// The prior of a limb's girth, given that of its counterpart.
-    fn girth_prior(&self, body: &Body, limb: usize) -> Option<GirthPrior> {
-        GirthPrior::given(body.roles().counterpart(limb).and_then(|other| self.girths.get(other)))
     }
 }
 
