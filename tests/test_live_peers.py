@@ -1,4 +1,4 @@
-"""Live sources against real peers: rclpy, Cyclone DDS, the RealSense library, Rerun, each from the package index.
+"""Real peers, each from the package index: rclpy, Cyclone DDS, the RealSense library, Rerun, OpenSim.
 
 They are installed once, into environments of their own beside pytest's cache.
 """
@@ -71,3 +71,7 @@ def test_realsense(ours):
 
 def test_view(ours):
     check(ours, "check_view.py")
+
+
+def test_opensim(request):
+    check(environment(request.config.cache, "opensim", ("opensim>=4.5",)), "check_opensim.py")

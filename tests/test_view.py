@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import voodoo
 from made_up import two_people
 from voodoo.errors import VoodooError
+from voodoo.model.limb_mesh import limb_mesh
 from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
@@ -21,7 +22,7 @@ from voodoo.pipeline.search import nobody
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
-from voodoo.visualization.body_geometry import bands, limb_mesh, nearest_limb
+from voodoo.visualization.body_geometry import bands, nearest_limb
 from voodoo.visualization.rerun_log import rounded_millimeters
 from voodoo.visualization.rerun_viewer import Viewer
 

@@ -20,6 +20,7 @@ from voodoo.cli.common import (
     wrote,
 )
 from voodoo.cli.options import (
+    RESULTS,
     BodyOption,
     FrameOption,
     HeightOption,
@@ -67,7 +68,7 @@ def ik_command(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME_ik.csv.",
+            help=f"{RESULTS}; by default NAME_ik.csv.",
         ),
     ] = None,
     topic: TopicOption = None,

@@ -139,8 +139,8 @@ DepthRangeOption = Annotated[
 ViewOption = Annotated[
     bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
 ]
-_RESULTS = "Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable"
-OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{_RESULTS}.")]
+RESULTS = "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, or a folder (ROS 2 bag); repeatable"
+OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}.")]
 OutOrNameOption = Annotated[
-    list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{_RESULTS}; by default NAME.csv.")
+    list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}; by default NAME.csv.")
 ]

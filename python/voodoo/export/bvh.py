@@ -7,14 +7,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.export.conventions import Y_UP_LEFT, plain
 from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
-
-_Y_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-"""(x, y, z) of BVH = (y, z, x) of the standing frame: X to the left, Y up, Z forward."""
-
 
 _MOVES_M = 1e-4
 
@@ -49,13 +46,13 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
     _describe(parts, 0, "", (scale, still, moving), lines, order)
     lines += ["MOTION", f"Frames: {len(track)}", f"Frame Time: {mean_interval(track.stamps):.9f}"]
-    local = _Y_UP @ posed.local() @ _Y_UP.T
+    local = Y_UP_LEFT @ posed.local() @ Y_UP_LEFT.T
     angles = np.empty((len(track), len(parts), 3))
     for index in range(len(parts)):
         angles[:, index] = np.degrees(euler_angles(local[:, index], "ZXY"))
     offsets[:, 0] = posed.heads[:, 0]
     moving[0] = True
-    places = offsets @ _Y_UP.T * scale
+    places = offsets @ Y_UP_LEFT.T * scale
     for shifts, turns in zip(places, angles, strict=True):
         row = [value for bone in order for value in (*(shifts[bone] if moving[bone] else ()), *turns[bone])]
         lines.append(" ".join(f"{value:.6f}" for value in row))
@@ -81,7 +78,7 @@ def _describe(
     turns = "Zrotation Xrotation Yrotation"
     channels = f"6 Xposition Yposition Zposition {turns}" if root or moving[index] else f"3 {turns}"
     lines += [
-        f"{indent}{'ROOT' if root else 'JOINT'} {_word(bone.name)}",
+        f"{indent}{'ROOT' if root else 'JOINT'} {plain(bone.name)}",
         f"{indent}{{",
         f"{indent}\tOFFSET {_numbers(start, scale)}",
         f"{indent}\tCHANNELS {channels}",
@@ -99,10 +96,5 @@ def _describe(
     lines.append(f"{indent}}}")
 
 
-def _word(name: str) -> str:
-    """The name in ASCII without spaces, which end names in readers."""
-    return "".join(letter if letter.isascii() and letter.isprintable() else "_" for letter in name).replace(" ", "_")
-
-
 def _numbers(vector: FloatArray, scale: float) -> str:
-    return " ".join(f"{value:.6f}" for value in _Y_UP @ vector * scale)
+    return " ".join(f"{value:.6f}" for value in Y_UP_LEFT @ vector * scale)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from voodoo.errors import VoodooError
 from voodoo.export.bvh import write_bvh
+from voodoo.export.c3d_file import write_c3d
+from voodoo.export.glb import write_glb
+from voodoo.export.opensim import write_mot, write_sto
 from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import write_bag
 from voodoo.export.track import Track
@@ -19,7 +22,15 @@ from voodoo.model.body import Body
 from voodoo.model.standing import is_optical
 from voodoo.whole import appearing_whole
 
-FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
+ONE_PERSON: Mapping[str, Callable[[Path, Track, Body], None]] = {
+    ".bvh": write_bvh,
+    ".trc": lambda path, track, _: write_trc(path, track),
+    ".c3d": lambda path, track, _: write_c3d(path, track),
+    ".mot": write_mot,
+    ".sto": write_sto,
+}
+"""Writers of formats that hold one person with z up, by suffix."""
+FORMATS = (*SUFFIXES, *ONE_PERSON, ".glb", ".mcap")
 """Suffixes; a path without one is a ROS 2 bag folder."""
 
 
@@ -58,7 +69,7 @@ def is_bag(path: Path) -> bool:
 
 def upright_words(paths: Sequence[Path], root_frame: str, *, optical: bool | None = None) -> str:
     """Which of the files `save` turns upright, in one line; "" if none."""
-    turned = [str(path) for path in paths if path.suffix in (".bvh", ".trc") or is_bag(path)]
+    turned = [str(path) for path in paths if path.suffix not in SUFFIXES]
     if not turned or not (is_optical(root_frame) if optical is None else optical):
         return ""
     return f"{', '.join(turned)}: turned upright, since the root frame {root_frame} is a camera's (y down, not level)"
@@ -94,14 +105,14 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
 
 
 def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool | None = None) -> None:
-    """Write a track: .csv, .npz, .bvh, .trc, .mcap, or a ROS 2 bag folder.
+    """Write a track in the format of the suffix, or a ROS 2 bag folder.
 
     Args:
         track: with limb poses.
         path: see FORMATS.
         body: in the sizes it was tracked with.
         root_frame: frame of the track.
-        optical: whether that is a camera's optical frame; then .bvh, .trc and bags are turned upright. None: by its name.
+        optical: whether that is a camera's optical frame; then all but .csv and .npz are turned upright. None: by its name.
 
     Raises:
         VoodooError: another suffix, or data that the format requires are missing.
@@ -112,10 +123,10 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         track.save(path)
         return
     with appearing_whole(path) as place:
-        if path.suffix == ".bvh":
-            write_bvh(place, upright(track, root_frame, optical=optical)[0], body)
-        elif path.suffix == ".trc":
-            write_trc(place, upright(track, root_frame, optical=optical)[0])
+        if path.suffix in ONE_PERSON:
+            ONE_PERSON[path.suffix](place, upright(track, root_frame, optical=optical)[0], body)
+        elif path.suffix == ".glb":
+            write_glb(place, {path.stem: (upright(track, root_frame, optical=optical)[0], body)})
         else:
             with bag_folder(place) as folder:
                 write_bag(folder, track, body, root_frame=root_frame, optical=optical)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from voodoo.export.bvh import write_bvh
-from voodoo.export.files import bag_folder, check_target, is_bag
+from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag
+from voodoo.export.glb import write_glb
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import write_people_bag
-from voodoo.export.trc import write_trc
 from voodoo.export.upright import upright
 from voodoo.model.body import Body
 from voodoo.whole import appearing_whole
@@ -20,8 +19,8 @@ def save_people(
 ) -> list[Path]:
     """Write a result of several persons; returns the written files.
 
-    .csv, .npz and bags hold all persons. .bvh and .trc hold one person: NAME.bvh becomes NAME_1.bvh, NAME_2.bvh, ..., from the
-    first to the last frame of each; without persons there is no file.
+    .csv, .npz, .glb and bags hold all persons. Other formats hold one person: NAME.bvh becomes NAME_1.bvh, NAME_2.bvh, ..., from
+    the first to the last frame of each; without persons there is no file.
 
     Args:
         result: with limb poses.
@@ -35,22 +34,25 @@ def save_people(
         OSError: a file cannot be written.
     """
     check_target(path)
-    if path.suffix in (".bvh", ".trc"):
+    if path.suffix in ONE_PERSON:
         written = []
         for one in result.tracks:
             own = path.with_name(f"{path.stem}_{one}{path.suffix}")
             track, _ = upright(result.unbroken(one), root_frame, optical=optical)
             with appearing_whole(own) as place:
-                if path.suffix == ".bvh":
-                    write_bvh(place, track, bodies[one])
-                else:
-                    write_trc(place, track)
+                ONE_PERSON[path.suffix](place, track, bodies[one])
             written.append(own)
         return written
     if is_bag(path):
         people = {str(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
         with appearing_whole(path) as place, bag_folder(place) as folder:
             write_people_bag(folder, people, root_frame=root_frame, optical=optical)
+    elif path.suffix == ".glb":
+        shown = {
+            one: upright(result.unbroken(one, to_the_end=True), root_frame, optical=optical)[0] for one in result.tracks
+        }
+        with appearing_whole(path) as place:
+            write_glb(place, {f"{path.stem}_{one}": (track, bodies[one]) for one, track in shown.items()})
     else:
         result.save(path)
     return [path]

@@ -18,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
+from voodoo.export.conventions import NAMES
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
@@ -25,12 +26,7 @@ from voodoo.export.upright import UPRIGHT_FROM_OPTICAL, upright
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
-_SIDE = {
-    "upperarm": "shoulder", "forearm": "elbow", "hand": "wrist", "thigh": "hip", "calf": "knee", "foot": "ankle",
-}  # fmt: skip
-FRAMES = {"pelvis": "waist", "thorax": "torso", "torso": "torso", "head": "head"} | {
-    f"{side}_{limb}": f"{side}_{joint}" for side in "lr" for limb, joint in _SIDE.items()
-}
+FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)

@@ -20,12 +20,13 @@ from voodoo.children import children
 from voodoo.errors import VoodooError
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
+from voodoo.model.limb_mesh import limb_mesh
 from voodoo.model.rotations import quaternions
 from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.search import nobody
 from voodoo.sensors.adapters import Memory, adapters_of
-from voodoo.visualization.body_geometry import bands, limb_colors, limb_mesh
+from voodoo.visualization.body_geometry import bands, limb_colors
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
 from voodoo.visualization.rerun_server import Server
