@@ -17,7 +17,8 @@ TOPICS = (*TOPIC_KINDS, "camera_info")
 RecordingArgument = Annotated[
     Path,
     typer.Argument(
-        metavar="RECORDING", help="ROS bag, UTD-MHAD *_depth.mat, folder of videos, Pose2Sim or PNGs, .trc."
+        metavar="RECORDING",
+        help="ROS bag, Azure Kinect .mkv, UTD-MHAD *_depth.mat, folder of videos, Pose2Sim or PNGs, .trc.",
     ),
 ]
 LoaderOption = Annotated[

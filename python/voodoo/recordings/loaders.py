@@ -70,6 +70,12 @@ def _markers() -> Callable[..., Recording]:
     return MarkerRecording
 
 
+def _azure_kinect() -> Callable[..., Recording]:
+    from voodoo.recordings.azure_kinect import AzureKinectRecording
+
+    return AzureKinectRecording
+
+
 LOADERS: dict[str, Loader] = {
     "ros2": Loader(_ros, "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"),
     "ros1": Loader(_ros, "a ROS 1 .bag, or a .zip of it"),
@@ -77,13 +83,13 @@ LOADERS: dict[str, Loader] = {
     "folder": Loader(_folder, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
     "pose2sim": Loader(_pose2sim, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
     "videos": Loader(_videos, "a folder with Calib*.toml and videos/* or images/*/ of several cameras"),
+    "azure-kinect": Loader(_azure_kinect, "a .mkv of an Azure Kinect or Femto Bolt"),
     "markers": Loader(_markers, "a .trc or .c3d file of markers"),
 }
 
 
 _FILM = ("a film", "depth, or a folder with the films of several cameras and their calibration, Calib*.toml")
 _ADVICE = {
-    ".mkv": ("a recording of an Azure Kinect, or a film", "its depth images as PNG files in a folder"),
     ".oni": ("a recording of OpenNI", "its depth images as PNG files in a folder"),
     ".svo": ("a recording of a ZED", "its depth images as PNG files in a folder, or a ROS bag"),
     ".svo2": ("a recording of a ZED", "its depth images as PNG files in a folder, or a ROS bag"),
@@ -152,6 +158,8 @@ def guess_loader(path: Path) -> str:
     if path.is_file():
         if path.name.endswith("_depth.mat"):
             return "utd-mhad"
+        if path.suffix.lower() == ".mkv":
+            return "azure-kinect"
         if path.suffix.lower() in (".trc", ".c3d"):
             return "markers"
         names = zip_members(path) if path.suffix == ".zip" else [path.name]

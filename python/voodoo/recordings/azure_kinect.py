@@ -1,0 +1,222 @@
+"""Azure Kinect and Femto Bolt `.mkv`: depth and color with their lenses, as Microsoft's and Orbbec's recorders write them.
+
+Calibration is an attachment, as the device stores it; how a mode of a camera crops and scales it is that of the Azure Kinect
+Sensor SDK 1.4, src/transformation/mode_specific_calibration.c.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
+from voodoo.model.camera import Camera
+from voodoo.model.joint import short
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.pictures import decode_color
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, refuse_blank
+
+FRAME = "depth_camera_optical_frame"
+COLOR_FRAME = "rgb_camera_optical_frame"
+_MODES = {
+    "NFOV_2X2BINNED": ((512, 512), (96, 90), (320, 288)),
+    "NFOV_UNBINNED": ((1024, 1024), (192, 180), (640, 576)),
+    "WFOV_2X2BINNED": ((512, 512), (0, 0), (512, 512)),
+    "WFOV_UNBINNED": ((1024, 1024), (0, 0), (1024, 1024)),
+    "720P": ((1280, 960), (0, 120), (1280, 720)),
+    "1080P": ((1920, 1440), (0, 180), (1920, 1080)),
+    "1440P": ((2560, 1920), (0, 240), (2560, 1440)),
+    "1536P": ((2048, 1536), (0, 0), (2048, 1536)),
+    "2160P": ((3840, 2880), (0, 360), (3840, 2160)),
+    "3072P": ((4096, 3072), (0, 0), (4096, 3072)),
+}
+"""Mode -> size of the whole sensor's image at its resolution, first column and row of the image in it, size of the image."""
+_DEPTH, _COLOR = "CALIBRATION_CameraPurposeDepth", "CALIBRATION_CameraPurposePhotoVideo"
+_MOST_ATTACHED = 2**20
+_EXPECTED = "a .mkv of an Azure Kinect or Femto Bolt (other cameras: docs/how-to/cameras.md)"
+
+
+class AzureKinectRecording(Recording):
+    """A recording of an Azure Kinect or Femto Bolt.
+
+    The root frame is the depth camera's optical frame (x right, y down, z forward). There is one frame for each depth image,
+    with the color images since the previous one (MJPG; other formats, infrared and IMU are not used). Stamps are those of the
+    device's clock [s].
+
+    Args:
+        path: the .mkv file.
+        left_out: counts unusable images, which are then left out; None: they are errors.
+
+    Raises:
+        RecordingError: PyAV is not installed, no depth track, or a calibration that is missing or damaged.
+    """
+
+    def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
+        """Read the tracks, the calibration and the stamps; see the class."""
+        self.path, self.name, self.root_frame = path, path.stem, FRAME
+        self.start, self.reference = None, None
+        self._left_out = left_out
+        with reading(path, _EXPECTED), _opened(path) as film:
+            tags = {word: value for word, value in film.metadata.items() if word.startswith("K4A_")}
+            tracks: dict[str, tuple[int, str]] = {}
+            for stream in film.streams:
+                tags |= stream.metadata
+                if (title := stream.metadata.get("title")) in ("DEPTH", "COLOR"):
+                    tracks[title] = (stream.index, stream.codec_context.name)
+            if "DEPTH" not in tracks or "K4A_DEPTH_MODE" not in tags:
+                raise RecordingError(
+                    f"{path}: expected {_EXPECTED}, found a film without its depth track; films of several cameras are read from "
+                    "a folder with their calibration, Calib*.toml (docs/how-to/color.md)"
+                )
+            cameras = _calibration(path, film)
+            self._offset = int(tags.get("K4A_START_OFFSET_NS", 0)) * 1e-9
+            self._tracks = {tracks["DEPTH"][0]: "depth"}
+            self._unused: tuple[tuple[str, str], ...] = ()
+            self._camera = _camera(path, cameras, _DEPTH, tags["K4A_DEPTH_MODE"])
+            if "COLOR" in tracks and tracks["COLOR"][1] != "mjpeg":
+                self._unused = (("color", f"{tracks['COLOR'][1]}, expected MJPG"),)
+            elif "COLOR" in tracks:
+                self._tracks[tracks["COLOR"][0]] = "color"
+                mode = tags.get("K4A_COLOR_MODE", "").removeprefix("MJPG_")
+                self._color = _camera(path, cameras, _COLOR, mode)
+                self._depth_from_color = np.linalg.inv(_pose(path, cameras, _COLOR))
+            self._stamps: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
+            for sensor, stamp, _ in self._packets(film):
+                self._stamps[sensor].append(stamp)
+        if not self._stamps["depth"]:
+            raise RecordingError(f"{path}: expected depth images, found none")
+
+    def _packets(self, film: Any) -> Iterator[tuple[str, float, Any]]:  # noqa: ANN401 - PyAV
+        """Sensor, stamp and packet of each image, in the order of the file."""
+        for packet in film.demux([film.streams[index] for index in self._tracks]):
+            if packet.size and packet.pts is not None:
+                stamp = float(packet.pts * packet.time_base) + self._offset
+                yield self._tracks[packet.stream.index], stamp, packet
+
+    def __len__(self) -> int:
+        """Number of depth images."""
+        return len(self._stamps["depth"])
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """Read the images; see Recording."""
+        waiting: list[ColorImage] = []
+        number = -1
+        with reading(self.path, _EXPECTED), _opened(self.path) as film:
+            for sensor, stamp, packet in self._packets(film):
+                if sensor == "color":
+                    size = (self._color.width, self._color.height)
+                    load = partial(decode_color, bytes(packet), f"{self.path}, color at {stamp:.6f}", size)
+                    waiting.append(ColorImage("color", stamp, load, self._color, self._depth_from_color))
+                    continue
+                number += 1
+                try:
+                    item = self._depth_image(stamp, bytes(packet))
+                except RecordingError as error:
+                    if self._left_out is None:
+                        raise
+                    self._left_out.add_error(error)
+                    continue
+                if self._left_out is not None:
+                    self._left_out.numbers["depth", stamp] = number
+                yield RecordedFrame(stamp, (*waiting, item))
+                waiting.clear()
+
+    def _depth_image(self, stamp: float, content: bytes) -> DepthImage:
+        where, size = f"{self.path}, depth", (self._camera.height, self._camera.width)
+        if len(content) != 2 * size[0] * size[1]:
+            raise RecordingError(f"{where}: expected {2 * size[0] * size[1]} bytes, found {len(content)}")
+        image = np.frombuffer(content, dtype=">u2").reshape(size).astype(np.uint16)
+        item = DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
+        if self._left_out is not None:
+            refuse_blank(item, where)
+        return item
+
+    def info(self) -> RecordingInfo:
+        """Summarize from tracks and calibration."""
+        sensors = []
+        for sensor, stamps in self._stamps.items():
+            camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
+            detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
+            rate = mean_rate(len(stamps), stamps[-1] - stamps[0] if stamps else 0.0)
+            sensors.append(SensorInfo(sensor, sensor, frame, len(stamps), rate, detail))
+        first, last = self._stamps["depth"][0], self._stamps["depth"][-1]
+        return self._described("azure-kinect", sensors, start=first, duration=last - first, unused=self._unused)
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        if frame == COLOR_FRAME and "color" in self._stamps:
+            return self._depth_from_color
+        return super().root_from(frame, stamp)
+
+
+def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV
+    try:
+        import av
+    except ImportError:
+        advice = "which PyAV reads, found no PyAV: pip install 'voodoo-tracker[azure]'"
+        raise RecordingError(f"{path}: expected {_EXPECTED}, {advice}") from None
+    # Another demuxer might follow links in the file.
+    return av.open(f"file:{path.absolute()}", format="matroska")
+
+
+def _calibration(path: Path, film: Any) -> dict[str, Any]:  # noqa: ANN401 - PyAV
+    """Purpose -> camera, as the device's calibration describes it.
+
+    Raises:
+        RecordingError: no such attachment, or not JSON with cameras.
+    """
+    attached = [one for one in film.streams if one.type == "attachment" and str(one.name).endswith(".json")]
+    if not attached:
+        raise RecordingError(f"{path}: expected the attachment calibration.json, found none")
+    content = bytes(attached[0].data)
+    if len(content) > _MOST_ATTACHED:
+        raise RecordingError(
+            f"{path}: {attached[0].name}: expected {_MOST_ATTACHED} bytes at most, found {len(content)}"
+        )
+    with reading(f"{path}, {attached[0].name}", "the calibration of an Azure Kinect"):
+        cameras = json.loads(content.rstrip(b"\0"))["CalibrationInformation"]["Cameras"]
+        return {str(camera["Purpose"]): camera for camera in cameras}
+
+
+def _camera(path: Path, cameras: dict[str, Any], purpose: str, mode: str) -> Camera:
+    """The camera of a mode.
+
+    Raises:
+        RecordingError: an unknown mode, or a calibration without what is needed.
+    """
+    if mode not in _MODES:
+        raise RecordingError(f"{path}: expected one of the modes {', '.join(_MODES)}, found {short(mode)}")
+    (wide, high), (left, top), (width, height) = _MODES[mode]
+    with reading(f"{path}, calibration", f"{purpose} with 14 parameters of its lens"):
+        numbers = [float(number) for number in cameras[purpose]["Intrinsics"]["ModelParameters"]]
+        cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = numbers
+        try:
+            # The device's pixel coordinates begin at the corner of the first pixel, ours in its center.
+            return Camera(
+                width, height, fx * wide, fy * high, cx * wide - left - 0.5, cy * high - top - 0.5,
+                (k1, k2, p1, p2, k3, k4, k5, k6), "rational_polynomial",
+            )  # fmt: skip
+        except CameraError as error:
+            raise RecordingError(f"{path}, calibration: {error}") from error
+
+
+def _pose(path: Path, cameras: dict[str, Any], purpose: str) -> FloatArray:
+    """camera_from_depth (4, 4).
+
+    Raises:
+        RecordingError: the calibration has none, or it is not rigid.
+    """
+    with reading(f"{path}, calibration", f"{purpose} with a rigid transform from the depth camera"):
+        pose = np.eye(4)
+        pose[:3, :3] = np.reshape([float(number) for number in cameras[purpose]["Rt"]["Rotation"]], (3, 3))
+        pose[:3, 3] = [float(number) for number in cameras[purpose]["Rt"]["Translation"]]
+        off = np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max()
+        if not off < 1e-3 or not np.isfinite(pose).all() or np.linalg.det(pose) < 0.0:
+            raise ValueError(f"a rotation with products of rows off by {off:.2g}")
+        return pose
