@@ -85,7 +85,7 @@ class AzureKinectRecording(Recording):
                 self._tracks[tracks["COLOR"][0]] = "color"
                 mode = tags.get("K4A_COLOR_MODE", "").removeprefix("MJPG_")
                 self._color = _camera(path, cameras, _COLOR, mode)
-                self._depth_from_color = np.linalg.inv(_pose(path, cameras, _COLOR))
+                self._depth_from_color = np.linalg.inv(_pose(path, cameras, _COLOR)).astype(np.float64)
             self._stamps: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
             for sensor, stamp, _ in self._packets(film):
                 self._stamps[sensor].append(stamp)
@@ -213,7 +213,7 @@ def _pose(path: Path, cameras: dict[str, Any], purpose: str) -> FloatArray:
         RecordingError: the calibration has none, or it is not rigid.
     """
     with reading(f"{path}, calibration", f"{purpose} with a rigid transform from the depth camera"):
-        pose = np.eye(4)
+        pose: FloatArray = np.eye(4)
         pose[:3, :3] = np.reshape([float(number) for number in cameras[purpose]["Rt"]["Rotation"]], (3, 3))
         pose[:3, 3] = [float(number) for number in cameras[purpose]["Rt"]["Translation"]]
         off = np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max()
