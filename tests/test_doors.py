@@ -23,28 +23,26 @@ from voodoo.recordings.marker_trajectories import read_c3d
 FRAMES = 12
 
 
-def poses_of(body, *, seed=3, frames=FRAMES, spread=0.5):
-    """Rotations (F, L, 3, 3) and heads (F, L, 3) of a body that moves smoothly through many poses."""
+def moving(body, *, seed=3, frames=FRAMES, spread=0.5):
+    """Rotations by limb (F, 3, 3) relative to the parent, and places of the root, of a body that moves smoothly."""
     parts, random = bones(body), np.random.default_rng(seed)
     swing = random.uniform(-spread, spread, (2, len(parts), 3))
     phase = np.linspace(0.0, 3.0, frames)
-    turns, heads = np.empty((frames, len(parts), 3, 3)), np.empty((frames, len(parts), 3))
+    local = {}
     for index, bone in enumerate(parts):
         wave = np.sin(phase)[:, None] * swing[0, index] + np.cos(phase)[:, None] * swing[1, index]
-        local = Rotation.from_rotvec(wave).as_matrix()
-        if bone.parent is None:
-            spin = Rotation.from_euler("z", 3.0 * phase[:, None]).as_matrix()  # through the half turn
-            turns[:, index], heads[:, index] = spin @ local, np.column_stack([phase, -phase, 1.0 + 0.1 * phase])
-        else:
-            turns[:, index] = turns[:, bone.parent] @ local
-            heads[:, index] = heads[:, bone.parent] + turns[:, bone.parent] @ (bone.head - parts[bone.parent].head)
-    return turns, heads
+        local[bone.name] = Rotation.from_rotvec(wave).as_matrix()
+    spin = Rotation.from_euler("z", 3.0 * phase[:, None]).as_matrix()  # through the half turn
+    local[parts[0].name] = spin @ local[parts[0].name]
+    return local, np.column_stack([phase, -phase, 1.0 + 0.1 * phase])
 
 
-def track_of(body, **how):
-    """A track of exactly these poses."""
+def track_of(body, local=None, root=((0.0, 0.0, 1.0),), **how):
+    """A track of exactly these rotations by limb (F, 3, 3) relative to the parent; by default it moves."""
     parts = bones(body)
-    turns, heads = poses_of(body, **how)
+    if local is None:
+        local, root = moving(body, **how)
+    turns, heads = (np.stack(list(one.values()), axis=1) for one in placed(body, local, np.array(root)))
     limbs = np.tile(np.eye(4), (*heads.shape[:2], 1, 1))
     for index, bone in enumerate(parts):
         limbs[:, index, :3, :3] = turns[:, index] @ bone.rest
@@ -75,14 +73,15 @@ def heads_of(track, body):
 
 
 def placed(body, local, root):
-    """Heads by kinematics from rotations (F, 3, 3) by bone relative to the parent, in the standing frame."""
+    """World rotations and heads by bone from rotations (F, 3, 3) relative to the parent, in the standing frame."""
     parts, turns, heads = bones(body), [], []
     for bone in parts:
         above = None if bone.parent is None else turns[bone.parent]
         turns.append(local[bone.name] if above is None else above @ local[bone.name])
         step = bone.head - parts[bone.parent].head if above is not None else None
         heads.append(root if above is None else heads[bone.parent] + above @ step)
-    return dict(zip((bone.name for bone in parts), heads, strict=True))
+    names = [bone.name for bone in parts]
+    return dict(zip(names, turns, strict=True)), dict(zip(names, heads, strict=True))
 
 
 def mot_columns(path: Path):
@@ -105,7 +104,7 @@ def read_mot(path: Path, body):
         turn = Rotation.from_euler("ZXY", np.column_stack(angles), degrees=True).as_matrix()
         local[limb] = RIGHT_OF.T @ turn @ RIGHT_OF
     root = np.column_stack([columns[f"pelvis_t{axis}"] for axis in "xyz"]) @ RIGHT_OF
-    return placed(body, local, root)
+    return placed(body, local, root)[1]
 
 
 def read_glb(path: Path, frame: int, person: str = "pose"):
@@ -172,7 +171,7 @@ def test_every_format_puts_the_joints_in_the_same_place(tmp_path, person):
         else turns[names_of(parts[bone.parent].name).opensim].transpose(0, 2, 1) @ turns[names_of(bone.name).opensim]
         for bone in parts
     }
-    sto = placed(body, local, expected[parts[0].name])
+    _, sto = placed(body, local, expected[parts[0].name])
     for bone in parts:
         here = expected[bone.name]
         assert np.abs(bvh[bone.name][:, [2, 0, 1]] / 100.0 - here).max() < 2e-3
@@ -265,15 +264,9 @@ def test_equal_motions_of_both_sides_have_equal_angles_with_the_signs_of_opensim
         "thigh": ((0, -0.7, 0), "hip_flexion"), "calf": ((0, 0.9, 0), "knee_angle"), "foot": ((0, -0.2, 0), "ankle_angle"),
         "forearm": ((0, -1.1, 0), "elbow_flex"), "upperarm": ((0, -0.4, 0), "arm_flex"),
     }  # fmt: skip
-    track = track_of(body, frames=1, spread=0.0)
-    turns = []
-    for bone in parts:
-        vector = turned.get(bone.name[2:], ((0, 0, 0), ""))[0] if bone.name[1] == "_" else (0, 0, 0)
-        own = Rotation.from_rotvec(vector).as_matrix()
-        turns.append(own if bone.parent is None else turns[bone.parent] @ own)
-    limbs = track.world_from_limb.copy()
-    limbs[0, :, :3, :3] = [turn @ bone.rest for turn, bone in zip(turns, parts, strict=True)]
-    save(replace(track, world_from_limb=limbs), tmp_path / "pose.mot", body=body, root_frame="odom")
+    vectors = [turned.get(name[2:] if name[1] == "_" else "", ((0, 0, 0), ""))[0] for name in body.limb_names]
+    local = {name: Rotation.from_rotvec([one]).as_matrix() for name, one in zip(body.limb_names, vectors, strict=True)}
+    save(track_of(body, local), tmp_path / "pose.mot", body=body, root_frame="odom")
     columns = mot_columns(tmp_path / "pose.mot")
     for vector, name in turned.values():
         for side in "lr":

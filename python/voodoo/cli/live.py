@@ -60,6 +60,14 @@ def live_command(
     duration: Annotated[float | None, typer.Option(metavar="S", min=0.0, help="End after this time.")] = None,
     rate: Annotated[float, typer.Option(metavar="N", help="Speed factor for a recording.")] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="Repeat a recording.")] = False,
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Send poses to vmc://HOST[:PORT], or serve them at ws://[HOST][:PORT]; repeatable "
+            "(pip install 'voodoo-tracker[stream]').",
+        ),
+    ] = None,
     publish: Annotated[
         bool | None,
         typer.Option(
@@ -100,6 +108,8 @@ def live_command(
 
     voodoo live realsense --out pose.csv --record take1.mcap
 
+    voodoo live realsense --to vmc://192.168.1.20 --to ws://
+
     voodoo live ros2:/camera/depth/image_rect_raw --people any --report live.json
     """
     from voodoo.cli.live_run import Wishes, entered, run
@@ -128,6 +138,7 @@ def live_command(
             detector=detector_of(detector),
             targets=tuple(out or ()),
             record=record,
+            to=tuple(to or ()),
             view=view,
             serve=serve,
             publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,

@@ -27,6 +27,7 @@ from voodoo.live.first_frame import FirstFrame
 from voodoo.live.follow import ONE, Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
+from voodoo.live.sinks.registry import sink_of
 from voodoo.live.sources.words import source_of
 from voodoo.live.spool import Files
 from voodoo.live.stream import Live
@@ -74,6 +75,7 @@ class Wishes:
     detector: AnyDetector = "shipped"
     targets: tuple[Path, ...] = ()
     record: Path | None = None
+    to: tuple[str, ...] = ()
     view: bool = False
     serve: str | None = None
     publish: bool = False
@@ -183,7 +185,8 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
 
 
 def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
-    outputs: list[Output] = []
+    # Addresses come first: one that is of no use leaves no file behind.
+    outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in wishes.to]
     files = None
     if wishes.publish:
         from voodoo.live.ros2.publisher import Ros2Output

@@ -1,0 +1,47 @@
+"""Addresses that live poses are sent to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+from urllib.parse import SplitResult, urlsplit
+
+from voodoo.errors import VoodooError
+from voodoo.live.session import Output
+
+
+class Sink(Protocol):
+    """Makes the output of an address.
+
+    Args:
+        address: as it was given, e.g. "vmc://host:39539".
+        root_frame: returns the frame of the poses, once a frame has arrived.
+        on_message: called with a readable line when a receiver is late, gone, or back; from any thread.
+
+    Raises:
+        VoodooError: the address is of no use, or a library is missing; names both.
+    """
+
+    def __call__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> Output:
+        """Open the output. `Output.publish` must neither wait for a receiver nor raise an error if there is none."""
+
+
+def parts_of(address: str, *, host: str | None, port: int) -> tuple[str, int, SplitResult]:
+    """Host, port and all parts of an address.
+
+    Args:
+        address: SCHEME://[HOST][:PORT][?...].
+        host: if the address has none; None: it must have one.
+        port: if the address has none.
+
+    Raises:
+        VoodooError: no host, or no valid port.
+    """
+    try:
+        parts = urlsplit(address)
+        found, number = parts.hostname or host, port if parts.port is None else parts.port
+    except ValueError as error:
+        raise VoodooError(f"{address}: expected SCHEME://HOST:PORT, found: {error}") from None
+    if not found or parts.path.strip("/") or " " in address:
+        raise VoodooError(f"{address}: expected SCHEME://HOST:PORT, found another form")
+    return found, number, parts
