@@ -148,12 +148,6 @@ class AzureKinectRecording(Recording):
         first, last = self._stamps["depth"][0], self._stamps["depth"][-1]
         return self._described("azure-kinect", sensors, start=first, duration=last - first, unused=self._unused)
 
-    def root_from(self, frame: str, stamp: float) -> FloatArray:
-        """See Recording."""
-        if frame == COLOR_FRAME and "color" in self._stamps:
-            return self._depth_from_color
-        return super().root_from(frame, stamp)
-
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV
     try:

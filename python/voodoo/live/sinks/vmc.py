@@ -9,7 +9,6 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -51,8 +50,12 @@ class VmcSink(Output):
 
     def __init__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> None:
         """Find the host."""
-        if find_spec("pythonosc") is None:
-            raise VoodooError(f"{address}: expected python-osc, found none; pip install 'voodoo-tracker[stream]'")
+        try:
+            from pythonosc import osc_bundle_builder, osc_message_builder
+        except ImportError:
+            advice = "pip install 'voodoo-tracker[stream]'"
+            raise VoodooError(f"{address}: expected python-osc, found none; {advice}") from None
+        self._bundle_of, self._message_of = osc_bundle_builder.OscBundleBuilder, osc_message_builder.OscMessageBuilder
         self.name = address
         self._root, self._on_message = root_frame, on_message
         host, port, _ = parts_of(address, host=None, port=PORT)
@@ -83,12 +86,9 @@ class VmcSink(Output):
             self._send(self._bundle(messages[first : first + _TOGETHER]))
 
     def _bundle(self, messages: list[tuple[str | float, ...]]) -> bytes:
-        from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
-        from pythonosc.osc_message_builder import OscMessageBuilder
-
-        bundle = OscBundleBuilder(IMMEDIATELY)
+        bundle = self._bundle_of(0)
         for path, *values in messages:
-            message = OscMessageBuilder(f"/VMC/Ext{path}")
+            message = self._message_of(f"/VMC/Ext{path}")
             for value in values:
                 message.add_arg(value)
             bundle.add_content(message.build())

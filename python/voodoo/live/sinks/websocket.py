@@ -9,7 +9,7 @@ import math
 import re
 import socket
 import threading
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 from urllib.parse import parse_qs
@@ -54,12 +54,13 @@ class WebSocketSink(Output):
         """Start the server."""
         try:
             from websockets.asyncio.server import serve
+            from websockets.exceptions import ConnectionClosed
         except ImportError:
             raise VoodooError(
                 f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
             ) from None
         self.name = address
-        self._root, self._on_message = root_frame, on_message
+        self._root, self._on_message, self._left = root_frame, on_message, ConnectionClosed
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
         origins = [None, _OWN_PAGES, *parse_qs(parts.query).get("origin", ())]
         self._loop = asyncio.new_event_loop()
@@ -73,14 +74,11 @@ class WebSocketSink(Output):
             )
 
         try:
-            self._server = self._wait(start())
+            self._server = asyncio.run_coroutine_threadsafe(start(), self._loop).result()
         except OSError as error:
             self._end()
             raise VoodooError(f"{address}: expected a free address of this machine, found: {error.strerror}") from error
         self.port: int = self._server.sockets[0].getsockname()[1]
-
-    def _wait(self, work: Coroutine[Any, Any, Any]) -> Any:  # noqa: ANN401
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
 
     def publish(self, step: Step) -> None:
         """See Output."""
@@ -93,24 +91,20 @@ class WebSocketSink(Output):
 
     async def _serve(self, connection: Any) -> None:  # noqa: ANN401 - of websockets
         """Send until the receiver leaves; what it says is not heard."""
-        from websockets.exceptions import ConnectionClosed
-
         connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
         sender = asyncio.ensure_future(self._send_all(connection))
         try:
             async for _ in connection:
                 pass
-        except ConnectionClosed as closed:
-            if closed.rcvd is None:
+        except self._left as left:
+            if left.rcvd is None:
                 self._on_message(f"{self._who(connection)} is gone")
         finally:
             sender.cancel()
 
     async def _send_all(self, connection: Any) -> None:  # noqa: ANN401 - of websockets
-        from websockets.exceptions import ConnectionClosed
-
         late = False
-        with suppress(ConnectionClosed):
+        with suppress(self._left):
             while True:
                 sending = asyncio.ensure_future(connection.send(await asyncio.shield(self._newest)))
                 done, _ = await asyncio.wait({sending}, timeout=_LATE_S)
