@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -201,6 +203,26 @@ def realsense(folder: Path) -> None:
         (folder / name).write_bytes((source / name).read_bytes())
 
 
+def azure_kinect(folder: Path) -> None:
+    """A .mkv of the smallest mode, without color; needs PyAV."""
+    import av
+
+    film = av.open(str(folder / "x.mkv"), "w", format="matroska", options={"allow_raw_vfw": "1"})
+    track = film.add_stream("rawvideo", rate=30)
+    track.width, track.height, track.pix_fmt, track.codec_context.codec_tag = 320, 288, "gray16be", "b16g"
+    track.metadata.update({"title": "DEPTH", "K4A_DEPTH_MODE": "NFOV_2X2BINNED"})
+    lens = {"ModelParameters": [0.5, 0.5, 0.5, 0.5, 0.5, 0, 0, 0.9, 0.1, 0, 0, 0, 0, 0]}
+    cameras = [{"Purpose": "CALIBRATION_CameraPurposeDepth", "Intrinsics": lens}]
+    content = json.dumps({"CalibrationInformation": {"Cameras": cameras}}).encode()
+    film.add_attachment("calibration.json", "application/octet-stream", content)
+    for number in range(2):
+        packet = av.Packet(np.full((288, 320), 1500, ">u2").tobytes())
+        packet.stream, packet.time_base, packet.is_keyframe = track, Fraction(1, 1000), True
+        packet.pts = packet.dts = 33 * number
+        film.mux(packet)
+    film.close()
+
+
 SMALL_BODY = voodoo.Body.human(1.7, model="papers").to_toml()
 MAP = (
     'y_up = true\nsigma_m = 0.02\n[sites]\nA = "l_wrist"\n[limbs]\nB = { limb = "head", position = [0.0, 0.1, 0.0] }\n'
@@ -241,6 +263,8 @@ SAMPLES: dict[str, Sample] = {
     ),
     "marker map": Sample(written("x.toml", MAP), ("x.toml",), lambda f, _: MarkerMap.load(f / "x.toml"), text=True),
 }
+if importlib.util.find_spec("av"):
+    SAMPLES["azure kinect"] = Sample(azure_kinect, ("x.mkv",), inside("x.mkv"))
 
 
 def void(_: object) -> None:

@@ -8,12 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.export.conventions import Y_UP_LEFT, plain
-from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, skeleton
+from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, placed_on_parents, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
-
-_MOVES_M = 1e-4
 
 
 def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.0) -> None:
@@ -39,19 +37,13 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     parts = posed.bones
     lines = ["HIERARCHY"]
     order: list[int] = []
-    offsets = posed.offsets()
-    # Only frames with a pose determine the offsets; without any the body is at rest.
-    known = offsets[track.found] if track.found.any() else offsets
-    still = np.median(known, axis=0)
-    moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
+    offsets, still, moving = placed_on_parents(posed, track.found)
     _describe(parts, 0, "", (scale, still, moving), lines, order)
     lines += ["MOTION", f"Frames: {len(track)}", f"Frame Time: {mean_interval(track.stamps):.9f}"]
     local = Y_UP_LEFT @ posed.local() @ Y_UP_LEFT.T
     angles = np.empty((len(track), len(parts), 3))
     for index in range(len(parts)):
         angles[:, index] = np.degrees(euler_angles(local[:, index], "ZXY"))
-    offsets[:, 0] = posed.heads[:, 0]
-    moving[0] = True
     places = offsets @ Y_UP_LEFT.T * scale
     for shifts, turns in zip(places, angles, strict=True):
         row = [value for bone in order for value in (*(shifts[bone] if moving[bone] else ()), *turns[bone])]

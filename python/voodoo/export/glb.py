@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, names_of
-from voodoo.export.skeleton import FloatArray, held, skeleton
+from voodoo.export.skeleton import FloatArray, held, placed_on_parents, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.limb_mesh import limb_mesh
@@ -21,8 +21,6 @@ from voodoo.model.rotations import quaternions
 
 _FLOAT, _UINT, _UBYTE = 5126, 5125, 5121
 _VERTICES, _INDICES = 34962, 34963
-_MOVES_M = 1e-4
-"""A bone whose place on its parent changes by more than this has an animated translation."""
 _COLORS = ((0.9, 0.6, 0.3), (0.3, 0.6, 0.9), (0.5, 0.8, 0.4), (0.8, 0.4, 0.7))
 
 
@@ -98,14 +96,12 @@ class _File:
             raise VoodooError(f"body: expected at most 256 limbs for .glb, found {len(body.limbs)}")
         posed = held(skeleton(track, body), track.found)
         parts = posed.bones
-        offsets = posed.offsets() @ Y_UP_LEFT.T
-        offsets[:, 0] = posed.heads[:, 0] @ Y_UP_LEFT.T
-        still = np.median(offsets[track.found] if track.found.any() else offsets, axis=0)
+        offsets, still, moving = placed_on_parents(posed, track.found)
         first = len(self._scene.get("nodes", []))
         for index, bone in enumerate(parts):
             below = [first + child for child, other in enumerate(parts) if other.parent == index]
             vrm = names_of(bone.name).vrm
-            node = {"name": bone.name, "translation": still[index].tolist()}
+            node = {"name": bone.name, "translation": (Y_UP_LEFT @ still[index]).tolist()}
             extras = {"extras": {"vrm": vrm[0].lower() + vrm[1:]}} if vrm else {}
             self._add("nodes", node | extras | ({"children": below} if below else {}))
         inverse = np.tile(np.eye(4), (len(parts), 1, 1))
@@ -127,8 +123,8 @@ class _File:
             ahead = np.sum(turns[1:, index] * turns[:-1, index], axis=1) < 0.0
             turns[1:, index] *= np.where(np.cumsum(ahead) % 2, -1.0, 1.0)[:, None]
             self._animate(first + index, "rotation", times, turns[:, index])
-            if not index or np.abs(offsets[:, index] - still[index]).max() > _MOVES_M:
-                self._animate(first + index, "translation", times, offsets[:, index])
+            if moving[index]:
+                self._animate(first + index, "translation", times, offsets[:, index] @ Y_UP_LEFT.T)
         if not track.found.all() or track.stamps[0] > start:
             # Before and after the person's own frames, readers hold the first and the last value.
             shown_at = np.r_[0.0, track.stamps - start] if track.stamps[0] > start else track.stamps - start

@@ -19,6 +19,7 @@ from voodoo.model.body import Body
 from voodoo.model.rotations import matrix_of_turn
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+_MOVES_M = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +146,27 @@ def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
     last = np.maximum.accumulate(np.where(found, np.arange(len(found)), -1))
     last[last < 0] = int(np.argmax(found))
     return replace(posed.of_frames(last), stamps=posed.stamps)
+
+
+def placed_on_parents(
+    posed: Skeleton, found: npt.NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    """Places of bones for formats with constant offsets, which may be animated.
+
+    Args:
+        posed: without gaps, see `held`.
+        found: (F,) frames that have a pose; without any all frames count.
+
+    Returns:
+        Places (F, L, 3) [m] of each bone on its parent, of the root in the world; the median (L, 3); and (L,) which of them
+        change by more than 0.1 mm, because lengths are refined while tracking. The root always does.
+    """
+    places = posed.offsets()
+    known = places[found] if found.any() else places
+    still = np.median(known, axis=0)
+    moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
+    places[:, 0], moving[0] = posed.heads[:, 0], True
+    return places, still, moving
 
 
 def mean_interval(stamps: FloatArray) -> float:
