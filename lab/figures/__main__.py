@@ -1,8 +1,8 @@
 """Write the figures into the pages: `python -m lab.figures [--check] [--pictures [--data D]]`.
 
 Numbers come from runs.json; change them there, after a run of the command that is named beside them. `--check` only compares,
-and names the pages that differ. `--pictures` draws docs/demo.png (the bundled recording) and docs/failures.png (a rendered
-recording of the data folder, by default ../shared/data) with this build.
+and names the pages that differ. `--pictures` draws docs/demo.png (the bundled recording), docs/joint-frames.png and
+docs/failures.png (a rendered recording of the data folder, by default ../shared/data) with this build.
 """
 
 from __future__ import annotations

@@ -7,8 +7,12 @@ import sys
 from pathlib import Path
 
 import cv2
+import matplotlib.pyplot as plt
+import numpy as np
 
 from lab.figures.pages import ROOT
+from voodoo.export.skeleton import bones
+from voodoo.model.body import Body
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording, sample_path
@@ -22,13 +26,37 @@ WIDTH = 1068
 
 
 def draw(data: Path) -> None:
-    """Draw docs/demo.png and docs/failures.png; `data` is the folder of the measurement data."""
+    """Draw docs/demo.png, docs/joint-frames.png and docs/failures.png; `data` is the folder of the measurement data."""
     _demo(ROOT / "docs" / "demo.png")
+    _joint_frames(ROOT / "docs" / "joint-frames.png")
     recordings = sorted((data / "rendered").glob("dev_*"))
     if not recordings:
         sys.exit(f"lab.figures: expected recordings in {data / 'rendered'}, found none")
     command = [sys.executable, ROOT / "lab" / "experiments" / "failures.py", *recordings]
     subprocess.run([*command, "--out", ROOT / "docs" / "failures.png"], check=True)
+
+
+def _joint_frames(target: Path) -> None:
+    """The default human at rest: bones, their names, and the frame of each; x red, y green, z blue."""
+    figure = plt.figure(figsize=(9.0, 8.0))
+    axes = figure.add_subplot(projection="3d", proj_type="ortho", computed_zorder=False)
+    for bone in bones(Body.human()):
+        axes.plot(*np.array([bone.head, bone.tip]).T, color="0.6", linewidth=4.0, solid_capstyle="round", zorder=1)
+        for axis, color in zip(np.eye(3), ("#d62728", "#2ca02c", "#1f77b4"), strict=True):
+            axes.plot(*np.array([bone.head, bone.head + 0.09 * axis]).T, color=color, linewidth=1.8, zorder=2)
+        if bone.name.startswith("r_"):  # names of the left are alike
+            low = 0.05 if bone.name == "r_clavicle" else 0.0
+            axes.text(*(bone.head - (0.0, 0.03, low)), bone.name, fontsize=8, ha="right", va="center")
+        elif not bone.name.startswith("l_"):
+            axes.text(*(bone.head + (0.0, 0.11, 0.0)), bone.name, fontsize=8, ha="left", va="center")
+    axes.set_aspect("equal")
+    axes.view_init(elev=14.0, azim=28.0)
+    axes.set_axis_off()
+    figure.savefig(target, dpi=130)
+    plt.close(figure)
+    image = cv2.imread(str(target))
+    rows, columns = np.nonzero(image.min(axis=2) < 255)
+    cv2.imwrite(str(target), image[rows.min() - 8 : rows.max() + 8, columns.min() - 8 : columns.max() + 8])
 
 
 def _demo(target: Path) -> None:
