@@ -2,12 +2,9 @@
 
 import json
 import re
-import shutil
 import socket
-import subprocess
 import threading
 import time
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import voodoo
+from browser import needs_chromium, told_by
 from commands import run
 from test_doors import track_of
 from voodoo.errors import VoodooError
@@ -241,59 +239,19 @@ def test_a_receiver_that_hangs_holds_nobody_up_and_gets_the_newest_when_it_wakes
     reader.join(5)
 
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (Debian: chromium)")
+@needs_chromium
 def test_a_page_in_a_browser_receives_poses(tmp_path):
     """The script of the page of the documentation, which reports what it logs to the server it came from."""
-    told = []
     (script,) = re.findall(r"```html\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
-
-    class Server(BaseHTTPRequestHandler):
-        def do_GET(self):
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html")
-            self.end_headers()
-            log = (
-                "<script>console.log = (...words) => fetch('/', {method: 'POST', body: JSON.stringify(words)})</script>"
-            )
-            self.wfile.write((log + script.replace(":8765", f":{sink.port}")).encode())
-
-        def do_POST(self):
-            told.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
-            self.send_response(204)
-            self.end_headers()
-
-        def log_message(self, *words):
-            pass
-
+    log = "<script>console.log = (...words) => fetch('/', {method: 'POST', body: JSON.stringify(words)})</script>"
     body = voodoo.Body.human()
     step = step_of(track_of(body), body, number=7)
     sink = opened("ws://:0")
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Server)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    words = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}"]
-    browser = subprocess.Popen(
-        [CHROMIUM, *words, f"http://localhost:{server.server_port}/"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-
-        def heard_back():
-            sink.publish(step)
-            time.sleep(0.03)
-            return bool(told)
-
-        until(heard_back, 30.0)
-    finally:
-        browser.kill()
-        browser.wait()
-        server.shutdown()
-        sink.close()
-    number, status, wrist = told[0]
-    assert (number, status) == (7, "tracking") and wrist == pytest.approx(step.estimates[7].joints["l_wrist"], abs=1e-5)
+    page = log + script.replace(":8765", f":{sink.port}")
+    (number, status, wrist), console = told_by(page, tmp_path, meanwhile=lambda: sink.publish(step))
+    sink.close()
+    assert (number, status) == (7, "tracking") and not console
+    assert wrist == pytest.approx(step.estimates[7].joints["l_wrist"], abs=1e-5)
 
 
 def test_pages_of_others_may_not_connect():

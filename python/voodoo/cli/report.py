@@ -1,0 +1,46 @@
+"""`voodoo report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from voodoo.cli.common import clear_errors
+from voodoo.errors import VoodooError
+
+
+def report_command(
+    result: Annotated[Path, typer.Argument(metavar="FILE", help="A .csv or .npz of voodoo track.")],
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The page.")] = Path("report.html"),
+) -> None:
+    """Write a result as one web page: the skeleton turning in 3-D with a timeline, status of limbs, joint angles, residual.
+
+    The page needs no network, and holds each person of the result.
+    Needs pip install 'voodoo-tracker[report]'.
+
+    Example
+
+    voodoo report pose.npz --out report.html
+    """
+    from voodoo.export.people import PeopleTrack
+    from voodoo.export.people_rows import is_people_file
+    from voodoo.export.result_file import check_suffix
+    from voodoo.export.track import Track
+    from voodoo.visualization.report_page import report_page
+    from voodoo.whole import appearing_whole
+
+    with clear_errors():
+        if out.suffix != ".html":
+            raise VoodooError(f"{out}: expected a name that ends in .html, found {out.suffix!r}")
+        check_suffix(result)
+        if is_people_file(result):
+            people = PeopleTrack.load(result)
+            tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
+        else:
+            tracks = {"the person": Track.load(result)}
+        page = report_page(result.stem, tracks)
+        with appearing_whole(out) as place:
+            place.write_text(page, encoding="utf-8")
+        typer.echo(f"wrote {out}")

@@ -1,0 +1,49 @@
+"""The page of a result, looked at in Chromium: nothing fails, nothing is fetched, and play turns the skeleton."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import voodoo
+from browser import needs_chromium, told_by
+from commands import refused, run
+from test_doors import track_of
+from test_exports import with_gaps
+from voodoo.export.people import PeopleTrack
+
+pytest.importorskip("plotly", reason="pip install plotly, of the extra report")
+PLAY = """<script>setTimeout(() => {
+  const plot = document.querySelectorAll(".js-plotly-plot")[1], first = plot._fullData[0].x[0];
+  plot.querySelector(".updatemenu-button").dispatchEvent(new MouseEvent("click"));
+  setTimeout(() => fetch("/", {method: "POST", body: JSON.stringify([
+    plot.layout.sliders[0].active, plot._fullData[0].x[0] !== first, plot.layout.shapes[0].x0,
+    performance.getEntriesByType("resource").map((one) => one.name).filter((name) => !name.endsWith("favicon.ico"))])}), 1500);
+}, 500)</script>"""
+
+
+@needs_chromium
+def test_a_page_plays_without_network(tmp_path):
+    body = voodoo.Body.human()
+    track = with_gaps(track_of(body))
+    sure = np.where(track.found[:, None, None, None], 1e-4 * np.eye(3), np.nan)
+    track = replace(
+        track,
+        covariance=np.tile(sure, (1, len(track.joint_names), 1, 1)),
+        limb_status={limb: ("", "measured") * 12 + ("",) for limb in body.limb_names},
+    )
+    PeopleTrack(track.stamps, {1: track, 2: track.of_frames(track.found)}).save(tmp_path / "all <b>.npz")
+    done = run("report", tmp_path / "all <b>.npz", "--out", tmp_path / "all.html")
+    assert done.exit_code == 0, done.stderr
+    page = (tmp_path / "all.html").read_text(encoding="utf-8")
+    (slider, moved, cursor, fetched), console = told_by(page + PLAY, tmp_path)
+    assert slider > 0 and moved and cursor > 0.0 and fetched == [] and console == []
+    assert "<h1>all &lt;b&gt;</h1>" in page and "12 tracking" in page and "13 searching" in page
+
+
+def test_what_is_no_result_leaves_no_page(tmp_path):
+    (tmp_path / "pose.csv").write_text("stamp_s,status\n")
+    refused(run("report", tmp_path / "pose.csv", "--out", tmp_path / "a.html"), "pose.csv")
+    refused(run("report", tmp_path / "none.npz", "--out", tmp_path / "a.html"), "none.npz", "no such file")
+    refused(run("report", tmp_path / "pose.csv", "--out", tmp_path / "a.pdf"), "a.pdf", ".html")
+    assert [path.name for path in tmp_path.iterdir()] == ["pose.csv"]
