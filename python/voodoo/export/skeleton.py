@@ -8,6 +8,7 @@ rest.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -52,7 +53,7 @@ def bones(body: Body) -> tuple[Bone, ...]:
     _, limbs, _ = body.core.parts()
     names = [limb[0] for limb in limbs]
     axes = [place[1] for limb in limbs if limb[3] is not None for place in limb[3][1:3]]
-    from_joints = iter([matrix_of_turn(axis) for axis in axes])
+    from_joints = iter([_turn(*axis) for axis in axes])
     for name, parent, shape, joint, _ in limbs:
         if joint is None or parent is None:
             turn, shift, place, above, joint_name = np.eye(3), np.zeros(3), np.zeros(3), None, name
@@ -69,6 +70,14 @@ def bones(body: Body) -> tuple[Bone, ...]:
         tip = turn @ np.array([0.0, 0.0, shape.length]) + shift
         result.append(Bone(name, above, joint_name, head, tip, turn, place))
     return tuple(result)
+
+
+@lru_cache(maxsize=256)
+def _turn(x: float, y: float, z: float) -> FloatArray:
+    """Cached, because the axes of joints stay while lengths are refined in every frame."""
+    turn = matrix_of_turn((x, y, z))
+    turn.setflags(write=False)
+    return turn
 
 
 @dataclass(frozen=True, eq=False)
