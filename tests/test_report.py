@@ -29,6 +29,7 @@ def test_a_page_plays_without_network(tmp_path):
     sure = np.where(track.found[:, None, None, None], 1e-4 * np.eye(3), np.nan)
     track = replace(
         track,
+        joint_names=("</script><script>boom()</script>", *track.joint_names[1:]),
         covariance=np.tile(sure, (1, len(track.joint_names), 1, 1)),
         limb_status={limb: ("", "measured") * 12 + ("",) for limb in body.limb_names},
     )
@@ -38,6 +39,7 @@ def test_a_page_plays_without_network(tmp_path):
     page = (tmp_path / "all.html").read_text(encoding="utf-8")
     (slider, moved, cursor, fetched), console = told_by(page + PLAY, tmp_path)
     assert slider > 0 and moved and cursor > 0.0 and fetched == [] and console == []
+    assert "<script>boom()" not in page
     assert "<h1>all &lt;b&gt;</h1>" in page and "12 tracking" in page and "13 searching" in page
 
 

@@ -41,7 +41,7 @@ def write_glb(path: str | Path, people: Mapping[str, tuple[Track, Body]]) -> Non
         OSError: the file cannot be written.
     """
     file = _File()
-    start = min((float(track.stamps[0]) for track, _ in people.values() if len(track)), default=0.0)
+    start = min((float(track.stamps[0]) for track, _ in people.values()), default=0.0)
     for number, (name, (track, body)) in enumerate(people.items()):
         file.add_person(name, track, body, _COLORS[number % len(_COLORS)], start)
     Path(path).write_bytes(file.content())
@@ -114,8 +114,6 @@ class _File:
         shown = {"name": f"{name}_mesh", "mesh": self._mesh(body, track, color), "skin": self._add("skins", skin)}
         person = self._add("nodes", {"name": name, "children": [first]})
         self._scene["scenes"][0].setdefault("nodes", []).extend([person, self._add("nodes", shown)])
-        if not len(track):
-            return
         times = self._floats(track.stamps - start, "SCALAR")
         turns = quaternions(Y_UP_LEFT @ posed.local() @ Y_UP_LEFT.T)
         for index in range(len(parts)):

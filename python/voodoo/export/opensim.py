@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.export.conventions import Y_UP_RIGHT, coordinates, names_of
-from voodoo.export.skeleton import Skeleton, mean_interval, skeleton
+from voodoo.export.conventions import Y_UP_RIGHT, coordinates, names_of, plain
+from voodoo.export.skeleton import FloatArray, mean_interval, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
@@ -40,8 +40,9 @@ def write_mot(path: str | Path, track: Track, body: Body) -> None:
         for turns, place in zip(angles, places, strict=True)
     )
     columns = [*names, *(f"{root}_t{axis}" for axis in "xyz")]
-    header = [Path(path).name, "version=1", f"nRows={len(angles)}", f"nColumns={1 + len(columns)}", "inDegrees=yes"]
-    _write(Path(path), header, columns, _times(track, posed), rows)
+    size = f"nRows={len(angles)}", f"nColumns={1 + len(columns)}"
+    header = [plain(Path(path).name), "version=1", *size, "inDegrees=yes"]
+    _write(Path(path), header, columns, posed.stamps - track.stamps[0], rows)
 
 
 def write_sto(path: str | Path, track: Track, body: Body) -> None:
@@ -64,16 +65,10 @@ def write_sto(path: str | Path, track: Track, body: Body) -> None:
     columns = [f"{names_of(bone.name).opensim}_imu" for bone in posed.bones]
     rate = 1.0 / mean_interval(track.stamps)
     header = [f"DataRate={rate:.6f}", "DataType=Quaternion", "version=3", "OpenSimVersion=4.5"]
-    _write(Path(path), header, columns, _times(track, posed), rows)
+    _write(Path(path), header, columns, posed.stamps - track.stamps[0], rows)
 
 
-def _times(track: Track, posed: Skeleton) -> list[float]:
-    return list(posed.stamps - track.stamps[0]) if len(track) else []
-
-
-def _write(
-    path: Path, header: Sequence[str], columns: Sequence[str], times: Sequence[float], rows: Iterable[str]
-) -> None:
+def _write(path: Path, header: Sequence[str], columns: Sequence[str], times: FloatArray, rows: Iterable[str]) -> None:
     lines = [*header, "endheader", "\t".join(["time", *columns])]
     lines += [f"{time:.6f}\t{row}" for time, row in zip(times, rows, strict=True)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
