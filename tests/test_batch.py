@@ -123,7 +123,7 @@ def test_a_file_appears_whole_and_leaves_nothing_beside_it(tmp_path, monkeypatch
     store = Store(str(tmp_path))
     store.write("frames/recording=a/part-0.parquet", b"old")
     place = tmp_path / "frames" / "recording=a"
-    (place / ".part-0.parquet.123-ab").write_bytes(b"of a worker that died")
+    (place / ".part-0.parquet-abcd1234.voodoo").mkdir()  # of a worker that died
 
     def full(*_):
         raise OSError(28, "No space left on device")

@@ -16,6 +16,8 @@ OUTPUTS = {"out", "overlay", "save", "report", "record"}
 """Parameters of commands that name what is written; all others with a metavar of files are read."""
 SEARCHED = "RECORDING..."
 """Metavar of folders in which recordings are searched for: the command checks the recordings that it finds."""
+_BESIDE = ("truth.csv", "truth_people.csv")
+"""Files that are read with a recording in their folder or the one below."""
 _FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
 
 
@@ -50,7 +52,9 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
             else:
                 # Also the path in SENSOR=DIR and KIND:SOURCE.
                 inputs += [Path(part) for word in words for part in (word, *re.split("[=:]", word, maxsplit=1)[1:])]
-    check_outputs(outputs, inputs)
+    folders = {folder for path in inputs for folder in (path.parent, path.parent.parent)}
+    inputs += [folder / name for folder in sorted(folders) for name in _BESIDE]
+    check_outputs(outputs, inputs, numbered=context.params.get("people") not in (None, "1"))
 
 
 def _words(value: object) -> Iterator[str]:

@@ -106,7 +106,7 @@ class _Followed(NamedTuple):
     track: PeopleTrack
     bodies: dict[int, Body]
     interrupted: bool
-    failure: VoodooError | OSError | None
+    failure: Exception | None
 
 
 def _run(

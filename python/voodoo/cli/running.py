@@ -37,7 +37,7 @@ class Run(NamedTuple):
     seconds: list[float]
     pictures: list[Picture]
     interrupted: bool
-    failure: VoodooError | OSError | None
+    failure: Exception | None
 
 
 def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
