@@ -27,6 +27,7 @@ COMMANDS = {
     "init": ["a", "--out", "i.json"],
     "ik": ["a", "--out", "k.csv"],
     "batch": ["a", "--out", "many"],
+    "recover": ["."],
     "info": ["a"],
     "config": [],
     "body": [],

@@ -203,15 +203,23 @@ def test_a_film_or_format_that_fails_costs_no_other_output(tmp_path, monkeypatch
     assert done.exit_code == 1
     assert "old.bvh" in done.stderr and "look.mp4" in done.stderr and "wrote pose.csv" in done.stderr
     assert Path("old.bvh").read_text() == "old" and len(Path("pose.csv").read_text().splitlines()) == 91
-    assert {file.name for file in tmp_path.iterdir()} == {"old.bvh", "pose.csv"}
+    (kept,) = {file.name for file in tmp_path.iterdir()} - {"old.bvh", "pose.csv"}
+    assert kept in done.stderr and "voodoo recover" in done.stderr
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert "wrote old.recovered.bvh" in run(app, ["recover", "."]).stdout
+    assert {file.name for file in tmp_path.iterdir()} == {"old.bvh", "old.recovered.bvh", "pose.csv"}
+    assert Path("old.bvh").read_text() == "old"
 
 
-def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monkeypatch):
+@pytest.mark.parametrize("command", [["live", "--rate", "4"], ["track"]], ids=["live", "track"])
+def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monkeypatch, command):
     """No part can be stored after the first; the files are on another disk."""
-    save, command = Track.save, ["live", str(sample_path()), "--rate", "4", "--out", str(tmp_path / "pose.csv")]
-    monkeypatch.setattr(Track, "save", lambda self, path: full() if path.name == "00000001.npz" else save(self, path))
-    done = run(app, command)
-    assert done.exit_code != 0 and "No space left" in done.stderr
+    savez, parts = np.savez, []
+    monkeypatch.setattr("voodoo.cli.track.TOGETHER", 30)
+    monkeypatch.setattr(np, "savez", lambda *place, **how: full() if parts else parts.append(savez(*place, **how)))
+    done = run(app, [command[0], str(sample_path()), *command[1:], "--out", str(tmp_path / "pose.csv")])
+    assert done.exit_code == 1 and "No space left" in done.stderr
     assert len(Track.load(tmp_path / "pose.csv")) == 60
     assert [file.name for file in tmp_path.iterdir()] == ["pose.csv"]
 
@@ -219,7 +227,7 @@ def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monke
 def test_the_poses_of_a_session_are_kept_where_its_files_cannot_be_written(tmp_path, monkeypatch):
     command = ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--out", str(tmp_path / "pose.csv")]
     with monkeypatch.context() as patch:
-        patch.setattr("voodoo.live.spool.save", full)
+        patch.setattr("voodoo.export.spool.write_csv", full)
         done = run(app, command)
     (folder,) = tmp_path.iterdir()
     assert done.exit_code != 0 and str(folder) in done.stderr
@@ -233,7 +241,7 @@ def test_a_recording_that_cannot_be_put_in_its_place_is_kept(tmp_path, monkeypat
     done = run(app, ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--record", str(take)])
     (folder,) = tmp_path.iterdir()
     assert done.exit_code == 1 and f"{take}: " in done.stderr and str(folder) in done.stderr
-    assert len(open_recording(folder / "take")) > 0
+    assert len(open_recording(folder / "take.mcap")) > 0
 
 
 def test_a_table_of_an_evaluation_that_fails_leaves_the_old_one(tmp_path):

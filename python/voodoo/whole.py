@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import json
 import os
 import re
@@ -10,7 +9,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +17,19 @@ from voodoo.errors import VoodooError
 
 SUFFIX = ".voodoo"
 """Ends the names of hidden folders."""
-KEPT = "kept.json"
+KEPT = ".voodoo-kept.json"
 """File in a hidden folder with the names of the outputs that its content becomes after a crash."""
+_LOCK = ".voodoo-lock"
 _LONGEST = 48
 """Length of an output's name in that of a hidden folder [characters]: names of files have 255 bytes at most."""
+_UNLOCKED = -1
 
 
 class Hidden:
     """A new hidden folder beside an output, for what is not complete yet.
 
-    No other process writes to it, and no link is followed. It is locked as long as this process lives; so what a process
-    left that was killed can be told from what is in use: it is removed when its output is written again, if nothing in it
-    is to be kept.
+    No other process writes to it, and no link is followed. It is locked as long as this process lives, so that what a killed
+    process left is told from what is in use: it is removed when its output is written again, unless `keep` was called.
 
     Args:
         path: the output.
@@ -42,15 +42,19 @@ class Hidden:
         """Make the folder, and that of the output."""
         path.parent.mkdir(parents=True, exist_ok=True)
         start = f".{path.name[:_LONGEST]}-"
-        for left in path.parent.glob(f"{glob.escape(start)}????????{SUFFIX}"):
-            if not (left / KEPT).exists() and (lock := locked(left)) is not None:
-                shutil.rmtree(left, ignore_errors=True)
-                os.close(lock)
-        while True:
+        for left in path.parent.iterdir():
+            with suppress(OSError):
+                ours = left.name.startswith(start) and left.name.endswith(SUFFIX)
+                if ours and not (left / KEPT).exists() and (lock := locked(left)) is not None:
+                    removed(left)
+                    os.close(lock)
+        self._lock: int | None = None
+        while self._lock is None:  # somebody took it for one that was left
             self.folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=start, suffix=SUFFIX))
-            self._lock = locked(self.folder)
-            if self.folder.exists():  # nobody took it for one that was left
-                break
+            try:
+                self._lock = locked(self.folder)
+            except OSError:
+                self._lock = _UNLOCKED if self.folder.exists() else None
 
     def keep(self, **note: Any) -> None:  # noqa: ANN401 - any values of JSON
         """Keep the folder after a crash; `note` tells what is in it."""
@@ -59,35 +63,45 @@ class Hidden:
 
     def remove(self) -> None:
         """Delete the folder."""
-        (self.folder / KEPT).unlink(missing_ok=True)
-        shutil.rmtree(self.folder, ignore_errors=True)
+        removed(self.folder)
         self.close()
 
     def close(self) -> None:
         """Leave the folder to others."""
-        if self._lock is not None:
+        if self._lock is not None and self._lock != _UNLOCKED:
             os.close(self._lock)
-            self._lock = None
+        self._lock = _UNLOCKED
+
+
+def removed(folder: Path) -> None:
+    """Delete a hidden folder; what a crash leaves of it is not kept."""
+    (folder / KEPT).unlink(missing_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def locked(folder: Path) -> int | None:
     """Lock a hidden folder until the returned descriptor is closed, or this process ends; None: another process lives in it.
 
-    Where the system has no such locks, every folder is taken to be in use.
+    Raises:
+        OSError: the folder is gone, or the system has no such locks.
     """
     if sys.platform == "win32":
-        return None
+        raise OSError("no locks")
     import fcntl
 
-    descriptor = None
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
     try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        if descriptor is not None:
-            os.close(descriptor)
+    except BlockingIOError:
+        os.close(descriptor)
         return None
-    return descriptor
+    except OSError:
+        os.close(descriptor)
+        raise
+    if folder.exists():
+        return descriptor
+    os.close(descriptor)  # it was removed before it was locked
+    return None
 
 
 @contextmanager

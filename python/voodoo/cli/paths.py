@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from voodoo.cli.common import clear_errors
+from voodoo.cli.signals import ending
 
 OUTPUTS = {"out", "overlay", "save", "report", "record"}
 """Parameters of commands that name what is written; all others with a metavar of files are read."""
@@ -22,13 +23,14 @@ _FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
 
 
 class Checked(TyperCommand):
-    """A command that begins only if nothing it writes is in the place of what it reads."""
+    """A command that begins only if nothing it writes is in the place of what it reads, and that signals end."""
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - Typer brings its own Click, or uses the installed one
         """Check the options, then run the command."""
         with clear_errors():
             check_paths(ctx)
-        return super().invoke(ctx)
+        with ending():
+            return super().invoke(ctx)
 
 
 def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reason
 from voodoo.export.bvh import write_bvh
 from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import write_bag
@@ -90,6 +90,8 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
             done += write(path)
         except (VoodooError, OSError) as error:
             failed.append(error)
+        except Exception as error:
+            failed.append(VoodooError(f"{path}: {reason(error)}"))
     return done, failed
 
 

@@ -55,6 +55,7 @@ class Viewer:
 
     Attributes:
         address: address for browsers; "" if it is not served.
+        failure: why the file is missing after a `with` block; None if it is there. If it is set before, the file is removed.
 
     Raises:
         VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
@@ -72,6 +73,7 @@ class Viewer:
         self._server: Server | None = None
         self._ends = ExitStack()
         self._place: Path | None = None
+        self.failure: Exception | None = None
         if serve is not None:
             self._server = Server(serve)
             self._ends.callback(self._server.close)
@@ -107,13 +109,17 @@ class Viewer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the file; after an error, remove it."""
-        if error is None:
-            self.close()
+        """Finish the file; after an error or failure, remove it."""
+        if error is None and self.failure is None:
+            try:
+                self.close()
+            except Exception as failure:
+                self.failure = failure
             return
         self._stream.disconnect()
-        with suppress(OSError):
-            self._ends.__exit__(kind, error, trace)
+        with suppress(OSError, RuntimeError):
+            raised = error or RuntimeError()
+            self._ends.__exit__(type(raised), raised, trace)
 
     def close(self) -> None:
         """Flush buffered data, and complete the file.

@@ -1,0 +1,61 @@
+"""Completes a recording whose recorder was killed."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from voodoo.errors import RecordingError, reading
+from voodoo.export.files import bag_folder
+from voodoo.export.ros2 import STORE
+from voodoo.recordings.mcap_file import check_mcap, records, stored_records
+from voodoo.whole import appearing_whole, move_whole
+
+_SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
+
+
+def complete(source: Path, path: Path) -> None:
+    """Give a file of `voodoo live --record` its name; one that is cut off is written anew with the messages of whole chunks.
+
+    Raises:
+        RecordingError: it is of another program.
+        OSError: it cannot be written.
+    """
+    try:
+        check_mcap(source)
+    except RecordingError:
+        _write(source, path)
+    else:
+        move_whole(source, path)
+
+
+def _write(source: Path, path: Path) -> None:
+    kinds: dict[int, str] = {}
+    connections: dict[int, Connection] = {}
+    with appearing_whole(path) as place, bag_folder(place) as folder:
+        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            for code, body in _sound(source):
+                if code == _SCHEMA:
+                    kinds[struct.unpack_from("<H", body)[0]] = _word(body, 2)
+                elif code == _CHANNEL:
+                    channel, schema = struct.unpack_from("<HH", body)
+                    connections[channel] = writer.add_connection(_word(body, 4), kinds[schema], typestore=STORE)
+                elif code == _MESSAGE:
+                    channel, _, time = struct.unpack_from("<HIQ", body)
+                    writer.write(connections[channel], time, body[22:])
+
+
+def _sound(source: Path) -> Iterator[tuple[int, bytes]]:
+    """The records in whole chunks."""
+    with reading(source, "a recording of voodoo live"):
+        for content in stored_records(source):
+            yield from records(content)
+
+
+def _word(body: bytes, at: int) -> str:
+    (length,) = struct.unpack_from("<I", body, at)
+    return body[at + 4 : at + 4 + length].decode()
