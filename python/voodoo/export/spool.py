@@ -8,12 +8,13 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading, reason
@@ -75,6 +76,7 @@ class Spool:
         self._hidden = Hidden(paths[0])
         self._together = together
         self._waiting: list[Estimate | PeopleEstimate] = []
+        self._made: dict[str, npt.NDArray[Any]] | None = None
         self._bodies: dict[int, Body] = {}
         self._bodies_at = -_BODIES_S
         self._parts: list[Path] = []
@@ -89,6 +91,7 @@ class Spool:
             OSError: they cannot be put on the disk; they are in memory then.
         """
         self._waiting.append(estimate)
+        self._made = None
         self._bodies.update(bodies)
         self.frames += 1
         poses = [one.estimate for one in estimate] if isinstance(estimate, PeopleEstimate) else [estimate]
@@ -98,7 +101,7 @@ class Spool:
             self._put_away()
 
     def _put_away(self) -> None:
-        arrays = self._last().arrays() if self._several else arrays_of(self._last())
+        arrays = dict(self._last())
         if time.monotonic() - self._bodies_at >= _BODIES_S:
             arrays["bodies"] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
             arrays["body_of"] = np.array(list(self._bodies), dtype=np.int64)
@@ -115,16 +118,18 @@ class Spool:
         names = [path.name for path in paths]
         self._hidden.keep(paths=names, root_frame=self._root(), optical=self._optical, several=self._several)
 
-    def _last(self) -> Any:  # noqa: ANN401 - Track or PeopleTrack
+    def _last(self) -> dict[str, npt.NDArray[Any]]:
         """What is in memory."""
-        if self._several:
-            return PeopleTrack.of(self._waiting, bodies=self._bodies)  # type: ignore[arg-type]
-        return Track.of(self._waiting, body=self._bodies.get(ONE))  # type: ignore[arg-type]
+        if self._made is None:
+            if self._several:
+                self._made = PeopleTrack.of(self._waiting, bodies=self._bodies).arrays()  # type: ignore[arg-type]
+            else:
+                self._made = arrays_of(Track.of(self._waiting, body=self._bodies.get(ONE)))  # type: ignore[arg-type]
+        return self._made
 
-    def _contents(self) -> Iterator[Arrays]:
-        yield from _stored(self._parts)
-        if self._waiting:
-            yield self._last().arrays() if self._several else arrays_of(self._last())
+    def _contents(self) -> Callable[[], Iterator[Arrays]]:
+        last = [self._last()] if self._waiting else []
+        return lambda: chain(_stored(self._parts), last)
 
     def sample(self) -> Track:
         """Some of the frames of one person: all of them if there are few.
@@ -133,7 +138,7 @@ class Spool:
             VoodooError: no frames.
         """
         every = -(-(len(self._parts) + 1) // _SAMPLED)
-        return Track.joined([track_of(part) for number, part in enumerate(self._contents()) if number % every == 0])
+        return Track.joined([track_of(part) for number, part in enumerate(self._contents()()) if number % every == 0])
 
     def write(self, *, left_out: Mapping[str, int] | None = None) -> tuple[list[Path], list[Exception]]:
         """Write the outputs, whatever becomes of each; returns the files, and what failed.
@@ -150,11 +155,12 @@ class Spool:
             self._hidden.remove()
             raise VoodooError("expected at least one frame to write, found none")
         failing: list[Path] = []
+        contents = self._contents()
         how: Any = {"bodies": self._bodies, "root_frame": self._root(), "optical": self._optical}
 
         def write(path: Path) -> list[Path]:
             try:
-                return _write(path, self._contents, several=self._several, left_out=left_out or {}, **how)
+                return _write(path, contents, several=self._several, left_out=left_out or {}, **how)
             except OSError:
                 failing.append(path)
                 raise
