@@ -181,7 +181,11 @@ class Store:
         """
         files, top = self._at
         with reading(f"{self.url}/{name}", "a readable file", error=VoodooError):
-            return files.cat_file(f"{top}/{name}").decode("utf-8") if files.exists(f"{top}/{name}") else None
+            return (
+                files.cat_file(f"{top}/{name}").decode("utf-8", errors="replace")
+                if files.exists(f"{top}/{name}")
+                else None
+            )
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file atomically.
@@ -198,6 +202,12 @@ class Store:
                 return
             with appearing_whole(Path(place)) as part:
                 part.write_bytes(content)
+
+    def rename(self, name: str, other: str) -> None:
+        """Give a file another name."""
+        files, top = self._at
+        with reading(f"{self.url}/{name}", "a file that can be renamed", error=VoodooError):
+            files.mv(f"{top}/{name}", f"{top}/{other}")
 
     def place_of(self, recording: str) -> str:
         """Path of a recording's table."""

@@ -30,6 +30,9 @@ def batch_command(
     only: Annotated[
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
     ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="S", min=0.001, help="A recording that takes longer has failed.")
+    ] = None,
     config: ConfigOption = None,
     model: ModelOption = None,
     use: UseOption = None,
@@ -85,7 +88,9 @@ def batch_command(
         sources = find_sources(recordings, only=only or ())
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
-        batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings)
+        batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings, limit_s=time_limit)
+        for note in batch.notes:
+            print_message(note)
         before = len(sources) - len(batch.jobs)
         interrupted = False
         if batch.jobs:
