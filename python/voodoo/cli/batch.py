@@ -91,6 +91,7 @@ def batch_command(
         batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings, limit_s=time_limit)
         for note in batch.notes:
             print_message(note)
+        batch.save()  # also of tables that it did not have
         before = len(sources) - len(batch.jobs)
         interrupted = False
         if batch.jobs:
