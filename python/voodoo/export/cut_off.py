@@ -19,7 +19,8 @@ _SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
 
 
 def complete(source: Path, path: Path) -> None:
-    """Give a file of `voodoo live --record` its name; one that is cut off is written anew with the messages of whole chunks.
+    """Give a file of `voodoo live --record` its name; one that is cut off is written anew with the messages of whole chunks,
+    if there are any.
 
     Raises:
         RecordingError: it is of another program.
@@ -28,7 +29,8 @@ def complete(source: Path, path: Path) -> None:
     try:
         check_mcap(source)
     except RecordingError:
-        _write(source, path)
+        if any(code == _MESSAGE for code, _ in _sound(source)):
+            _write(source, path)
     else:
         move_whole(source, path)
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading, reason
 from voodoo.export.cut_off import complete
-from voodoo.export.files import check_target, save, written
+from voodoo.export.files import FORMATS, check_target, save, written
 from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
 from voodoo.export.people_rows import write_rows
@@ -303,11 +303,12 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
         free = {Path(str(name)).name: _free(hidden.parent / Path(str(name)).name, taken) for name in note["paths"]}
     if "several" not in note:  # a recording, or a folder that was being replaced
         for name, path in free.items():
-            bag = next((hidden / name).glob("*.mcap"), None)
-            if bag is not None and path.suffix == ".mcap":
-                complete(bag, path)
-            elif (hidden / name).exists():
-                move_whole(hidden / name, path)
+            left = hidden / name
+            if path.suffix == ".mcap" and left.is_dir():
+                for bag in left.glob("*.mcap"):
+                    complete(bag, path)
+            elif left.exists():
+                move_whole(left, path)
             done += [path] if path.exists() else []
         removed(hidden)
         return
@@ -339,5 +340,7 @@ def _free(path: Path, taken: set[Path]) -> Path:
     found, number = path, 1
     while found.exists() or found.resolve() in taken:
         again = f"-{number}" if number > 1 else ""
-        found, number = path.with_name(f"{path.stem}.recovered{again}{path.suffix}"), number + 1
+        known = path.suffix in FORMATS
+        name = f"{path.stem}.recovered{again}{path.suffix}" if known else f"{path.name}-recovered{again}"
+        found, number = path.with_name(name), number + 1
     return found
