@@ -212,7 +212,7 @@ def test_a_film_or_format_that_fails_costs_no_other_output(tmp_path, monkeypatch
     assert Path("old.bvh").read_text() == "old"
 
 
-@pytest.mark.parametrize("command", [["live", "--rate", "4"], ["track"]], ids=["live", "track"])
+@pytest.mark.parametrize("command", [["live", "--rate", "2"], ["track"]], ids=["live", "track"])
 def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monkeypatch, command):
     """No part can be stored after the first; the files are on another disk."""
     savez, parts = np.savez, []

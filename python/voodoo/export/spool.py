@@ -176,6 +176,9 @@ class Spool:
             self._keep(failing)
         except OSError:
             kept += f", without the last {len(self._waiting)}" if self._waiting else ""
+        if not self._parts:
+            self._hidden.remove()
+            return done, failed
         self._hidden.close()
         return done, [*failed, VoodooError(kept)]
 

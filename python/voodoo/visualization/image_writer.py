@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -13,6 +14,8 @@ from voodoo.errors import VoodooError, utf8_name
 from voodoo.visualization.ink import Picture
 from voodoo.whole import appearing_whole, check_disk
 
+_LEAST_FREE = 2**16
+"""Free space below which a disk is looked at [bytes]."""
 _PICTURE = re.compile(r"frame_\d{6,}\.png")
 
 
@@ -68,7 +71,9 @@ class PictureWriter:
                 else:
                     self._place.mkdir()
             if self._film is not None:
-                self._film.write(picture)
+                self._film.write(picture)  # which does not tell that the disk is full
+                if shutil.disk_usage(self._place.parent).free < _LEAST_FREE:
+                    check_disk(self._place.parent)
             else:
                 _encode(self._place / f"frame_{self._count:06d}.png", picture)
             self._count += 1
