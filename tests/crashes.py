@@ -89,7 +89,8 @@ def command(kind: Kind, folder: Path, recording: Path) -> tuple[int, str]:
             for job in batch.jobs:
                 batch.take(do(job))
             batch.save()
-            return int(any(row.status != "done" for row in batch.rows.values())), ""
+            errors = [row.error for row in batch.rows.values() if row.status != "done"]
+            return int(bool(errors)), "".join(errors)
         except (VoodooError, OSError) as error:
             return 1, str(error)
     done = run(*(str(recording) if word == "REC" else word for word in kind.words))

@@ -23,6 +23,8 @@ _LOCK = ".voodoo-lock"
 _LONGEST = 48
 """Length of an output's name in that of a hidden folder [characters]: names of files have 255 bytes at most."""
 _UNLOCKED = -1
+_open: set[Path] = set()
+"""Hidden folders of this process: they may be without a lock."""
 
 
 class Hidden:
@@ -45,7 +47,7 @@ class Hidden:
         for left in path.parent.iterdir():
             with suppress(OSError):
                 ours = left.name.startswith(start) and left.name.endswith(SUFFIX)
-                if ours and not (left / KEPT).exists() and (lock := locked(left)) is not None:
+                if ours and left not in _open and not (left / KEPT).exists() and (lock := locked(left)) is not None:
                     removed(left)
                     os.close(lock)
         self._lock: int | None = None
@@ -55,6 +57,7 @@ class Hidden:
                 self._lock = locked(self.folder)
             except OSError:
                 self._lock = _UNLOCKED if self.folder.exists() else None
+        _open.add(self.folder)
 
     def keep(self, **note: Any) -> None:  # noqa: ANN401 - any values of JSON
         """Keep the folder after a crash; `note` tells what is in it."""
@@ -68,6 +71,7 @@ class Hidden:
 
     def close(self) -> None:
         """Leave the folder to others."""
+        _open.discard(self.folder)
         if self._lock is not None and self._lock != _UNLOCKED:
             os.close(self._lock)
         self._lock = _UNLOCKED
@@ -75,8 +79,9 @@ class Hidden:
 
 def removed(folder: Path) -> None:
     """Delete a hidden folder; what a crash leaves of it is not kept."""
-    (folder / KEPT).unlink(missing_ok=True)
-    shutil.rmtree(folder, ignore_errors=True)
+    with suppress(OSError):
+        (folder / KEPT).unlink(missing_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def locked(folder: Path) -> int | None:

@@ -113,6 +113,7 @@ class Spool:
         self._bodies_at = time.monotonic() if "bodies" in arrays else self._bodies_at
         self._parts.append(path)
         self._waiting.clear()
+        self._made = None
 
     def _keep(self, paths: Iterable[Path]) -> None:
         names = [path.name for path in paths]
@@ -200,7 +201,8 @@ class Spool:
             self._hidden.remove()
             return
         with suppress(OSError):
-            self._put_away()
+            if self._waiting:
+                self._put_away()
         self._hidden.close()
         if isinstance(error, OSError):
             raise VoodooError(f"{reason(error)}; {self._kept}") from error
