@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,23 +27,6 @@ from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.ink import Picture
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.rerun_viewer import Viewer
-
-
-class Stepped(Protocol):
-    """A tracked frame, of one person or several."""
-
-    @property
-    def index(self) -> int:
-        """Number in the recording."""
-        ...
-
-    @property
-    def seconds(self) -> float:
-        """Duration of tracking [s]."""
-        ...
-
-
-S = TypeVar("S", bound=Stepped)
 
 
 class Run(NamedTuple):
@@ -130,11 +113,11 @@ def detector_of(path: Path | None) -> AnyDetector:
 
 def run(
     source: Recording,
-    steps: Iterable[S],
+    steps: Iterable[Any],
     *,
-    take: Callable[[S], None],
-    draw: Callable[[Overlay, S], Picture],
-    show: Callable[[Viewer, S], None],
+    take: Callable[[Any], None],
+    draw: Callable[[Overlay, Any], Picture],
+    show: Callable[[Viewer, Any], None],
     overlay: Path | None = None,
     save: Path | None = None,
     viewer: Viewer | None = None,
@@ -145,7 +128,7 @@ def run(
 
     Args:
         source: the recording.
-        steps: tracks it.
+        steps: its frames, tracked, of one person or several.
         take: keeps the poses of a frame. An OSError, also of the recording, ends the run.
         draw: a picture of a frame.
         show: shows a frame in `viewer`.
@@ -165,7 +148,7 @@ def run(
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
     drawing: list[Overlay] = []
 
-    def drawn(step: S) -> None:
+    def drawn(step: Any) -> None:  # noqa: ANN401 - of one person or several
         if not drawing:
             drawing.append(Overlay(source))
         picture = draw(drawing[0], step)

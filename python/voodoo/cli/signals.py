@@ -35,7 +35,7 @@ def ending() -> Iterator[None]:
         typer.Exit: with the code of the signal, instead of KeyboardInterrupt or an exit with INTERRUPTED.
     """
     before: dict[int, Any] = {}
-    _received.clear()
+    _received.number = int(signal.SIGINT)
 
     def receive(number: int, _: FrameType | None) -> None:
         for each in before:
@@ -46,18 +46,16 @@ def ending() -> Iterator[None]:
             raise KeyboardInterrupt
 
     if threading.current_thread() is threading.main_thread():
-        known = {number: signal.getsignal(number) for number in _NUMBERS}
-        before = {number: handler for number, handler in known.items() if handler not in (signal.SIG_IGN, None)}
+        before = {number: signal.getsignal(number) for number in _NUMBERS}
+        before = {number: handler for number, handler in before.items() if handler not in (signal.SIG_IGN, None)}
         for number in before:
             signal.signal(number, receive)
     try:
         yield
-    except KeyboardInterrupt:
-        raise typer.Exit(128 + _received.number if _received.is_set() else INTERRUPTED) from None
-    except typer.Exit as end:
-        if end.exit_code == INTERRUPTED and _received.is_set():
-            raise typer.Exit(128 + _received.number) from None
-        raise
+    except (KeyboardInterrupt, typer.Exit) as end:
+        if getattr(end, "exit_code", INTERRUPTED) != INTERRUPTED:
+            raise
+        raise typer.Exit(128 + _received.number) from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -37,18 +37,17 @@ def complete(source: Path, path: Path) -> None:
 
 def _write(source: Path, path: Path) -> None:
     kinds: dict[int, str] = {}
-    connections: dict[int, Connection] = {}
+    topics: dict[int, Connection] = {}
     with appearing_whole(path) as place, bag_folder(place) as folder:
         with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
             for code, body in _sound(source):
+                one, other = struct.unpack_from("<HH", body)
                 if code == _SCHEMA:
-                    kinds[struct.unpack_from("<H", body)[0]] = _word(body, 2)
+                    kinds[one] = _word(body, 2)
                 elif code == _CHANNEL:
-                    channel, schema = struct.unpack_from("<HH", body)
-                    connections[channel] = writer.add_connection(_word(body, 4), kinds[schema], typestore=STORE)
+                    topics[one] = writer.add_connection(_word(body, 4), kinds[other], typestore=STORE)
                 elif code == _MESSAGE:
-                    channel, _, time = struct.unpack_from("<HIQ", body)
-                    writer.write(connections[channel], time, body[22:])
+                    writer.write(topics[one], struct.unpack_from("<Q", body, 6)[0], body[22:])
 
 
 def _sound(source: Path) -> Iterator[tuple[int, bytes]]:
