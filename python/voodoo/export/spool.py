@@ -24,7 +24,7 @@ from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
 from voodoo.export.people_rows import write_rows
 from voodoo.export.result_file import SUFFIXES
-from voodoo.export.track import Arrays, Track, arrays_of, track_of, tracks_of, write_arrays, write_csv
+from voodoo.export.track import BODIES, BODY_OF, Arrays, Track, arrays_of, track_of, tracks_of, write_arrays, write_csv
 from voodoo.model.body import Body
 from voodoo.people import PeopleEstimate
 from voodoo.stored import MOST_METADATA, read_stored_text
@@ -35,7 +35,7 @@ ONE = 1
 """Number of the person if only one is tracked."""
 _BODIES_S = 10.0
 """Time between two copies of the bodies, which take long to write [s]."""
-_SAMPLED = 8
+_SAMPLED = 3
 """Number of parts in a sample."""
 
 
@@ -102,15 +102,16 @@ class Spool:
 
     def _put_away(self) -> None:
         arrays = dict(self._last())
-        if time.monotonic() - self._bodies_at >= _BODIES_S:
-            arrays["bodies"] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
-            arrays["body_of"] = np.array(list(self._bodies), dtype=np.int64)
+        needed = any(path.suffix not in SUFFIXES for path in self._paths)
+        if needed and time.monotonic() - self._bodies_at >= _BODIES_S:
+            arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
+            arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
         path = self._hidden.folder / f"{len(self._parts):08d}.npz"
         with appearing_whole(path) as place, place.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
         if not self._parts:
             self._keep(self._paths)
-        self._bodies_at = time.monotonic() if "bodies" in arrays else self._bodies_at
+        self._bodies_at = time.monotonic() if BODIES in arrays else self._bodies_at
         self._parts.append(path)
         self._waiting.clear()
         self._made = None
@@ -233,7 +234,7 @@ def _write(
     if path.suffix in SUFFIXES and not (several and _jumps(contents())):
         with appearing_whole(path) as place:
             if path.suffix == ".npz":
-                write_arrays(place, lambda: map(_results, contents()), _fixed(contents(), several, left_out))
+                write_arrays(place, contents, _fixed(contents(), several, left_out))
             elif several:
                 write_rows(place, (_people(part).rows() for part in contents()))
             else:
@@ -245,11 +246,6 @@ def _write(
         return save_people(PeopleTrack.joined(list(map(_people, contents()))), path, bodies=bodies, **how)
     save(Track.joined(list(map(track_of, contents()))), path, body=bodies[ONE], **how)
     return [path]
-
-
-def _results(part: Arrays) -> Arrays:
-    """The arrays of a part without what is kept for `recover`."""
-    return {name: part[name] for name in part if name not in ("bodies", "body_of")}
 
 
 def _fixed(parts: Iterator[Arrays], several: bool, left_out: Mapping[str, int]) -> Arrays:
@@ -323,10 +319,8 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
         try:
             for part in _stored([path]):
                 content = dict(part)
-                texts = content.get("bodies", np.empty(0)).tolist()
-                bodies.update(
-                    zip(content["body_of"].tolist() if texts else [], map(Body.from_toml, texts), strict=True)
-                )
+                texts = content.get(BODIES, np.empty(0)).tolist()
+                bodies.update(zip(content[BODY_OF].tolist() if texts else [], map(Body.from_toml, texts), strict=True))
             parts.append(path)
         except VoodooError as error:
             failed.append(error)  # the others can be used

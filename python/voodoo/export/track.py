@@ -28,6 +28,8 @@ Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
 FORMAT_VERSION = 2
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
+BODIES, BODY_OF = "bodies", "body_of"
+"""Arrays of a part that are not those of a result: texts of bodies, and the persons whose they are."""
 _STATUS = "_status"
 """Suffix of the name of a limb's column in .csv."""
 _SIGMA = "_sigma_m"
@@ -331,7 +333,10 @@ def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Array
     kinds: dict[str, tuple[int, tuple[int, ...], np.dtype[Any]]] = {}
     rest: dict[str, npt.NDArray[Any]] = {}
     for part in parts():
-        for name, array in part.items():
+        for name in part:
+            if name in (BODIES, BODY_OF):
+                continue
+            array = part[name]
             if name.rpartition("/")[2] in (*_BY_FRAME, "status", "limb_status"):
                 count, row, kind = kinds.get(name, (0, array.shape[1:], array.dtype))
                 # Without covariances there are no columns.
