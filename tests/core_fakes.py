@@ -261,7 +261,9 @@ def install(monkeypatch):
     """Put the stand-ins where the package looks for the core."""
     import voodoo.cli.running
     import voodoo.evaluation.evaluate
+    import voodoo.export.spool
     import voodoo.pipeline.front_end
+    import voodoo.pipeline.people
     import voodoo.pipeline.search
     import voodoo.pipeline.start
     from voodoo.export import collected as results

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 import scipy.io
 
+import fuzz_structures
 import voodoo
 from bag_writer import Messages, write_bag
 from mcap_writer import write_mcap
@@ -39,12 +40,14 @@ JOINTS = {
 
 @dataclass(frozen=True)
 class Sample:
-    """Writes its files into a folder; `mutated` are those that are damaged, `open` reads all there is."""
+    """Writes its files into a folder; `mutated` are those that are damaged, `open` reads all there is, `damage` knows their
+    structure."""
 
     make: Callable[[Path], None]
     mutated: tuple[str, ...]
     open: Callable[[Path, bool], Any]
     text: bool = False
+    damage: Callable[[bytes, Random], bytes] | None = None
 
 
 def read_all(path: Path, lenient: bool) -> None:
@@ -228,14 +231,20 @@ MAP = (
     'y_up = true\nsigma_m = 0.02\n[sites]\nA = "l_wrist"\n[limbs]\nB = { limb = "head", position = [0.0, 0.1, 0.0] }\n'
 )
 SAMPLES: dict[str, Sample] = {
-    "mcap": Sample(storage("mcap"), ("b.mcap",), inside("b.mcap")),
-    "mcap packed": Sample(chunked(), ("b.mcap",), inside("b.mcap")),
-    "mcap plain": Sample(chunked(compression="", checksum=False), ("b.mcap",), inside("b.mcap")),
-    "db3": Sample(storage("sqlite3"), ("b.db3",), inside("b.db3")),
+    "mcap": Sample(storage("mcap"), ("b.mcap",), inside("b.mcap"), damage=fuzz_structures.mcap),
+    "mcap packed": Sample(chunked(), ("b.mcap",), inside("b.mcap"), damage=fuzz_structures.mcap),
+    "mcap plain": Sample(
+        chunked(compression="", checksum=False), ("b.mcap",), inside("b.mcap"), damage=fuzz_structures.mcap
+    ),
+    "db3": Sample(storage("sqlite3"), ("b.db3",), inside("b.db3"), damage=fuzz_structures.sqlite),
     "metadata.yaml": Sample(lambda f: void(bag(f)), ("b/metadata.yaml",), inside("b"), text=True),
-    "ros1 bag": Sample(lambda f: void(bag(f, ros=1)), ("b.bag",), inside("b.bag")),
-    "realsense bag": Sample(realsense, ("recorded_2_55.bag",), inside("recorded_2_55.bag")),
-    "realsense db3": Sample(realsense, ("recorded_2_59.db3",), inside("recorded_2_59.db3")),
+    "ros1 bag": Sample(lambda f: void(bag(f, ros=1)), ("b.bag",), inside("b.bag"), damage=fuzz_structures.ros1),
+    "realsense bag": Sample(
+        realsense, ("recorded_2_55.bag",), inside("recorded_2_55.bag"), damage=fuzz_structures.ros1
+    ),
+    "realsense db3": Sample(
+        realsense, ("recorded_2_59.db3",), inside("recorded_2_59.db3"), damage=fuzz_structures.sqlite
+    ),
     "zip": Sample(zipped, ("b.zip",), inside("b.zip")),
     "pictures": Sample(folder_of_images, ("depth/0.5.png", "rgb/0.5.jpg"), inside("")),
     "calibration.toml": Sample(folder_of_images, ("calibration.toml",), inside(""), text=True),

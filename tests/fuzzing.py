@@ -29,6 +29,8 @@ from random import Random
 LONGEST_S = 5.0
 MOST_BYTES = 2**30
 API = "api"
+STRUCTURED = 0.8
+"""Share of damage within the structure of a file, where it is known."""
 TOKENS = (
     "nan",
     "inf",
@@ -127,7 +129,10 @@ def work(first: int, last: int, step: int, folder: Path, only: str) -> None:
             else:
                 sample, place = fuzz_samples.SAMPLES[name], folder / re.sub(r"\W", "_", name)
                 file = rng.choice(sample.mutated)
-                (place / file).write_bytes(mutated(pristine[name][file], rng, text=sample.text))
+                if sample.damage is not None and rng.random() < STRUCTURED:
+                    (place / file).write_bytes(sample.damage(pristine[name][file], rng))
+                else:
+                    (place / file).write_bytes(mutated(pristine[name][file], rng, text=sample.text))
                 signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
                 sample.open(place, rng.random() < 0.5)
         except VoodooError as error:

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,7 +124,7 @@ def test_a_file_appears_whole_and_leaves_nothing_beside_it(tmp_path, monkeypatch
     store = Store(str(tmp_path))
     store.write("frames/recording=a/part-0.parquet", b"old")
     place = tmp_path / "frames" / "recording=a"
-    (place / ".part-0.parquet.123-ab").write_bytes(b"of a worker that died")
+    (place / ".part-0.parquet-abcd1234.voodoo").mkdir()  # of a worker that died
 
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -210,23 +211,43 @@ def test_an_interrupted_batch_goes_on_and_other_settings_do_not(tmp_path):
     sources = ["/a/one", "/a/two", "/a/three", "/a/four"]
     batch = Batch(sources, out, settings)
     assert [job.name for job in batch.jobs] == ["one", "two", "three", "four"]
-    store = Store(out)
-    store.write(store.place_of("one"), b"")
-    batch.take(Row("one", frames=3, source="/a/one"))
+    store, row = Store(out), Row("one", frames=3, source="/a/one")
+    whole = encode(columns_of({1: track_of([0.0, 0.1, 0.2])}), {"row": vars(row), "settings": settings.as_dict()})
+    store.write(store.place_of("one"), whole)
+    store.write(store.place_of("three"), whole[:-4])  # only its name is right
+    batch.take(row)
+    batch.take(replace(row, recording="three", source="/a/three"))
     batch.take(Row("two", status=FAILED, error="bad", source="/a/two"))
     batch.take(Row("four", frames=3, source="/a/four"))  # whose table is gone
     batch.save()
     again = Batch([*sources, "/b/one"], out, settings)
     assert [job.name for job in again.jobs] == ["two", "three", "four", "one~2"]
-    assert set(again.rows) == {"one", "two"}
+    assert set(again.rows) == {"one", "two"} and again.notes == []
     assert json.loads((tmp_path / "out" / "settings.json").read_text())["people"] == 1
     with pytest.raises(
         VoodooError, match=r"expected results of the same settings, found some of use None; give another --out"
     ):
         Batch(sources, out, replace(settings, use=("depth",)))
-    (tmp_path / "out" / "settings.json").write_text("{")
-    with pytest.raises(VoodooError, match=r"settings.json: expected the settings of a batch"):
-        Batch(sources, out, settings)
+    for broken in (b"{", b"\0\0", b"\xff[]", b""):
+        for name in ("settings.json", "summary.csv"):
+            (tmp_path / "out" / name).write_bytes(broken)
+        mended = Batch(sources, out, settings)
+        assert [job.name for job in mended.jobs] == ["two", "three", "four"] and mended.rows.keys() == {"one"}
+        assert len(mended.notes) == 2 and (tmp_path / "out" / "summary.csv.damaged").read_bytes() == broken
+        assert json.loads((tmp_path / "out" / "settings.json").read_text())["people"] == 1
+
+
+@storing
+def test_a_recording_that_takes_too_long_has_failed(job, monkeypatch):
+    row = do(replace(job, limit_s=0.05))
+    assert row.status == FAILED and "the time limit" in row.error and not Store(job.out).recordings()
+    monkeypatch.setattr(task, "_GRACE_S", 0.0)
+    child = os.fork()
+    if not child:  # it hangs where nothing looks at the time
+        monkeypatch.setattr(task, "_track", lambda *_: time.sleep(60))
+        do(replace(job, limit_s=0.1))
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
 
 
 def test_what_is_missing_is_reported_before_the_work(tmp_path, monkeypatch):

@@ -27,6 +27,8 @@ COMMANDS = {
     "init": ["a", "--out", "i.json"],
     "ik": ["a", "--out", "k.csv"],
     "batch": ["a", "--out", "many"],
+    "recover": ["."],
+    "report": ["a/pose.csv", "--out", "r.html"],
     "info": ["a"],
     "config": [],
     "body": [],
@@ -56,6 +58,8 @@ def trapped(tmp_path, monkeypatch):
     damage.write(folder / "a" / "bag", entries[: damage.depth_rows(entries)[8]])
     for name in ("init.json", "truth.csv"):
         shutil.copy(sample_path() / name, folder / "a")
+    rows = ["stamp_s,status,residual_m,vc7_x,vc7_y,vc7_z", "0.0,tracking,0.01,0,0,1", "0.1,tracking,0.01,0,0,1"]
+    (folder / "a" / "pose.csv").write_text("\n".join(rows) + "\n")
     (tmp_path / "voodoo_command.py").write_text("from voodoo.cli import main\nif __name__ == '__main__':\n    main()\n")
     monkeypatch.chdir(folder)
     monkeypatch.setenv("PYTHONPATH", str(Path(voodoo.__file__).parent.parent))

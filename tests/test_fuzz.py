@@ -30,7 +30,7 @@ def test_the_harness_reports_what_fails(tmp_path, monkeypatch):
     (tmp_path / "fuzz_samples.py").write_text(
         "import os, re\nfrom pathlib import Path\n"
         "class Sample:\n"
-        "    mutated, text = ('x',), False\n"
+        "    mutated, text, damage = ('x',), False, None\n"
         "    def __init__(self, do): self.do = do\n"
         "    def make(self, folder): (folder / 'x').write_bytes(b'abc')\n"
         "    def open(self, folder, lenient): self.do()\n"

@@ -147,7 +147,7 @@ def test_recordings_add_up():
 
 def test_rows_are_read_as_they_are_written(tmp_path):
     rows = replace(result({1: [0.5, N, 0.7], 12: [1.0, 1.1, 1.2]}), residual=np.array([0.01, N, 0.02, 0.03, 0.04]))
-    write_rows(tmp_path / "r.csv", rows)
+    write_rows(tmp_path / "r.csv", [rows])
     assert (tmp_path / "r.csv").read_text().startswith("stamp_s,person,status,residual_m,humanoid_root_x,")
     again = read_rows(tmp_path / "r.csv")
     assert again.persons.tolist() == rows.persons.tolist() == [1, 12, 12, 1, 12]
@@ -235,7 +235,7 @@ def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
         (),
         np.empty((count, 0)),
     )
-    write_rows(tmp_path / "theirs.csv", rows)
+    write_rows(tmp_path / "theirs.csv", [rows])
     command = ["eval", str(path), "--result", str(tmp_path / "theirs.csv"), "--out", str(tmp_path / "out")]
     message = CliRunner().invoke(app, command)
     assert message.exit_code == 0, message.output

@@ -68,6 +68,10 @@ def test_a_file_takes_less_than_fifty_kilobytes_a_frame(tmp_path):
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
     front_end = FrontEnd(tracker)
+    (tmp_path / "track.rrd").write_text("old")
+    with pytest.raises(KeyboardInterrupt), Viewer(save=tmp_path / "track.rrd"):
+        raise KeyboardInterrupt
+    assert (tmp_path / "track.rrd").read_text() == "old"
     with Viewer(save=tmp_path / "track.rrd") as viewer:
         for recorded, _ in zip(paired(recording), range(45), strict=False):
             viewer.log(front_end.step(recorded), tracker.body, recorded=recorded, front_end=front_end)

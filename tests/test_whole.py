@@ -6,6 +6,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -14,10 +15,13 @@ import voodoo
 from commands import refused
 from voodoo.cli import app
 from voodoo.cli.paths import OUTPUTS
+from voodoo.evaluation.plot import plot_errors
 from voodoo.evaluation.tables import write_sequences
+from voodoo.export.files import ONE_PERSON
 from voodoo.export.track import Track
 from voodoo.recordings import open_recording, sample_path
-from voodoo.whole import appearing_whole, check_outputs
+from voodoo.visualization.image_writer import PictureWriter, save_picture
+from voodoo.whole import Hidden, appearing_whole, check_outputs
 
 run = CliRunner().invoke
 
@@ -44,6 +48,65 @@ def test_a_folder_appears_whole_too(tmp_path):
         (place / "a").write_text("a")
         assert not (tmp_path / "bag").exists()
     assert [file.name for file in (tmp_path / "bag").iterdir()] == ["a"]
+
+
+def test_what_a_killed_process_left_is_removed_unless_it_is_kept_or_in_use(tmp_path):
+    path = tmp_path / "pose.csv"
+    in_use, kept, left = Hidden(path), Hidden(path), Hidden(path)
+    kept.keep(paths=["pose.csv"])
+    for one in (kept, left):
+        one.close()  # as at the end of a process
+    (tmp_path / ".pose.csv-backup").mkdir()
+    with appearing_whole(path) as place:
+        place.write_text("new")
+    assert in_use.folder.exists() and kept.folder.exists() and not left.folder.exists()
+    assert (tmp_path / ".pose.csv-backup").exists()
+
+
+def test_a_folder_is_replaced_by_a_complete_one_or_stays(tmp_path, monkeypatch):
+    look = tmp_path / "look"
+    with PictureWriter(look, rate_hz=30.0) as writer:
+        for _ in range(3):
+            writer.write(np.zeros((8, 8, 3), np.uint8))
+    assert len(list(look.iterdir())) == 3
+    for fails in ("voodoo.visualization.image_writer._encode", "pathlib.Path.rename"):
+        with monkeypatch.context() as patch, PictureWriter(look, rate_hz=30.0) as writer:
+            writer.write(np.zeros((8, 8, 3), np.uint8))
+            patch.setattr(fails, full)
+            writer.write(np.zeros((8, 8, 3), np.uint8))
+            writer.__exit__(None, None, None)
+        assert "No space left" in str(writer.failure) and len(list(look.iterdir())) == 3
+    with PictureWriter(look, rate_hz=30.0) as writer:
+        writer.write(np.zeros((8, 8, 3), np.uint8))
+    assert len(list(look.iterdir())) == 1 and [file.name for file in tmp_path.iterdir()] == ["look"]
+    (look / "mine.txt").write_text("precious")
+    with pytest.raises(voodoo.VoodooError, match=r"found mine\.txt"):
+        PictureWriter(look, rate_hz=30.0)
+
+
+def test_a_figure_and_a_picture_appear_whole(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    figure, picture = tmp_path / "errors.png", tmp_path / "sheet.png"
+    for path in (figure, picture):
+        path.write_text("old")
+    monkeypatch.setattr(Figure, "savefig", lambda self, place, **how: full(place.write_text("half")))
+    monkeypatch.setattr("voodoo.visualization.image_writer._encode", lambda place, _: full(place.write_text("half")))
+    with pytest.raises(OSError, match=r"errors\.png"):
+        plot_errors(figure, [])
+    with pytest.raises(OSError, match=r"sheet\.png"):
+        save_picture(picture, np.zeros((8, 8, 3), np.uint8))
+    assert figure.read_text() == picture.read_text() == "old"
+
+
+def test_the_files_of_persons_are_outputs_too(tmp_path):
+    check_outputs([tmp_path / "walk.trc"], [], numbered=True)
+    (tmp_path / "walk_1.trc").write_text("markers")
+    check_outputs([tmp_path / "walk.trc"], [tmp_path / "walk_1.trc"])
+    with pytest.raises(voodoo.VoodooError, match="can be a person's"):
+        check_outputs([tmp_path / "walk.trc"], [tmp_path / "walk_1.trc"], numbered=True)
+    with pytest.raises(voodoo.VoodooError, match="apart"):
+        check_outputs([tmp_path / "look.bvh", tmp_path / "look_12.bvh"], [], numbered=True)
 
 
 def test_two_processes_that_write_one_name_leave_one_whole_result(tmp_path):
@@ -121,6 +184,9 @@ def test_no_output_is_written_into_the_recording(command, tmp_path):
     for option in files_of(command, written=True):
         for target in ("truth.csv", "bag/bag.mcap", "new.csv"):
             refused(run(app, [command, str(recording), option, str(recording / target)]), "outside of what is read")
+        if command in ("track", "live", "ik"):  # a truth is read with the bag below it
+            given = [command, str(recording / "bag"), option, str(recording / "truth.csv")]
+            refused(run(app, given), "another file than what is read")
     assert {file: file.read_bytes() for file in recording.rglob("*") if file.is_file()} == before
 
 
@@ -131,22 +197,30 @@ def full(*_, **__):
 def test_a_film_or_format_that_fails_costs_no_other_output(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("voodoo.visualization.image_writer.PictureWriter._open", full)
-    monkeypatch.setattr("voodoo.export.files.write_bvh", full)
+    monkeypatch.setitem(ONE_PERSON, ".bvh", full)
     Path("old.bvh").write_text("old")
     command = ["track", str(sample_path()), "--use", "depth"]
     done = run(app, [*command, "--out", "old.bvh", "--out", "pose.csv", "--overlay", "look.mp4"])
     assert done.exit_code == 1
     assert "old.bvh" in done.stderr and "look.mp4" in done.stderr and "wrote pose.csv" in done.stderr
     assert Path("old.bvh").read_text() == "old" and len(Path("pose.csv").read_text().splitlines()) == 91
-    assert {file.name for file in tmp_path.iterdir()} == {"old.bvh", "pose.csv"}
+    (kept,) = {file.name for file in tmp_path.iterdir()} - {"old.bvh", "pose.csv"}
+    assert kept in done.stderr and "voodoo recover" in done.stderr
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert "wrote old.recovered.bvh" in run(app, ["recover", "."]).stdout
+    assert {file.name for file in tmp_path.iterdir()} == {"old.bvh", "old.recovered.bvh", "pose.csv"}
+    assert Path("old.bvh").read_text() == "old"
 
 
-def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monkeypatch):
+@pytest.mark.parametrize("command", [["live", "--rate", "2"], ["track"]], ids=["live", "track"])
+def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monkeypatch, command):
     """No part can be stored after the first; the files are on another disk."""
-    save, command = Track.save, ["live", str(sample_path()), "--rate", "4", "--out", str(tmp_path / "pose.csv")]
-    monkeypatch.setattr(Track, "save", lambda self, path: full() if path.name == "00000001.npz" else save(self, path))
-    done = run(app, command)
-    assert done.exit_code != 0 and "No space left" in done.stderr
+    savez, parts = np.savez, []
+    monkeypatch.setattr("voodoo.cli.track.TOGETHER", 30)
+    monkeypatch.setattr(np, "savez", lambda *place, **how: full() if parts else parts.append(savez(*place, **how)))
+    done = run(app, [command[0], str(sample_path()), *command[1:], "--out", str(tmp_path / "pose.csv")])
+    assert done.exit_code == 1 and "No space left" in done.stderr
     assert len(Track.load(tmp_path / "pose.csv")) == 60
     assert [file.name for file in tmp_path.iterdir()] == ["pose.csv"]
 
@@ -154,7 +228,7 @@ def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monke
 def test_the_poses_of_a_session_are_kept_where_its_files_cannot_be_written(tmp_path, monkeypatch):
     command = ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--out", str(tmp_path / "pose.csv")]
     with monkeypatch.context() as patch:
-        patch.setattr("voodoo.live.spool.save", full)
+        patch.setattr("voodoo.export.spool.write_csv", full)
         done = run(app, command)
     (folder,) = tmp_path.iterdir()
     assert done.exit_code != 0 and str(folder) in done.stderr
@@ -168,7 +242,7 @@ def test_a_recording_that_cannot_be_put_in_its_place_is_kept(tmp_path, monkeypat
     done = run(app, ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--record", str(take)])
     (folder,) = tmp_path.iterdir()
     assert done.exit_code == 1 and f"{take}: " in done.stderr and str(folder) in done.stderr
-    assert len(open_recording(folder / "take")) > 0
+    assert len(open_recording(folder / "take.mcap")) > 0
 
 
 def test_a_table_of_an_evaluation_that_fails_leaves_the_old_one(tmp_path):

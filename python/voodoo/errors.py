@@ -109,7 +109,7 @@ def reason(error: Exception) -> str:
     """An error as words, which name its file."""
     if isinstance(error, OSError) and error.filename and error.strerror:
         return f"{error.filename}: {error.strerror}"
-    return str(error)
+    return str(error) if isinstance(error, VoodooError | OSError) else shortened(f"{type(error).__name__}: {error}")
 
 
 def shortened(text: str, *, most: int = 300) -> str:

@@ -2,30 +2,127 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from voodoo.errors import VoodooError
+
+SUFFIX = ".voodoo"
+"""Ends the names of hidden folders."""
+KEPT = ".voodoo-kept.json"
+"""File in a hidden folder with the names of the outputs that its content becomes after a crash."""
+_LOCK = ".voodoo-lock"
+_LONGEST = 48
+"""Length of an output's name in that of a hidden folder [characters]: names of files have 255 bytes at most."""
+_UNLOCKED = -1
+_open: set[Path] = set()
+"""Hidden folders of this process: they may be without a lock."""
+
+
+class Hidden:
+    """A new hidden folder beside an output, for what is not complete yet.
+
+    No other process writes to it, and no link is followed. It is locked as long as this process lives, so that what a killed
+    process left is told from what is in use: it is removed when its output is written again, unless `keep` was called.
+
+    Args:
+        path: the output.
+
+    Attributes:
+        folder: the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Make the folder, and that of the output."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        start = f".{path.name[:_LONGEST]}-"
+        for left in path.parent.iterdir():
+            with suppress(OSError):
+                ours = left.name.startswith(start) and left.name.endswith(SUFFIX)
+                if ours and left not in _open and not (left / KEPT).exists() and (lock := locked(left)) is not None:
+                    removed(left)
+                    os.close(lock)
+        self._lock: int | None = None
+        while self._lock is None:  # somebody took it for one that was left
+            self.folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=start, suffix=SUFFIX))
+            try:
+                self._lock = locked(self.folder)
+            except OSError:
+                self._lock = _UNLOCKED if self.folder.exists() else None
+        _open.add(self.folder)
+
+    def keep(self, **note: Any) -> None:  # noqa: ANN401 - any values of JSON
+        """Keep the folder after a crash; `note` tells what is in it."""
+        with appearing_whole(self.folder / KEPT) as place:
+            place.write_text(json.dumps(note), encoding="utf-8")
+
+    def remove(self) -> None:
+        """Delete the folder."""
+        removed(self.folder)
+        self.close()
+
+    def close(self) -> None:
+        """Leave the folder to others."""
+        _open.discard(self.folder)
+        if self._lock is not None and self._lock != _UNLOCKED:
+            os.close(self._lock)
+        self._lock = _UNLOCKED
+
+
+def removed(folder: Path) -> None:
+    """Delete a hidden folder; what a crash leaves of it is not kept."""
+    with suppress(OSError):
+        (folder / KEPT).unlink(missing_ok=True)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def locked(folder: Path) -> int | None:
+    """Lock a hidden folder until the returned descriptor is closed, or this process ends; None: another process lives in it.
+
+    Raises:
+        OSError: the folder is gone, or the system has no such locks.
+    """
+    if sys.platform == "win32":
+        raise OSError("no locks")
+    import fcntl
+
+    descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        return None
+    except OSError:
+        os.close(descriptor)
+        raise
+    if folder.exists():
+        return descriptor
+    os.close(descriptor)  # it was removed before it was locked
+    return None
 
 
 @contextmanager
 def appearing_whole(path: Path) -> Iterator[Path]:
-    """Another place to write to, which becomes this file or folder when it is complete; until then an old file stays.
+    """Another place to write to, which becomes this file or folder when it is complete; until then an old one stays.
 
-    The place is in a new folder beside `path`, so that no other process writes to it and no link is followed. What is written
-    is on the disk before it appears. If the block fails, nothing remains of it.
+    The place is in a hidden folder beside `path`. What is written is on the disk before it appears. If the block fails,
+    nothing remains of it.
 
     Raises:
         OSError: it cannot be written; names `path`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name[:64]}-"))
+    hidden = None
     try:
-        place = folder / path.name
+        hidden = Hidden(path)
+        place = hidden.folder / path.name
         yield place
         move_whole(place, path)
     except OSError as error:
@@ -33,19 +130,56 @@ def appearing_whole(path: Path) -> Iterator[Path]:
             raise
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        if hidden is not None:
+            hidden.remove()
 
 
 def move_whole(place: Path, path: Path) -> None:
     """Give a complete file or folder its name, once it is on the disk; if that fails, it stays where it is.
+
+    An old folder is put aside before, and removed afterwards.
 
     Raises:
         OSError: it cannot be moved, or is on another file system.
     """
     for written in (place, *place.rglob("*")) if place.is_dir() else (place,):
         _sync(written)
-    os.replace(place, path)  # noqa: PTH105 - the replacement must be atomic
+    if place.is_dir() and path.is_dir() and any(path.iterdir()):
+        _exchange(place, path)
+    else:
+        os.replace(place, path)  # noqa: PTH105 - the replacement must be atomic
     _sync(path.parent)
+
+
+def _exchange(place: Path, path: Path) -> None:
+    """Replace a folder that is not empty, in two steps; after a crash between them the old one is in a folder that is kept."""
+    aside = Hidden(path)
+    try:
+        aside.keep(paths=[path.name])
+        old = aside.folder / path.name
+        path.rename(old)
+        try:
+            place.rename(path)
+        except OSError:
+            old.rename(path)
+            raise
+    finally:
+        if path.exists():
+            aside.remove()
+        else:
+            aside.close()
+
+
+def check_disk(folder: Path) -> None:
+    """Find out whether a megabyte can be written: some libraries do not tell why they cannot.
+
+    Raises:
+        OSError: it cannot.
+    """
+    with tempfile.TemporaryFile(dir=folder) as probe:
+        probe.write(bytes(1 << 20))
+        probe.flush()
+        os.fsync(probe.fileno())
 
 
 def _sync(path: Path) -> None:
@@ -59,12 +193,13 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None]) -> None:
+def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None], *, numbered: bool = False) -> None:
     """Reject outputs that would replace what is read, or each other, before the work starts.
 
     Args:
         outputs: files and folders that will be written.
         inputs: files and folders that are read; None and names that are no files are ignored.
+        numbered: outputs of one person, .bvh and .trc, become NAME_1, NAME_2, ...
 
     Raises:
         VoodooError: an output is an input or inside one, or two outputs are the same or one is inside the other.
@@ -75,18 +210,29 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path | None]) -> Non
         for source, found in sources:
             if _same(place, found):
                 raise VoodooError(f"{path}: expected another file than what is read, found the same")
+            if numbered and _is_numbered(found, place):
+                raise VoodooError(
+                    f"{path}: expected other files than what is read, found that {source} can be a person's"
+                )
             if found in place.parents and found.is_dir():
                 raise VoodooError(f"{path}: expected a place outside of what is read, found one inside {source}")
             if place in found.parents:
                 raise VoodooError(f"{path}: expected a place outside of what is read, found a folder with {source}")
         for other, found in targets[:index]:
-            if _same(place, found) or found in place.parents or place in found.parents:
+            both = numbered and (_is_numbered(found, place) or _is_numbered(place, found))
+            if _same(place, found) or found in place.parents or place in found.parents or both:
                 raise VoodooError(f"{path}: expected outputs that are apart, found {other} in the same place")
 
 
 def _place(path: Path) -> Path:
     """The absolute place of a name, links followed."""
     return Path(os.path.realpath(path))
+
+
+def _is_numbered(path: Path, target: Path) -> bool:
+    """Whether a file can be that of a person of an output."""
+    stem = re.fullmatch(rf"{re.escape(target.stem)}_\d+", path.stem)
+    return stem is not None and path.parent == target.parent and path.suffix == target.suffix in (".bvh", ".trc")
 
 
 def _same(one: Path, other: Path) -> bool:

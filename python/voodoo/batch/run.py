@@ -11,12 +11,13 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from voodoo.batch.storage import Store, named
-from voodoo.batch.summary import DONE, Row, read_table, write_table
-from voodoo.batch.task import Job, Settings, do, failed
+from voodoo.batch.summary import FAILED, Row, read_table, write_table
+from voodoo.batch.task import Job, Settings, do, failed, stored_row
 from voodoo.children import children
 from voodoo.errors import VoodooError, reading
 
@@ -27,6 +28,8 @@ of a million recordings is large."""
 _AHEAD = 4
 """Number of tasks per worker that are submitted to the scheduler: a million would fill its memory."""
 _CONNECT_S, _POLL_S = 30, 0.3
+_READERS = 16
+"""Tables that are looked at together: each waits for the network."""
 
 
 class Batch:
@@ -36,26 +39,31 @@ class Batch:
         sources: see voodoo.batch.storage.find_sources.
         out: path or URL of the folder; results of an earlier run with the same settings are kept.
         settings: settings for all recordings.
+        limit_s: longest time for a recording [s].
 
     Attributes:
         rows: rows of the finished and failed recordings, by name.
         jobs: remaining jobs: untracked recordings, and failed ones.
+        notes: what was found damaged, and made anew.
 
     Raises:
         VoodooError: the folder cannot be used, or has results with other settings.
     """
 
-    def __init__(self, sources: Sequence[str], out: str, settings: Settings) -> None:
-        """Determine which recordings are done."""
+    def __init__(self, sources: Sequence[str], out: str, settings: Settings, *, limit_s: float | None = None) -> None:
+        """Determine which recordings are done: those whose tables are complete."""
         self._store = Store(out)
+        self.notes: list[str] = []
         self._check_settings(settings)
-        text = self._store.read(SUMMARY)
-        known = {} if text is None else read_table(text, f"{out}/{SUMMARY}")
-        tables = self._store.recordings()
-        self.rows = {name: row for name, row in known.items() if row.status != DONE or name in tables}
-        pairs = named(sources, {name: row.source for name, row in known.items()})
-        done = {name for name, row in self.rows.items() if row.status == DONE}
-        self.jobs = [Job(name, source, out, settings) for name, source in pairs if name not in done]
+        names = sorted(self._store.recordings())
+        with ThreadPoolExecutor(_READERS) as readers:
+            found = dict(zip(names, readers.map(lambda name: stored_row(out, name, settings), names), strict=True))
+        done = {name: row for name, row in found.items() if row is not None}
+        known = self._summary()
+        failed = {name: row for name, row in known.items() if row.status == FAILED}
+        self.rows = {**failed, **done}
+        pairs = named(sources, {name: row.source for name, row in {**known, **done}.items()})
+        self.jobs = [Job(name, source, out, settings, limit_s) for name, source in pairs if name not in done]
         self._written, self._took = -_EVERY_S, 0.0
 
     def _check_settings(self, settings: Settings) -> None:
@@ -66,16 +74,29 @@ class Batch:
             return
         try:
             found = json.loads(before)
-        except ValueError:
-            found = None
-        if not isinstance(found, dict):
-            raise VoodooError(f"{self._store.url}/{SETTINGS}: expected the settings of a batch, found another file")
-        different = [f"{name} {found.get(name)!r}" for name, value in described.items() if found.get(name) != value]
+            different = [name for name, value in described.items() if found.get(name) != value]
+        except (ValueError, AttributeError):
+            self._set_aside(SETTINGS)
+            self._check_settings(settings)
+            return
         if different:
+            words = ", ".join(f"{name} {found.get(name)!r}" for name in different)
             raise VoodooError(
-                f"{self._store.url}: expected results of the same settings, found some of {', '.join(different)}; "
+                f"{self._store.url}: expected results of the same settings, found some of {words}; "
                 "give another --out, or the same settings"
             )
+
+    def _summary(self) -> dict[str, Row]:
+        text = self._store.read(SUMMARY)
+        try:
+            return {} if text is None else read_table(text, f"{self._store.url}/{SUMMARY}")
+        except VoodooError:
+            self._set_aside(SUMMARY)
+            return {}
+
+    def _set_aside(self, name: str) -> None:
+        self._store.rename(name, f"{name}.damaged")
+        self.notes.append(f"{self._store.url}/{name} is damaged, and made anew; the old one is {name}.damaged")
 
     def take(self, row: Row) -> None:
         """Store the row of a recording; the table is written at intervals."""
@@ -138,7 +159,8 @@ def _row(task: Any, job: Job) -> Row:  # noqa: ANN401 - Dask has no types
         found = task.result()
     except Exception as error:  # an error of the scheduler: a task itself never raises
         if type(error).__name__ == "KilledWorker":
-            return failed(job, "the worker died, and another one that was given it again")
+            limit = "" if job.limit_s is None else f" (its time limit is {job.limit_s:g} s)"
+            return failed(job, f"the worker died, and another one that was given it again{limit}")
         return failed(job, f"{type(error).__name__}: {' '.join(str(error).split())}")
     return found if isinstance(found, Row) else failed(job, f"expected a row, found {type(found).__name__}")
 

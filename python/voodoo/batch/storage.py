@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -16,6 +14,7 @@ from urllib.parse import quote, unquote
 
 from voodoo.errors import RecordingError, VoodooError, a_path, reading
 from voodoo.evaluation.search import find_recordings
+from voodoo.whole import appearing_whole
 
 _FILES = (".bag", ".mcap", ".db3", ".zip", ".trc", ".c3d")
 _OF_A_FOLDER = re.compile(r"(metadata\.yaml|Calib[^/]*\.toml|calibration\.toml|bag/[^/]*)$")
@@ -182,7 +181,11 @@ class Store:
         """
         files, top = self._at
         with reading(f"{self.url}/{name}", "a readable file", error=VoodooError):
-            return files.cat_file(f"{top}/{name}").decode("utf-8") if files.exists(f"{top}/{name}") else None
+            return (
+                files.cat_file(f"{top}/{name}").decode("utf-8", errors="replace")
+                if files.exists(f"{top}/{name}")
+                else None
+            )
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file atomically.
@@ -197,16 +200,14 @@ class Store:
             if not is_local(self.url):
                 files.pipe_file(place, content)  # objects are written atomically
                 return
-            target = Path(place)
-            for left in target.parent.glob(f".{target.name}.*"):  # left by a worker that died
-                with contextlib.suppress(OSError):
-                    left.unlink()
-            part = target.with_name(f".{target.name}.{os.getpid()}-{os.urandom(4).hex()}")
-            try:
+            with appearing_whole(Path(place)) as part:
                 part.write_bytes(content)
-                os.replace(part, target)  # noqa: PTH105 - the replacement must be atomic
-            finally:
-                part.unlink(missing_ok=True)
+
+    def rename(self, name: str, other: str) -> None:
+        """Give a file another name."""
+        files, top = self._at
+        with reading(f"{self.url}/{name}", "a file that can be renamed", error=VoodooError):
+            files.mv(f"{top}/{name}", f"{top}/{other}")
 
     def place_of(self, recording: str) -> str:
         """Path of a recording's table."""

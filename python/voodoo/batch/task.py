@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import faulthandler
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -37,6 +37,9 @@ from voodoo.sensors.settings import FrontEndSettings
 T = TypeVar("T")
 _TOGETHER = 500
 """Number of frames whose estimates are kept in memory."""
+_GRACE_S = 10.0
+"""Time after the limit at which a worker ends that does not return from a library [s]."""
+_NOWHERE = Path(os.devnull).open("w")
 
 
 @dataclass(frozen=True)
@@ -70,12 +73,13 @@ class Settings:
 
 @dataclass(frozen=True)
 class Job:
-    """A recording to track: name, source, target of its table, and settings."""
+    """A recording to track: name, source, target of its table, settings, and longest time [s]."""
 
     name: str
     source: str
     out: str
     settings: Settings
+    limit_s: float | None = None
 
 
 def do(job: Job) -> Row:
@@ -86,6 +90,8 @@ def do(job: Job) -> Row:
     """
     began = time.perf_counter()
     _one_thread()
+    if job.limit_s is not None:  # for what cannot be interrupted; a part of the time is for what can
+        faulthandler.dump_traceback_later(job.limit_s + _GRACE_S, exit=True, file=_NOWHERE)
     try:
         done = row_of(job)
         if done is not None:
@@ -101,6 +107,8 @@ def do(job: Job) -> Row:
         words = " ".join(str(error).split()) or "no further detail"
         text = words if isinstance(error, (ValueError, OSError)) else f"{type(error).__name__}: {words}"
         return failed(job, text, time.perf_counter() - began)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def failed(job: Job, why: str, seconds: float = float("nan")) -> Row:
@@ -110,18 +118,24 @@ def failed(job: Job, why: str, seconds: float = float("nan")) -> Row:
 
 def row_of(job: Job) -> Row | None:
     """The row in the existing table of a recording, if it has the same source and settings; or None."""
-    file = Store(job.out).opened(job.name)
+    row = stored_row(job.out, job.name, job.settings)
+    return row if row is not None and row.source == job.source else None
+
+
+def stored_row(out: str, name: str, settings: Settings) -> Row | None:
+    """The row in the footer of a table; None if it is not complete, or has other settings."""
+    file = Store(out).opened(name)
     if file is None:
         return None
     with file:
         note = note_of(file)
-    if note is None or note.get("settings") != job.settings.as_dict():
+    if note is None or note.get("settings") != settings.as_dict():
         return None
     try:
         row = Row.of(note["row"])
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
-    return row if row.source == job.source and row.status == DONE else None
+    return row if row.status == DONE else None
 
 
 def _track(job: Job, path: Path) -> tuple[Row, Columns]:
@@ -164,7 +178,7 @@ def _one_person(
     init = AUTO if job.settings.init == AUTO else None
     tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
     steps = track(recording, tracker, settings=settings, left_out=left_out)
-    for part in _parts(step.estimate for step in steps):
+    for part in _parts((step.estimate for step in steps), job.limit_s):
         yield {1: Track.of(part, body=tracker.body)}
 
 
@@ -180,14 +194,26 @@ def _people(
             bodies.update({person.id: people.body(person.id) for person in step.estimate})
             yield step.estimate
 
-    for part in _parts(estimates()):
+    for part in _parts(estimates(), job.limit_s):
         yield PeopleTrack.of(part, bodies=bodies).tracks
 
 
-def _parts(items: Iterable[T]) -> Iterator[list[T]]:
-    """Yields lists of limited length, because the estimates of hours would fill the memory."""
-    stream = iter(items)
-    while part := list(itertools.islice(stream, _TOGETHER)):
+def _parts(items: Iterable[T], limit_s: float | None) -> Iterator[list[T]]:
+    """Yields lists of limited length, because the estimates of hours would fill the memory.
+
+    Raises:
+        RecordingError: they take longer than a limit [s].
+    """
+    began = time.monotonic()
+    part: list[T] = []
+    for item in items:
+        part.append(item)
+        if limit_s is not None and time.monotonic() - began > limit_s:
+            raise RecordingError(f"expected to be tracked in {limit_s:g} s, the time limit, found it to take longer")
+        if len(part) == _TOGETHER:
+            yield part
+            part = []
+    if part:
         yield part
 
 

@@ -19,6 +19,7 @@ from voodoo.cli.ik import ik_command
 from voodoo.cli.init import init_command
 from voodoo.cli.live import live_command
 from voodoo.cli.paths import Checked
+from voodoo.cli.recover import recover_command
 from voodoo.cli.report import report_command
 from voodoo.cli.show import body_command, config_command, info_command
 from voodoo.cli.terminal import Escaped
@@ -75,6 +76,7 @@ app.command("ik", cls=Checked, short_help="Find postures from a few known sites 
 app.command("eval", cls=Checked, short_help="Measure the tracker on recordings with a truth.")(eval_command)
 app.command("batch", cls=Checked, short_help="Track a thousand recordings, one task each.")(batch_command)
 app.command("report", cls=Checked, short_help="Write a result as a web page to look at.")(report_command)
+app.command("recover", cls=Checked, short_help="Make the files of commands that were killed.")(recover_command)
 app.command("info", cls=Checked, short_help="Say what is in a recording.")(info_command)
 app.command("config", cls=Checked, short_help="Print the default configuration as commented TOML.")(config_command)
 app.command("body", cls=Checked, short_help="Print a body as TOML: the default human, or a file.")(body_command)

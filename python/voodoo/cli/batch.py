@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import os
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated
 
 import typer
 
 from voodoo.cli.common import clear_errors, print_interrupted, print_message, progressing
 from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, PeopleOption, StrictOption, UseOption
+from voodoo.cli.signals import deferred
 
 
 def batch_command(
@@ -32,6 +29,9 @@ def batch_command(
     ] = None,
     only: Annotated[
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="S", min=0.001, help="A recording that takes longer has failed.")
     ] = None,
     config: ConfigOption = None,
     model: ModelOption = None,
@@ -88,14 +88,17 @@ def batch_command(
         sources = find_sources(recordings, only=only or ())
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
-        batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings)
+        batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings, limit_s=time_limit)
+        for note in batch.notes:
+            print_message(note)
+        batch.save()  # also of tables that it did not have
         before = len(sources) - len(batch.jobs)
         interrupted = False
         if batch.jobs:
             count = workers or (
                 len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
             )
-            with _ctrl_c() as stop:
+            with deferred() as stop:
                 rows = run(batch.jobs, workers=count, scheduler=scheduler, stop=stop)
                 try:
                     for row in progressing(rows, "tracking", len(batch.jobs)):
@@ -113,23 +116,3 @@ def batch_command(
         broken = [row for row in ours if row.status == FAILED]
         if broken:
             raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")
-
-
-@contextmanager
-def _ctrl_c() -> Iterator[threading.Event]:
-    """Ctrl-C inside sets the event, so that the run ends in an orderly way; a second one ends the program."""
-    stop = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield stop
-        return
-    before = signal.getsignal(signal.SIGINT)
-
-    def set_once(*_: object) -> None:
-        stop.set()
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-    signal.signal(signal.SIGINT, set_once)
-    try:
-        yield stop
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import typer
 
 from voodoo.cli.options import NUMBERS, TOPICS
+from voodoo.cli.signals import INTERRUPTED
 from voodoo.cli.terminal import Escaped
 from voodoo.errors import VoodooError, reason
 
-if TYPE_CHECKING:
-    from voodoo.export.track import Track
-
 T = TypeVar("T")
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, by convention 128 + SIGINT."""
 
 
 def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
@@ -70,9 +67,9 @@ def refuse_both(name: str, value: object, **others: object) -> None:
             raise typer.BadParameter(f"give {name} or {other}, not both")
 
 
-def states(result: Track) -> str:
+def states(status: Iterable[str]) -> str:
     """Number of frames per status, e.g. "88 tracking, 2 lost"."""
-    return ", ".join(f"{result.status.count(word)} {word}" for word in dict.fromkeys(result.status))
+    return ", ".join(f"{count} {word}" for word, count in Counter(status).items())
 
 
 def wrote(files: Sequence[Path]) -> str:

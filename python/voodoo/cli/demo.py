@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, refuse_missing, states
+from voodoo.cli.common import clear_errors, refuse_missing, states
+from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import VoodooError
 
 
@@ -21,8 +22,11 @@ def demo_command(
     """
     import numpy as np
 
-    from voodoo.cli.running import opened, run
+    from voodoo._core import Estimate
+    from voodoo.cli.running import opened, pictured, run
     from voodoo.evaluation.evaluate import compare
+    from voodoo.export.track import Track
+    from voodoo.pipeline.run import track
     from voodoo.pipeline.start import AUTO, start_tracker
     from voodoo.recordings.sample import sample_path
     from voodoo.visualization.image_writer import save_picture
@@ -31,17 +35,22 @@ def demo_command(
     with clear_errors():
         source = opened(sample_path(), None, None)
         tracker = start_tracker(source, init=AUTO)
-        out.mkdir(parents=True, exist_ok=True)
-        result, seconds, sheet, interrupted, failure = run(source, tracker, out / "overlay.mp4", sheet=6)
+        estimates: list[Estimate] = []
+        how: dict[str, Any] = {"overlay": out / "overlay.mp4", "sheet": 6, **pictured(tracker)}
+        steps = track(source, tracker)
+        seconds, sheet, interrupted, _, failures = run(
+            source, steps, take=lambda step: estimates.append(step.estimate), **how
+        )
         if interrupted:
             raise typer.Exit(INTERRUPTED)
+        result = Track.of(estimates, body=tracker.body)
         result.save(out / "pose.csv")
-        refuse_missing([failure], f"wrote {out / 'pose.csv'}")
+        refuse_missing(failures, f"wrote {out / 'pose.csv'}")
         save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
         if not result.found.any():
             raise VoodooError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
         errors = compare(source, result)
-        typer.echo(f"{source.name}: {len(result)} frames, {states(result)}")
+        typer.echo(f"{source.name}: {len(result)} frames, {states(result.status)}")
         typer.echo(
             f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)"
         )

@@ -10,6 +10,7 @@ import typer
 
 from voodoo.cli.common import clear_errors, print_interrupted, progressing, until_interrupted
 from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
+from voodoo.cli.signals import deferred
 
 
 def eval_command(
@@ -108,7 +109,8 @@ def eval_command(
         if scores:
             typer.echo(markdown(scores, tables))
         if out is not None and scores:
-            files = write_reports(out, scores, tables, picture=not interrupted)
+            with deferred():
+                files = write_reports(out, scores, tables, picture=not interrupted)
             typer.echo("wrote " + ", ".join(str(file) for file in files))
         print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
         refuse_failures(scores)

@@ -32,6 +32,7 @@ from voodoo.cli.options import (
     TopicOption,
 )
 from voodoo.cli.paths import check_paths
+from voodoo.cli.signals import deferred
 from voodoo.errors import VoodooError
 
 
@@ -129,11 +130,12 @@ def ik_command(
             export(result, path, body=tracker.body, root_frame=source.root_frame, optical=optical)
             return [path]
 
-        done, failed = written(files, write)
+        with deferred():
+            done, failed = written(files, write)
         for name, values in errors.items():
             if np.isfinite(values).any():
                 typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
-        message = f"{len(result)} frames, {states(result)}{wrote(done)}"
+        message = f"{len(result)} frames, {states(result.status)}{wrote(done)}"
         refuse_missing(failed, message)
         print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
         typer.echo(message)

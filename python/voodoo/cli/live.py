@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, print_message, refuse_both, topics_of
+from voodoo.cli.common import clear_errors, numbers_of, print_message, refuse_both, topics_of
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -26,9 +26,7 @@ from voodoo.cli.options import (
     UseOption,
     ViewOption,
 )
-
-TERMINATED = 143
-"""Exit code after SIGTERM."""
+from voodoo.cli.signals import INTERRUPTED
 
 
 def live_command(
@@ -98,7 +96,7 @@ def live_command(
 ) -> None:
     """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
 
-    Ends after --duration, with the recording, or with Ctrl-C or SIGTERM; then files are completed.
+    Ends after --duration, with the recording, or with Ctrl-C, SIGTERM or SIGHUP; then files are completed.
     Every second a line on stderr has rate, latency, drops and the status of each person.
     Faults of the source are reported there and counted.
 
@@ -114,6 +112,7 @@ def live_command(
     """
     from voodoo.cli.live_run import Wishes, entered, run
     from voodoo.cli.people import limit_of, no_starts
+    from voodoo.cli.recover import recover_before
     from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
     from voodoo.export.files import check_target
     from voodoo.pipeline.start import beginning_of
@@ -149,10 +148,9 @@ def live_command(
         source = entered(
             sources, calibration or (), rate=rate, loop=loop, root_frame=frame, options=options, several=several
         )
+        recover_before([*wishes.targets, *([record] if record is not None else [])])
         done = run(source, wishes, duration=duration, report=report)
         for path in done.written:
             print_message(f"wrote {path}")
-        if done.signal == "SIGINT":
+        if done.ended:
             raise typer.Exit(INTERRUPTED)
-        if done.signal:
-            raise typer.Exit(TERMINATED)

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import gc
 import json
-import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
 
 from voodoo.cli.common import print_message
 from voodoo.cli.people import body_of
+from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import instant
+from voodoo.export.spool import Spool
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.first_frame import FirstFrame
 from voodoo.live.follow import ONE, Follower, Step
@@ -29,7 +29,6 @@ from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.registry import sink_of
 from voodoo.live.sources.words import source_of
-from voodoo.live.spool import Files
 from voodoo.live.stream import Live
 from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
@@ -52,6 +51,8 @@ _STANDING = {
 }
 _TICK_S = 0.05
 _LINE_S = 1.0
+_TOGETHER = 30
+"""Frames of files that a power cut costs at most."""
 _NO_SCREEN = "--save FILE.rrd writes a file"
 """Advice in the error of `Viewer` without a screen."""
 _SWITCH_S = 5e-4
@@ -83,9 +84,9 @@ class Wishes:
 
 @dataclass
 class Done:
-    """Result of a session: the signal that ended it ("": none), and the written files."""
+    """Result of a session: whether a signal ended it, and the written files."""
 
-    signal: str = ""
+    ended: bool = False
     written: list[Path] = field(default_factory=list)
 
 
@@ -122,11 +123,11 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
     """
     done = Done()
     warm_up()
-    with _prompt_threads(), _signals() as signals, live:
+    with _prompt_threads(), deferred() as ended, live:
         outputs, files = _outputs(live, wishes)
         session = Session(live, lambda frame: _follower(live, wishes, frame), outputs=outputs)
         try:
-            _check_states(session, signals, duration)
+            _check_states(session, ended, duration)
         finally:
             try:
                 session.finish()
@@ -134,18 +135,18 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
                 if report is not None:
                     write_report(report, session)
         print_message(f"{session.line()}; {session.published} published")
-        done.signal = signals[0] if signals else ""
+        done.ended = ended.is_set()
         if files is not None:
             done.written += files.written
         done.written += [path for path in (wishes.record, report) if path is not None and path.exists()]
     return done
 
 
-def _check_states(session: Session, signals: Sequence[str], duration: float | None) -> None:
+def _check_states(session: Session, ended: threading.Event, duration: float | None) -> None:
     """Print a line every second until the end."""
     clock = session.live.clock
     began = reported = clock.now()
-    while session.wait(_TICK_S) and not signals:
+    while session.wait(_TICK_S) and not ended.is_set():
         now = clock.now()
         if duration is not None and now - began >= duration:
             return
@@ -184,7 +185,7 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
 
 
-def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
+def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | None]:
     # Addresses come first: one that is of no use leaves no file behind.
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in wishes.to]
     files = None
@@ -193,7 +194,7 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
 
         outputs.append(Ros2Output(lambda: live.root_frame))
     if wishes.targets:
-        files = Files(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
+        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
         outputs.append(files)
     if wishes.record is not None:
         outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
@@ -207,6 +208,37 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], Files | None]:
         if viewer.address:
             print_message(f"look at {viewer.address} in a browser")
     return outputs, files
+
+
+class FileOutput(Output):
+    """Keeps poses on disk, and writes the files when the session ends; see `Spool`.
+
+    Attributes:
+        written: files that exist after `close`.
+    """
+
+    name = "files"
+    waiting = 256
+
+    def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str], several: bool) -> None:
+        """Make the folder of the poses."""
+        self._spool = Spool(paths, root_frame=root_frame, several=several, together=_TOGETHER)
+        self._several = several
+        self.written: list[Path] = []
+
+    def publish(self, step: Step) -> None:
+        """See Output."""
+        self._spool.add(step.people if self._several else step.estimates[ONE], step.bodies)
+
+    def close(self) -> None:
+        """Write the files.
+
+        Raises:
+            VoodooError: there were no frames, or a file cannot be written; names the folder that is kept then.
+        """
+        self.written, failed = self._spool.write()
+        if failed:
+            raise VoodooError("; ".join(map(reason, failed))) from failed[0]
 
 
 class ShowOutput(Output):
@@ -244,25 +276,6 @@ def _prompt_threads() -> Iterator[None]:
     finally:
         gc.unfreeze()
         sys.setswitchinterval(before)
-
-
-@contextmanager
-def _signals() -> Iterator[list[str]]:
-    """Collects the names of received SIGINT and SIGTERM; a second one ends the program immediately."""
-    found: list[str] = []
-    before = {}
-
-    def note(number: int, _: FrameType | None) -> None:
-        found.append(signal.Signals(number).name)
-        signal.signal(number, signal.SIG_DFL)
-
-    if threading.current_thread() is threading.main_thread():
-        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield found
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def warm_up() -> None:

@@ -11,22 +11,26 @@ import typer
 from typer.core import TyperCommand
 
 from voodoo.cli.common import clear_errors
+from voodoo.cli.signals import ending
 
 OUTPUTS = {"out", "overlay", "save", "report", "record"}
 """Parameters of commands that name what is written; all others with a metavar of files are read."""
 SEARCHED = "RECORDING..."
 """Metavar of folders in which recordings are searched for: the command checks the recordings that it finds."""
+_BESIDE = ("truth.csv", "truth_people.csv")
+"""Files that are read with a recording in their folder or the one below."""
 _FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
 
 
 class Checked(TyperCommand):
-    """A command that begins only if nothing it writes is in the place of what it reads."""
+    """A command that begins only if nothing it writes is in the place of what it reads, and that signals end."""
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - Typer brings its own Click, or uses the installed one
         """Check the options, then run the command."""
         with clear_errors():
             check_paths(ctx)
-        return super().invoke(ctx)
+        with ending():
+            return super().invoke(ctx)
 
 
 def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
@@ -50,7 +54,9 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
             else:
                 # Also the path in SENSOR=DIR and KIND:SOURCE.
                 inputs += [Path(part) for word in words for part in (word, *re.split("[=:]", word, maxsplit=1)[1:])]
-    check_outputs(outputs, inputs)
+    folders = {folder for path in inputs for folder in (path.parent, path.parent.parent)}
+    inputs += [folder / name for folder in sorted(folders) for name in _BESIDE]
+    check_outputs(outputs, inputs, numbered=context.params.get("people") not in (None, "1"))
 
 
 def _words(value: object) -> Iterator[str]:

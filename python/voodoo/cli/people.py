@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import typer
 
-from voodoo.cli.common import INTERRUPTED, print_message, progressing, refuse_missing, wrote
 from voodoo.errors import VoodooError
 
 if TYPE_CHECKING:
     from voodoo.evaluation.people import PeopleScore
     from voodoo.evaluation.score import Score
-    from voodoo.export.people import PeopleTrack
+    from voodoo.export.spool import Spool
     from voodoo.model.body import Body
     from voodoo.names import HumanModel
     from voodoo.people import People
+    from voodoo.pipeline.people import TrackedPeople
     from voodoo.pipeline.start import Automatic
-    from voodoo.recordings.left_out import LeftOut
-    from voodoo.recordings.recording import Recording
-    from voodoo.sensors.settings import FrontEndSettings
+    from voodoo.visualization.ink import Picture
+    from voodoo.visualization.overlay import Overlay
     from voodoo.visualization.rerun_viewer import Viewer
 
 ANY = "any"
@@ -67,80 +63,21 @@ def body_of(body: Path | None, *, height: float | None, model: HumanModel | None
     return Body.human(1.75 if height is None else height, model=model or "measured")
 
 
-@dataclass(frozen=True, eq=False)
-class Outputs:
-    """Targets of a result: files, images, Rerun."""
-
-    targets: Sequence[Path]
-    overlay: Path | None
-    save: Path | None
-    viewer: Viewer | None
-
-
-def follow_people(
-    source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
-) -> None:
-    """Track all persons in a recording, and write the requested outputs."""
-    from voodoo.export.files import upright_words, written
-    from voodoo.export.people_files import save_people
-
-    result, bodies, interrupted, failure = _run(source, people, settings, outputs, left_out)
-    how: Any = {"root_frame": source.root_frame, "optical": source.info().camera_root}
-    done, failed = written(outputs.targets, lambda path: save_people(result, path, bodies=bodies, **how))
-    if turned := upright_words(done, **how):
-        print_message(turned)
-    done += [path for path in (None if failure else outputs.overlay, outputs.save) if path is not None]
-    rows = sum(len(track) for track in result.tracks.values())
-    count = len(result.tracks)
-    message = f"{len(result)} frames, {count} {'person' if count == 1 else 'persons'} in {rows} rows{wrote(done)}"
-    refuse_missing([*failed, failure], message)
-    if interrupted:
-        typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {message}", err=True)
-        raise typer.Exit(INTERRUPTED)
-    typer.echo(message)
-    if not result.tracks:
-        typer.echo(f"voodoo: {source.name}: nobody was found in {len(result)} frames", err=True)
-
-
-class _Followed(NamedTuple):
-    track: PeopleTrack
-    bodies: dict[int, Body]
-    interrupted: bool
-    failure: VoodooError | OSError | None
-
-
-def _run(
-    source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
-) -> _Followed:
-    """Track and draw. Ctrl-C ends the run with the frames so far, if any."""
-    from voodoo.export.people import PeopleTrack
-    from voodoo.pipeline.people import track_people
-    from voodoo.visualization.image_writer import PictureWriter
-    from voodoo.visualization.overlay import Overlay
-
-    estimates, interrupted = [], False
+def pictured_people(people: People, spool: Spool) -> dict[str, Any]:
+    """How `voodoo.cli.running.run` keeps, draws and shows the frames of all persons."""
     bodies: dict[int, Body] = {}
-    rate = source.info().rate_hz
-    drawing = None if outputs.overlay is None else Overlay(source)
-    writer = (
-        None if outputs.overlay is None else PictureWriter(outputs.overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
-    )
-    with writer or nullcontext():
-        try:
-            steps = track_people(source, people, settings=settings, left_out=left_out)
-            for step in progressing(steps, source.name, len(source)):
-                estimates.append(step.estimate)
-                bodies |= {person.id: people.body(person.id) for person in step.estimate}
-                if outputs.viewer is not None:
-                    outputs.viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
-                if writer is not None and drawing is not None:
-                    writer.write(drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index))
-        except KeyboardInterrupt:
-            if not estimates:
-                raise
-            interrupted = True
-    failure = None if writer is None else writer.failure
-    return _Followed(PeopleTrack.of(estimates, bodies=bodies), bodies, interrupted, failure)
+
+    def take(step: TrackedPeople) -> None:
+        bodies.update({person.id: people.body(person.id) for person in step.estimate})
+        spool.add(step.estimate, bodies)
+
+    def draw(drawing: Overlay, step: TrackedPeople) -> Picture:
+        return drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index)
+
+    def show(viewer: Viewer, step: TrackedPeople) -> None:
+        viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
+
+    return {"take": take, "draw": draw, "show": show}
 
 
 def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:

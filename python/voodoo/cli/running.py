@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,13 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from voodoo.cli.common import progressing
+from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
 from voodoo.errors import VoodooError
-from voodoo.export.track import Track
-from voodoo.pipeline.run import track
+from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import Beginning
-from voodoo.pipeline.starts.chosen import Starts
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
@@ -30,14 +30,14 @@ from voodoo.visualization.rerun_viewer import Viewer
 
 
 class Run(NamedTuple):
-    """Outcome of a run over a recording: the result, the time of every frame [s], the requested images, whether it was ended by
-    Ctrl-C, and why images of `overlay` are missing."""
+    """Outcome of a run over a recording: the time of every frame [s], the requested images, whether it was ended by a signal,
+    which of `overlay` and `save` are written, and what failed."""
 
-    track: Track
-    seconds: list[float]
+    seconds: Sequence[float]
     pictures: list[Picture]
     interrupted: bool
-    failure: VoodooError | OSError | None
+    written: list[Path]
+    failures: list[Exception]
 
 
 def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
@@ -113,54 +113,99 @@ def detector_of(path: Path | None) -> AnyDetector:
 
 def run(
     source: Recording,
-    tracker: Tracker,
-    overlay: Path | None,
+    steps: Iterable[Any],
     *,
-    sheet: int = 0,
-    settings: FrontEndSettings | None = None,
-    starts: Starts | None = None,
+    take: Callable[[Any], None],
+    draw: Callable[[Overlay, Any], Picture],
+    show: Callable[[Viewer, Any], None],
+    overlay: Path | None = None,
+    save: Path | None = None,
     viewer: Viewer | None = None,
+    sheet: int = 0,
     left_out: LeftOut | None = None,
 ) -> Run:
-    """Track and draw, with `sheet` images spread over the recording. Ctrl-C ends the run with the frames so far, if any."""
-    estimates, seconds, pictures, interrupted = [], [], [], False
+    """Track and draw; a signal ends the run with the frames so far, if any. What cannot be drawn or shown costs no poses.
+
+    Args:
+        source: the recording.
+        steps: its frames, tracked, of one person or several.
+        take: keeps the poses of a frame. An OSError, also of the recording, ends the run.
+        draw: a picture of a frame.
+        show: shows a frame in `viewer`.
+        overlay: PictureWriter's path.
+        save: file of the viewer.
+        viewer: closed at the end.
+        sheet: number of images of `overlay` to return, spread over the recording.
+        left_out: told if no frame can be used.
+
+    Raises:
+        VoodooError: no frames.
+    """
+    seconds, pictures, interrupted = array("d"), [], False
+    failures: list[Exception] = []
     chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
     rate = source.info().rate_hz
-    drawing = Overlay(source)
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
-    with writer or nullcontext():
+    drawing: list[Overlay] = []
+
+    def drawn(step: Any) -> None:  # noqa: ANN401 - of one person or several
+        if not drawing:
+            drawing.append(Overlay(source))
+        picture = draw(drawing[0], step)
+        if writer is not None:
+            writer.write(picture)
+        if step.index in chosen:
+            pictures.append(picture)
+
+    with deferred() as ended, viewer or nullcontext(), writer or nullcontext():
         try:
-            steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
             for step in progressing(steps, source.name, len(source)):
-                estimates.append(step.estimate)
                 seconds.append(step.seconds)
+                take(step)
                 if viewer is not None:
-                    viewer.log(
-                        step.estimate,
-                        tracker.body,
-                        recorded=step.recorded,
-                        front_end=step.front_end,
-                        seconds=step.seconds,
-                    )
-                if writer is not None or step.index in chosen:
-                    picture = drawing.draw(
-                        step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end
-                    )
-                    if writer is not None:
-                        writer.write(picture)
-                    if step.index in chosen:
-                        pictures.append(picture)
+                    _apart(viewer, show, viewer, step)
+                if writer is not None:
+                    _apart(writer, drawn, step)
+                if interrupted := ended.is_set():
+                    break
         except KeyboardInterrupt:
-            if not estimates:
+            if not seconds:
                 raise
             interrupted = True
-    if not estimates:
+        except OSError as error:
+            if not seconds:
+                raise
+            failures.append(error)
+    if not seconds:
         raise VoodooError(
             f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
         )
-    left = {} if left_out is None else left_out.counts
-    failure = None if writer is None else writer.failure
-    return Run(Track.of(estimates, body=tracker.body, left_out=left), seconds, pictures, interrupted, failure)
+    outputs = [(path, output.failure) for path, output in ((overlay, writer), (save, viewer)) if output is not None]
+    failures += [failure for _, failure in outputs if failure is not None]
+    done = [path for path, failure in outputs if path is not None and failure is None]
+    return Run(seconds, pictures, interrupted, done, failures)
+
+
+def _apart(output: PictureWriter | Viewer, call: Callable[..., None], *arguments: object) -> None:
+    """Serve an output, unless it has failed."""
+    if output.failure is None:
+        try:
+            call(*arguments)
+        except Exception as error:
+            output.failure = error
+
+
+def pictured(tracker: Tracker) -> dict[str, Any]:
+    """How `run` draws and shows the frames of one person."""
+
+    def draw(drawing: Overlay, step: TrackedFrame) -> Picture:
+        return drawing.draw(step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end)
+
+    def show(viewer: Viewer, step: TrackedFrame) -> None:
+        how: dict[str, Any] = {"recorded": step.recorded, "front_end": step.front_end, "seconds": step.seconds}
+        viewer.log(step.estimate, tracker.body, **how)
+
+    return {"draw": draw, "show": show}
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from voodoo.cli.common import (
-    INTERRUPTED,
     clear_errors,
     numbers_of,
     print_message,
@@ -41,11 +40,16 @@ from voodoo.cli.options import (
     ViewOption,
 )
 from voodoo.cli.paths import check_paths
+from voodoo.cli.signals import INTERRUPTED, deferred
+from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
-    from voodoo.export.track import Track
+    from voodoo.export.spool import Spool
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.recording import Recording
+
+TOGETHER = 250
+"""Frames whose poses a crash costs at most, and that are in memory."""
 
 
 def track_command(
@@ -108,7 +112,8 @@ def track_command(
 
     The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in the
     recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
-    limb. The .npz adds the pose of every limb. Ctrl-C writes the frames so far and ends with exit code 130.
+    limb. The .npz adds the pose of every limb. Ctrl-C writes the frames so far and ends with exit code 130; after a
+    crash, voodoo recover does.
 
     Unusable frames (a repeated or late stamp, a blank or undecodable image) are left out and have no row. They are counted by
     reason on stderr and in the .npz. With --strict the first one ends the command without a result.
@@ -136,7 +141,8 @@ def track_command(
     """
     from dataclasses import replace
 
-    from voodoo.cli.people import Outputs, body_of, follow_people, limit_of, no_starts
+    from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people
+    from voodoo.cli.recover import recover_before
     from voodoo.cli.running import (
         bare_for,
         boxes_of,
@@ -145,15 +151,18 @@ def track_command(
         detector_of,
         kinds_of,
         opened,
+        pictured,
         run,
         viewer_of,
     )
-    from voodoo.export.files import check_target, upright_words, written
-    from voodoo.export.files import save as export
+    from voodoo.export.files import check_target, upright_words
+    from voodoo.export.spool import ONE, Spool
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
     from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
+    from voodoo.pipeline.people import track_people
+    from voodoo.pipeline.run import track
     from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
@@ -197,70 +206,72 @@ def track_command(
             check_target(target)
         if not out:
             check_paths(context, targets)
-        if several:
-            followed = body_of(body, height=height, model=model)
-            everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
-            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
-            with viewer_of(view, save, source.name) as viewer:
-                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer), left_out)
-            _print_left_out(source, left_out)
-            return
-        tracker = start_tracker(
-            source,
-            init=beginning,
-            body=None if body is None else Body.load(body),
-            height=height,
-            model=model,
-            config=config_of(config),
-            markers=markers,
-            use=kinds,
-            detector=detector_of(detector),
+        recover_before(targets)
+        optical = source.info().camera_root
+        keeping = Spool(
+            targets, root_frame=lambda: source.root_frame, optical=optical, several=several, together=TOGETHER
         )
-        with viewer_of(view, save, source.name) as viewer:
+        with keeping as spool, viewer_of(view, save, source.name) as viewer:
+            how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(
                 FrontEndSettings.of(source, use=kinds),
                 depth_filter=depth_filter,
                 exclude=boxes,
-                draw_regions=draw_regions,
+                draw_regions=draw_regions and not several,
             )
-            how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
-            result, _, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
-        optical = source.info().camera_root
-
-        def write(path: Path) -> list[Path]:
-            export(result, path, body=tracker.body, root_frame=source.root_frame, optical=optical)
-            return [path]
-
-        done, failed = written(targets, write)
-        turned = upright_words(done, source.root_frame, optical=optical)
-        done += [path for path in (None if failure else overlay, save) if path is not None]
-        message = f"{len(result)} frames, {states(result)}{wrote(done)}"
-        refuse_missing([*failed, failure], message)
-        if interrupted:
+            if several:
+                followed = body_of(body, height=height, model=model)
+                everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
+                steps = track_people(source, everybody, settings=settings, left_out=left_out)
+                how |= {"steps": steps, **pictured_people(everybody, spool)}
+            else:
+                tracker = start_tracker(
+                    source,
+                    init=beginning,
+                    body=None if body is None else Body.load(body),
+                    height=height,
+                    model=model,
+                    config=config_of(config),
+                    markers=markers,
+                    use=kinds,
+                    detector=detector_of(detector),
+                )
+                starts = starts_of(beginning, source)
+                how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+                how |= {"take": lambda step: spool.add(step.estimate, {ONE: tracker.body}), **pictured(tracker)}
+            with deferred():
+                done = run(source, **how)
+                sample = None if several else spool.sample()
+                files, failed = spool.write(left_out=None if left_out is None else left_out.counts)
+        turned = upright_words(files, source.root_frame, optical=optical)
+        if several:
+            count, rows = len(spool.persons), spool.states.total()
+            found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
+        else:
+            found = states(spool.states.elements())
+        message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
+        if turned:
+            print_message(turned)
+        refuse_missing([*failed, *done.failures], message)
+        if done.interrupted:
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
         typer.echo(message)
-        if turned:
-            print_message(turned)
-        if doubt := lying_words(result, source.root_frame, optical=optical):
+        if sample is not None and (doubt := lying_words(sample, source.root_frame, optical=optical)):
             print_message(f"{source.name}: {doubt}")
-        _print_warnings(source, result, left_out)
+        _print_warnings(source, spool, left_out)
 
 
-def _print_left_out(source: Recording, left_out: LeftOut | None) -> None:
-    if left_out:
-        first = next(iter(left_out.first.values()))
-        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
-
-
-def _print_warnings(source: Recording, result: Track, left_out: LeftOut | None) -> None:
+def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -> None:
     """Print on stderr what was left out, and possible reasons if no person was tracked."""
     from voodoo.recordings.depth_range import depth_range
 
-    _print_left_out(source, left_out)
-    if not result.found.any():
-        print_message(f"{source.name}: nobody was found in {len(result)} frames")
-    if not {"tracking", "degraded"} & set(result.status):
+    if left_out:
+        first = next(iter(left_out.first.values()))
+        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
+    if not spool.states.keys() - {SEARCHING}:
+        print_message(f"{source.name}: nobody was found in {spool.frames} frames")
+    if not {"tracking", "degraded"} & spool.states.keys():
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")

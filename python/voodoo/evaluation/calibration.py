@@ -15,6 +15,7 @@ from voodoo._core import Estimate
 from voodoo.evaluation import metrics
 from voodoo.evaluation.figure import new_figure
 from voodoo.evaluation.metrics import mean_or_nan
+from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
@@ -200,4 +201,5 @@ def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     right.legend(frameon=False, fontsize=8)
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=130)
+    with appearing_whole(path) as place:
+        figure.savefig(place, dpi=130)

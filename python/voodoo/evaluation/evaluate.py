@@ -36,6 +36,8 @@ from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+_OF_TERMINALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name))
+"""Signals of Ctrl-C and of a terminal that is closed."""
 
 
 _CARRIER = {
@@ -187,20 +189,22 @@ def evaluate_all(
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Processes started inside ignore Ctrl-C, which a terminal sends to all processes; this process terminates them."""
+    """Processes started inside ignore what a terminal sends to all processes; this process terminates them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    received = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    received = {number: signal.signal(number, signal.SIG_IGN) for number in _OF_TERMINALS}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, received)
+        for number, handler in received.items():
+            signal.signal(number, handler)
 
 
 def _one_thread() -> None:
     """Initialize a worker: one thread each, because the processes run in parallel."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in _OF_TERMINALS:
+        signal.signal(number, signal.SIG_IGN)
     os.environ["RAYON_NUM_THREADS"] = "1"
     cv2.setNumThreads(1)
 

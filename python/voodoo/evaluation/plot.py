@@ -10,6 +10,7 @@ import numpy as np
 from voodoo.evaluation.figure import new_figure
 from voodoo.evaluation.score import Score
 from voodoo.evaluation.summary import CLASSES
+from voodoo.whole import appearing_whole
 
 _CLASS_COLORS = ("#c8553d", "#e8b04b", "#4c8c6b")
 
@@ -39,4 +40,5 @@ def plot_errors(path: Path, scores: Sequence[Score]) -> None:
     right.set_ylabel("sequences")
     for axes in (left, right):
         axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=130)
+    with appearing_whole(path) as place:
+        figure.savefig(place, dpi=130)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -112,15 +113,18 @@ def write_reports(
     folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None], *, picture: bool = True
 ) -> list[Path]:
     """Write sequences.csv, summary.csv, summary.md, with `picture` errors.png and calibration.png (the latter if joints were
-    compared with a reference), and frames/NAME.csv; returns all but the last.
+    compared with a reference), and frames/NAME.csv (NAME~2.csv of the second recording with a name); returns all but the last.
 
     Raises:
         OSError: a file cannot be written.
     """
     (folder / "frames").mkdir(parents=True, exist_ok=True)
+    names: Counter[str] = Counter()
     for score, table in zip(scores, tables, strict=True):
+        names[score.name] += 1
+        again = f"~{names[score.name]}" if names[score.name] > 1 else ""
         if table is not None:
-            write_frames(folder / "frames" / f"{score.name}.csv", table)
+            write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
     sequences, summary, text, plot = (
         folder / name for name in ("sequences.csv", "summary.csv", "summary.md", "errors.png")
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, reason
 from voodoo.export.bvh import write_bvh
 from voodoo.export.c3d_file import write_c3d
 from voodoo.export.glb import write_glb
@@ -101,6 +101,8 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
             done += write(path)
         except (VoodooError, OSError) as error:
             failed.append(error)
+        except Exception as error:
+            failed.append(VoodooError(f"{path}: {reason(error)}"))
     return done, failed
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from voodoo.errors import VoodooError
 from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
 from voodoo.export.result_file import check_suffix
-from voodoo.export.track import Track, arrays_of, track_of_rows, tracks_of
+from voodoo.export.track import Track, arrays_of, track_of_rows, tracks_of, write_arrays
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
@@ -128,17 +128,22 @@ class PeopleTrack:
         check_suffix(path)
         with appearing_whole(path) as part:
             if path.suffix == ".csv":
-                write_rows(part, self.rows())
+                write_rows(part, [self.rows()])
             else:
-                arrays = {
-                    f"person_{one}/{name}": array
-                    for one, track in self.tracks.items()
-                    for name, array in arrays_of(track).items()
-                }
-                with part.open("wb") as file:
-                    np.savez_compressed(
-                        file, allow_pickle=False, stamps=self.stamps, persons=np.array(sorted(self.tracks)), **arrays
-                    )
+                write_arrays(part, lambda: iter([self.arrays()]))
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """All data as arrays, see `save`."""
+        own = {one: arrays_of(track) for one, track in self.tracks.items()}
+        named = {f"person_{one}/{name}": array for one, arrays in own.items() for name, array in arrays.items()}
+        return {"stamps": self.stamps, "persons": np.array(sorted(self.tracks)), **named}
+
+    @classmethod
+    def joined(cls, parts: Sequence[PeopleTrack]) -> PeopleTrack:
+        """Concatenate consecutive results."""
+        persons = sorted({person for part in parts for person in part.tracks})
+        tracks = {one: Track.joined([part.tracks[one] for part in parts if one in part.tracks]) for one in persons}
+        return cls(np.concatenate([part.stamps for part in parts]), tracks)
 
     @classmethod
     def load(cls, path: str | Path) -> PeopleTrack:

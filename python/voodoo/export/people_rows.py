@@ -116,12 +116,18 @@ def _check(path: Path, table: FloatArray) -> None:
         raise VoodooError(f"{path}: expected finite numbers or empty cells, found others")
 
 
-def write_rows(path: Path, rows: PeopleRows) -> None:
-    """Write them, positions to 1 um."""
+def write_rows(path: Path, parts: Iterable[PeopleRows]) -> None:
+    """Write consecutive rows, positions to 1 um; names are those of the first part that has rows."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header_of(rows.joint_names, rows.angle_names))
-        writer.writerows(_cells(rows))
+        header: list[str] = []
+        for rows in parts:
+            if not header and len(rows):
+                header = header_of(rows.joint_names, rows.angle_names)
+                writer.writerow(header)
+            writer.writerows(_cells(rows))
+        if not header:
+            writer.writerow(header_of((), ()))
 
 
 def _cells(rows: PeopleRows) -> Iterable[list[str]]:

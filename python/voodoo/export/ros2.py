@@ -29,7 +29,7 @@ from voodoo.model.rotations import quaternions
 FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
 
-_STORE = get_typestore(Stores.ROS2_HUMBLE)
+STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
 _POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
@@ -175,10 +175,10 @@ def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None
         for index, stamp in enumerate(human.track.stamps)
     )
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connect = {name: writer.add_connection(name, kind, typestore=_STORE) for name, kind in kinds.items()}
+        connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
         for stamp, number, index in frames:
             for name, message in humans[number].messages(index, markers=markers).items():
-                writer.write(connect[name], round(stamp * 1e9), _STORE.serialize_cdr(message, message.__msgtype__))
+                writer.write(connect[name], round(stamp * 1e9), STORE.serialize_cdr(message, message.__msgtype__))
 
 
 def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[str, tuple[str | None, FloatArray]]:
@@ -331,7 +331,7 @@ def _marker(
 
 
 def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
-    return _STORE.types[kind](**fields)
+    return STORE.types[kind](**fields)
 
 
 def _header(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
@@ -384,4 +384,4 @@ def instant(
 
 def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition
     """A message as ROS 2 sends and stores it."""
-    return bytes(_STORE.serialize_cdr(message, message.__msgtype__))
+    return bytes(STORE.serialize_cdr(message, message.__msgtype__))

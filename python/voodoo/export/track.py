@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -22,10 +23,13 @@ from voodoo.unpacking import stored_arrays
 from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
 
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
 FORMAT_VERSION = 2
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
+BODIES, BODY_OF = "bodies", "body_of"
+"""Arrays of a part that are not those of a result: texts of bodies, and the persons whose they are."""
 _STATUS = "_status"
 """Suffix of the name of a limb's column in .csv."""
 _SIGMA = "_sigma_m"
@@ -235,29 +239,9 @@ class Track:
         check_suffix(path)
         with appearing_whole(path) as part:
             if path.suffix == ".csv":
-                self._write_csv(part)
+                write_csv(part, [self], sure=self.covariance.size > 0)
             else:
-                self._write_npz(part)
-
-    def _write_csv(self, path: Path) -> None:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            limbs = [f"{limb}{_STATUS}" for limb in self.limb_status]
-            sure = [f"{name}{_SIGMA}" for name in self.joint_names if self.covariance.size]
-            writer.writerow(_header(self.joint_names, self.angle_names) + limbs + sure)
-            words = zip(*self.limb_status.values(), strict=True) if limbs else [()] * len(self)
-            sigmas = np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3.0)
-            for stamp, status, residual, joints, angles, support, sigma in zip(
-                self.stamps, self.status, self.residual, self.joints, self.angles, words, sigmas, strict=True
-            ):
-                # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
-                row = [repr(float(stamp)), status]
-                row += [_cell(value) for value in (residual, *joints.ravel(), *angles)]
-                writer.writerow([*row, *support, *(_cell(value) for value in sigma)])
-
-    def _write_npz(self, path: Path) -> None:
-        with path.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays_of(self))
+                write_arrays(part, lambda: iter([arrays_of(self)]))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
@@ -314,6 +298,64 @@ class Track:
     def _read_npz(cls, path: Path) -> Track:
         with stored_arrays(path, "a result of voodoo track") as content:
             return track_of(content)
+
+
+def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
+    """Write consecutive parts of a track as rows; `sure`: one of them has covariances."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        for number, part in enumerate(parts):
+            if not number:
+                limbs = [f"{limb}{_STATUS}" for limb in part.limb_status]
+                sigmas_of = [f"{name}{_SIGMA}" for name in part.joint_names if sure]
+                writer.writerow(_header(part.joint_names, part.angle_names) + limbs + sigmas_of)
+            words = zip(*part.limb_status.values(), strict=True) if limbs else [()] * len(part)
+            sigmas = np.full((len(part), len(sigmas_of)), np.nan)
+            if part.covariance.size:
+                sigmas = np.sqrt(np.trace(part.covariance, axis1=2, axis2=3) / 3.0)
+            for stamp, status, residual, joints, angles, support, sigma in zip(
+                part.stamps, part.status, part.residual, part.joints, part.angles, words, sigmas, strict=True
+            ):
+                # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
+                row = [repr(float(stamp)), status]
+                row += [_cell(value) for value in (residual, *joints.ravel(), *angles)]
+                writer.writerow([*row, *support, *(_cell(value) for value in sigma)])
+
+
+def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
+    """Write the arrays of consecutive parts of a result as one .npz; a part is in memory at a time.
+
+    Args:
+        path: the file.
+        parts: returns their arrays, from the first part on.
+        fixed: arrays that are not those of the first part that has them, or that no part has.
+    """
+    kinds: dict[str, tuple[int, tuple[int, ...], np.dtype[Any]]] = {}
+    rest: dict[str, npt.NDArray[Any]] = {}
+    for part in parts():
+        for name in part:
+            if name in (BODIES, BODY_OF):
+                continue
+            array = part[name]
+            if name.rpartition("/")[2] in (*_BY_FRAME, "status", "limb_status"):
+                count, row, kind = kinds.get(name, (0, array.shape[1:], array.dtype))
+                # Without covariances there are no columns.
+                kinds[name] = count + len(array), max(row, array.shape[1:]), np.result_type(kind, array.dtype)
+            else:
+                rest.setdefault(name, array)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, array in {**rest, **(fixed or {})}.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as out:
+                np.lib.format.write_array(out, array, allow_pickle=False)
+        for name, (count, row, kind) in kinds.items():
+            about = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": (count, *row)}
+            with file.open(f"{name}.npy", "w", force_zip64=True) as out:
+                np.lib.format.write_array_header_1_0(out, about)
+                for part in parts():
+                    if name in part:
+                        array = part[name]
+                        filled = array if array.shape[1:] == row else np.full((len(array), *row), np.nan)
+                        out.write(filled.astype(kind).tobytes())
 
 
 def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,7 +19,7 @@ from voodoo.live.session import Output
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
 from voodoo.model.rotations import quaternions
-from voodoo.whole import move_whole
+from voodoo.whole import Hidden, move_whole
 
 _STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
@@ -51,10 +49,11 @@ class Recorder(Output):
             raise VoodooError(f"{path}: expected a name that ends in .mcap, found {path.suffix!r}")
         if path.exists():
             raise VoodooError(f"{path}: expected a file that does not exist yet, found one")
-        path.parent.mkdir(parents=True, exist_ok=True)
         self._path, self._root = path, root_frame
-        self._folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
-        self._writer = Writer(self._folder / path.stem, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._hidden = Hidden(path)
+        self._hidden.keep(paths=[path.name])
+        self._folder = self._hidden.folder / path.name
+        self._writer = Writer(self._folder, version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
         self._topics: dict[str, Connection] = {}
         self._cameras: dict[str, Camera] = {}
@@ -119,12 +118,12 @@ class Recorder(Output):
         """
         try:
             self._writer.close()
-            move_whole(next((self._folder / self._path.stem).glob("*.mcap")), self._path)
+            move_whole(next(self._folder.glob("*.mcap")), self._path)
         except OSError as error:
             raise VoodooError(
                 f"{self._path}: {error.strerror or error}; what was recorded is in {self._folder}"
             ) from error
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._hidden.remove()
 
 
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401

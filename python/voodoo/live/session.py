@@ -76,7 +76,7 @@ class _Lane:
         for output in self.outputs:
             try:
                 output.close()
-            except (VoodooError, OSError) as error:
+            except Exception as error:
                 self.error = _together([self.error, error])
 
 
@@ -266,7 +266,7 @@ class Session:
 def _together(errors: Sequence[BaseException | None]) -> BaseException | None:
     """The only error, or one that tells all of them; None without any."""
     found = [error for error in errors if error is not None]
-    expected = [error for error in found if isinstance(error, VoodooError | OSError)]
+    expected = [error for error in found if isinstance(error, Exception)]
     if len(found) < 2 or len(expected) < len(found):
         return next((error for error in found if error not in expected), next(iter(found), None))
     return VoodooError("; ".join(map(reason, expected)))

@@ -139,18 +139,42 @@ class McapFile(McapReader):
         return content
 
 
-def _messages(content: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Channel, time [ns] and bytes of the messages in a chunk."""
+def records(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Code and bytes of the records in a chunk."""
     at = 0
     while at < len(content):
         code, length = struct.unpack_from("<BQ", content, at)
         at += 9
         if at + length > len(content):
             raise ValueError(f"expected {len(content) - at} bytes at most in a record, found {length}")
-        if code == _MESSAGE:
-            channel, _, time, _ = struct.unpack_from("<HIQQ", content, at)
-            yield channel, time, content[at + 22 : at + length]
+        yield code, content[at : at + length]
         at += length
+
+
+def _messages(content: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Channel, time [ns] and bytes of the messages in a chunk."""
+    for code, body in records(content):
+        if code == _MESSAGE:
+            channel, _, time, _ = struct.unpack_from("<HIQQ", body)
+            yield channel, time, body[22:]
+
+
+def stored_records(path: Path) -> Iterator[bytes]:
+    """The content of the chunks without compression up to where a file is cut off.
+
+    Raises:
+        ValueError: no MCAP file.
+    """
+    check_stored(path, "an MCAP file", most=MOST_RECORDED)
+    with path.open("rb") as file:
+        if file.read(8) != _MAGIC:
+            raise ValueError("found other bytes at its start")
+        while len(head := file.read(9)) == 9:
+            code, length = struct.unpack("<BQ", head)
+            if length > MOST_BYTES or len(body := file.read(length)) < length:
+                return
+            if code == _CHUNK and body[28:32] == bytes(4):
+                yield body[40:]
 
 
 @dataclass

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -10,24 +12,28 @@ import cv2
 
 from voodoo.errors import VoodooError, utf8_name
 from voodoo.visualization.ink import Picture
-from voodoo.whole import appearing_whole
+from voodoo.whole import appearing_whole, check_disk
+
+_LEAST_FREE = 2**16
+"""Free space below which a disk is looked at [bytes]."""
+_PICTURE = re.compile(r"frame_\d{6,}\.png")
 
 
 class PictureWriter:
     """Writes images of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
 
-    What cannot be written does not end the block: `failure` holds the first error, and nothing more is written. A film appears
-    when it is complete.
+    What cannot be written does not end the block: `failure` holds the first error, and nothing more is written. A film or
+    folder appears when it is complete; it replaces a film, or a folder of such images.
 
     Args:
-        path: ends in .mp4 for a video; otherwise a folder, which is created if missing.
+        path: ends in .mp4 for a video; otherwise a folder.
         rate_hz: frame rate of the video.
 
     Attributes:
         failure: why images are missing; None if there are all.
 
     Raises:
-        VoodooError: a suffix of another video or image format, or a name that is not UTF-8.
+        VoodooError: a suffix of another video or image format, a name that is not UTF-8, or a folder with other files.
     """
 
     def __init__(self, path: Path, *, rate_hz: float) -> None:
@@ -42,26 +48,36 @@ class PictureWriter:
         self._count = 0
         self._appearing = ExitStack()
         self._place = path
-        self.failure: VoodooError | OSError | None = None
+        self.failure: Exception | None = None
         folder = path.parent if self._is_film else path
         if folder.exists() and not folder.is_dir():
             raise VoodooError(f"{folder}: expected a folder, found a file")
-        folder.mkdir(parents=True, exist_ok=True)
+        if not self._is_film and path.exists():
+            other = next((file.name for file in path.iterdir() if not _PICTURE.fullmatch(file.name)), None)
+            if other is not None:
+                raise VoodooError(
+                    f"{path}: expected a new folder, or one of pictures like frame_000000.png, found {other}"
+                )
 
     def write(self, picture: Picture) -> None:
         """Add an image."""
         if self.failure is not None:
             return
         try:
-            if self._is_film:
-                if self._film is None:
-                    self._place = self._appearing.enter_context(appearing_whole(self._path))
+            if not self._count:
+                self._place = self._appearing.enter_context(appearing_whole(self._path))
+                if self._is_film:
                     self._film = self._open(picture)
-                self._film.write(picture)
+                else:
+                    self._place.mkdir()
+            if self._film is not None:
+                self._film.write(picture)  # which does not tell that the disk is full
+                if shutil.disk_usage(self._place.parent).free < _LEAST_FREE:
+                    check_disk(self._place.parent)
             else:
-                save_picture(self._path / f"frame_{self._count:06d}.png", picture)
+                _encode(self._place / f"frame_{self._count:06d}.png", picture)
             self._count += 1
-        except (VoodooError, OSError) as error:
+        except Exception as error:
             self.failure = error
 
     def __enter__(self) -> PictureWriter:
@@ -77,12 +93,12 @@ class PictureWriter:
             if error is None and self.failure is None:
                 try:
                     self._check()
-                except VoodooError as failure:
+                except Exception as failure:
                     self.failure = failure
         problem = error or self.failure
         try:
             self._appearing.__exit__(None if problem is None else type(problem), problem, None)
-        except (VoodooError, OSError) as failure:
+        except Exception as failure:
             if error is None:
                 self.failure = failure  # which names the film
 
@@ -90,6 +106,7 @@ class PictureWriter:
         height, width = picture.shape[:2]
         film = cv2.VideoWriter(str(self._place), cv2.VideoWriter.fourcc(*"mp4v"), self._rate_hz, (width, height))
         if not film.isOpened():
+            check_disk(self._place.parent)
             raise VoodooError(f"{self._path}: expected a file that can be written as MPEG-4, found that OpenCV cannot")
         return film
 
@@ -101,15 +118,23 @@ class PictureWriter:
         finally:
             film.release()
         if count != self._count or not readable:
+            check_disk(self._place.parent)
             raise VoodooError(f"{self._path}: expected a film of {self._count} pictures, found {count} readable ones")
 
 
 def save_picture(path: Path, picture: Picture) -> None:
-    """Write one image in the format of its suffix.
+    """Write one image in the format of its suffix; it appears when it is complete.
 
     Raises:
-        VoodooError: it could not be written.
+        VoodooError, OSError: it could not be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(utf8_name(path), picture):
-        raise VoodooError(f"{path}: expected a file that can be written, found that OpenCV cannot")
+    utf8_name(path)
+    with appearing_whole(path) as place:
+        _encode(place, picture)
+
+
+def _encode(place: Path, picture: Picture) -> None:
+    done, data = cv2.imencode(place.suffix, picture)
+    if not done:
+        raise VoodooError(f"{place.name}: expected a picture, found one that OpenCV cannot encode")
+    place.write_bytes(data.tobytes())

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from contextlib import ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
 from types import ModuleType, TracebackType
@@ -30,6 +31,7 @@ from voodoo.visualization.body_geometry import bands, limb_colors
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.rerun_log import StepLog, entity
 from voodoo.visualization.rerun_server import Server
+from voodoo.whole import appearing_whole, check_disk
 
 _MOST_POINTS = 40_000
 _EPOCH_S = 1e9
@@ -47,13 +49,14 @@ class Viewer:
     silhouette of each limb), `plots/...`; the timeline is `time`.
 
     Args:
-        save: .rrd file to write; None opens the viewer. In a file depth is rounded to a quarter of a percent, and large
-            depth images are subsampled.
+        save: .rrd file to write, which appears when it is complete; None opens the viewer. In a file depth is rounded to a
+            quarter of a percent, and large depth images are subsampled.
         name: of the recording, shown in the viewer.
         serve: PORT, or HOST:PORT: serve it to browsers there instead, see `voodoo.visualization.rerun_server`.
 
     Attributes:
         address: address for browsers; "" if it is not served.
+        failure: why the file is missing after a `with` block; None if it is there. If it is set before, the file is removed.
 
     Raises:
         VoodooError: Rerun is not installed, another suffix, or a viewer that cannot open here.
@@ -69,14 +72,18 @@ class Viewer:
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, **how)
         self._stream.send_recording_name(name)
         self._server: Server | None = None
+        self._ends = ExitStack()
+        self._place: Path | None = None
+        self.failure: Exception | None = None
         if serve is not None:
             self._server = Server(serve)
+            self._ends.callback(self._server.close)
             self._stream.connect_grpc(self._server.data)
         elif save is None:
             self._open()
         else:
-            Path(save).parent.mkdir(parents=True, exist_ok=True)
-            self._stream.save(str(save))
+            self._place = self._ends.enter_context(appearing_whole(Path(save)))
+            self._stream.save(str(self._place))
         self._whole = save is None
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -103,15 +110,35 @@ class Viewer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Finish the file."""
-        self.close()
+        """Finish the file; after an error or failure, remove it."""
+        if error is None and self.failure is None:
+            try:
+                self.close()
+            except Exception as failure:
+                self.failure = failure
+            return
+        self._stream.disconnect()
+        with suppress(OSError, RuntimeError):
+            raised = error or RuntimeError()
+            self._ends.__exit__(type(raised), raised, trace)
 
     def close(self) -> None:
-        """Flush buffered data, and close the file."""
-        self._stream.flush()
-        self._stream.disconnect()
-        if self._server is not None:
-            self._server.close()
+        """Flush buffered data, and complete the file.
+
+        Raises:
+            VoodooError, OSError: it could not be written.
+        """
+        with self._ends:
+            try:
+                self._stream.flush()
+            except RuntimeError as error:
+                if self._place is not None:  # a window may be closed before the end
+                    check_disk(self._place.parent)
+                    raise VoodooError(f"{self._place.name}: {str(error).strip() or type(error).__name__}") from error
+            finally:
+                self._stream.disconnect()
+            if self._place is not None:
+                check_disk(self._place.parent)  # Rerun does not tell that it could not write the end
 
     @property
     def address(self) -> str:

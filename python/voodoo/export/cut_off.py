@@ -1,0 +1,62 @@
+"""Completes a recording whose recorder was killed."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from voodoo.errors import RecordingError, reading
+from voodoo.export.files import bag_folder
+from voodoo.export.ros2 import STORE
+from voodoo.recordings.mcap_file import check_mcap, records, stored_records
+from voodoo.whole import appearing_whole, move_whole
+
+_SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
+
+
+def complete(source: Path, path: Path) -> None:
+    """Give a file of `voodoo live --record` its name; one that is cut off is written anew with the messages of whole chunks,
+    if there are any.
+
+    Raises:
+        RecordingError: it is of another program.
+        OSError: it cannot be written.
+    """
+    try:
+        check_mcap(source)
+    except RecordingError:
+        if any(code == _MESSAGE for code, _ in _sound(source)):
+            _write(source, path)
+    else:
+        move_whole(source, path)
+
+
+def _write(source: Path, path: Path) -> None:
+    kinds: dict[int, str] = {}
+    topics: dict[int, Connection] = {}
+    with appearing_whole(path) as place, bag_folder(place) as folder:
+        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            for code, body in _sound(source):
+                one, other = struct.unpack_from("<HH", body)
+                if code == _SCHEMA:
+                    kinds[one] = _word(body, 2)
+                elif code == _CHANNEL:
+                    topics[one] = writer.add_connection(_word(body, 4), kinds[other], typestore=STORE)
+                elif code == _MESSAGE:
+                    writer.write(topics[one], struct.unpack_from("<Q", body, 6)[0], body[22:])
+
+
+def _sound(source: Path) -> Iterator[tuple[int, bytes]]:
+    """The records in whole chunks."""
+    with reading(source, "a recording of voodoo live"):
+        for content in stored_records(source):
+            yield from records(content)
+
+
+def _word(body: bytes, at: int) -> str:
+    (length,) = struct.unpack_from("<I", body, at)
+    return body[at + 4 : at + 4 + length].decode()

@@ -1,0 +1,345 @@
+"""Keeps poses on disk while they are tracked, and converts them to files of any format at the end, or after a crash."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import chain, pairwise
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo._core import Estimate
+from voodoo.errors import VoodooError, a_path, reading, reason
+from voodoo.export.cut_off import complete
+from voodoo.export.files import FORMATS, check_target, save, written
+from voodoo.export.people import PeopleTrack
+from voodoo.export.people_files import save_people
+from voodoo.export.people_rows import write_rows
+from voodoo.export.result_file import SUFFIXES
+from voodoo.export.track import BODIES, BODY_OF, Arrays, Track, arrays_of, track_of, tracks_of, write_arrays, write_csv
+from voodoo.model.body import Body
+from voodoo.people import PeopleEstimate
+from voodoo.stored import MOST_METADATA, read_stored_text
+from voodoo.unpacking import stored_arrays
+from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, removed
+
+ONE = 1
+"""Number of the person if only one is tracked."""
+_BODIES_S = 10.0
+"""Time between two copies of the bodies, which take long to write [s]."""
+_SAMPLED = 3
+"""Number of parts in a sample."""
+
+
+class Spool:
+    """Poses of one person or several in a hidden folder next to the first output; use it in a `with` block.
+
+    An error of this package in the block removes them; after another one, or a crash, `recover` makes the outputs.
+
+    Args:
+        paths: outputs, see `voodoo.export.files.FORMATS`.
+        root_frame: returns the frame of the poses, when there are some.
+        optical: whether that is a camera's optical frame; None: by its name.
+        several: whether several persons are tracked.
+        together: number of frames that are kept in memory.
+
+    Attributes:
+        frames: number of frames.
+        states: number of poses of each status.
+        persons: numbers of the persons.
+
+    Raises:
+        VoodooError: a path that cannot be written to.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        *,
+        root_frame: Callable[[], str],
+        optical: bool | None = None,
+        several: bool = False,
+        together: int,
+    ) -> None:
+        """Check the paths, and make the folder."""
+        for path in paths:
+            check_target(path)
+        self._paths, self._root, self._optical, self._several = list(paths), root_frame, optical, several
+        self._hidden = Hidden(paths[0])
+        self._together = together
+        self._waiting: list[Estimate | PeopleEstimate] = []
+        self._made: dict[str, npt.NDArray[Any]] | None = None
+        self._bodies: dict[int, Body] = {}
+        self._bodies_at = -_BODIES_S
+        self._parts: list[Path] = []
+        self.frames = 0
+        self.states: Counter[str] = Counter()
+        self.persons: set[int] = set()
+
+    def add(self, estimate: Estimate | PeopleEstimate, bodies: Mapping[int, Body]) -> None:
+        """Take the poses of a frame, and the bodies in it.
+
+        Raises:
+            OSError: they cannot be put on the disk; they are in memory then.
+        """
+        self._waiting.append(estimate)
+        self._made = None
+        self._bodies.update(bodies)
+        self.frames += 1
+        poses = [one.estimate for one in estimate] if isinstance(estimate, PeopleEstimate) else [estimate]
+        self.states.update(str(pose.status) for pose in poses)
+        self.persons.update(bodies)
+        if len(self._waiting) >= self._together:
+            self._put_away()
+
+    def _put_away(self) -> None:
+        arrays = dict(self._last())
+        needed = any(path.suffix not in SUFFIXES for path in self._paths)
+        if needed and time.monotonic() - self._bodies_at >= _BODIES_S:
+            arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
+            arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
+        path = self._hidden.folder / f"{len(self._parts):08d}.npz"
+        with appearing_whole(path) as place, place.open("wb") as file:
+            np.savez(file, allow_pickle=False, **arrays)
+        if not self._parts:
+            self._keep(self._paths)
+        self._bodies_at = time.monotonic() if BODIES in arrays else self._bodies_at
+        self._parts.append(path)
+        self._waiting.clear()
+        self._made = None
+
+    def _keep(self, paths: Iterable[Path]) -> None:
+        names = [path.name for path in paths]
+        self._hidden.keep(paths=names, root_frame=self._root(), optical=self._optical, several=self._several)
+
+    def _last(self) -> dict[str, npt.NDArray[Any]]:
+        """What is in memory."""
+        if self._made is None:
+            if self._several:
+                self._made = PeopleTrack.of(self._waiting, bodies=self._bodies).arrays()  # type: ignore[arg-type]
+            else:
+                self._made = arrays_of(Track.of(self._waiting, body=self._bodies.get(ONE)))  # type: ignore[arg-type]
+        return self._made
+
+    def _contents(self) -> Callable[[], Iterator[Arrays]]:
+        last = [self._last()] if self._waiting else []
+        return lambda: chain(_stored(self._parts), last)
+
+    def sample(self) -> Track:
+        """Some of the frames of one person: all of them if there are few.
+
+        Raises:
+            VoodooError: no frames.
+        """
+        every = -(-(len(self._parts) + 1) // _SAMPLED)
+        return Track.joined([track_of(part) for number, part in enumerate(self._contents()()) if number % every == 0])
+
+    def write(self, *, left_out: Mapping[str, int] | None = None) -> tuple[list[Path], list[Exception]]:
+        """Write the outputs, whatever becomes of each; returns the files, and what failed.
+
+        The folder is removed when all of them are complete; it is kept for those that a disk has no place for.
+
+        Args:
+            left_out: unusable measurements: reason -> number.
+
+        Raises:
+            VoodooError: there were no frames.
+        """
+        if not self.frames:
+            self._hidden.remove()
+            raise VoodooError("expected at least one frame to write, found none")
+        failing: list[Path] = []
+        contents = self._contents()
+        how: Any = {"bodies": self._bodies, "root_frame": self._root(), "optical": self._optical}
+
+        def write(path: Path) -> list[Path]:
+            try:
+                return _write(path, contents, several=self._several, left_out=left_out or {}, **how)
+            except OSError:
+                failing.append(path)
+                raise
+
+        done, failed = written(self._paths, write)
+        if not failing:
+            self._hidden.remove()
+            return done, failed
+        kept = self._kept
+        try:
+            if self._waiting:
+                self._put_away()
+            self._keep(failing)
+        except OSError:
+            kept += f", without the last {len(self._waiting)}" if self._waiting else ""
+        if not self._parts:
+            self._hidden.remove()
+            return done, failed
+        self._hidden.close()
+        return done, [*failed, VoodooError(kept)]
+
+    def __enter__(self) -> Spool:
+        """Enter the context."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove the folder after an error of this package; keep it after another one.
+
+        Raises:
+            VoodooError: an error of the system; names the folder.
+        """
+        if error is None:
+            return
+        if isinstance(error, VoodooError) or not self._parts:
+            self._hidden.remove()
+            return
+        with suppress(OSError):
+            if self._waiting:
+                self._put_away()
+        self._hidden.close()
+        if isinstance(error, OSError):
+            raise VoodooError(f"{reason(error)}; {self._kept}") from error
+
+    @property
+    def _kept(self) -> str:
+        return f"the poses are kept in {self._hidden.folder}; voodoo recover makes the files"
+
+
+def _stored(paths: Sequence[Path]) -> Iterator[Arrays]:
+    for path in paths:
+        with stored_arrays(path, "poses that were tracked") as content:
+            yield content
+
+
+def _write(
+    path: Path,
+    contents: Callable[[], Iterator[Arrays]],
+    *,
+    several: bool,
+    bodies: Mapping[int, Body],
+    root_frame: str,
+    optical: bool | None,
+    left_out: Mapping[str, int],
+) -> list[Path]:
+    """Write one output. A part is in memory at a time, in formats other than .csv and .npz all."""
+    check_target(path)
+    if path.suffix in SUFFIXES and not (several and _jumps(contents())):
+        with appearing_whole(path) as place:
+            if path.suffix == ".npz":
+                write_arrays(place, contents, _fixed(contents(), several, left_out))
+            elif several:
+                write_rows(place, (_people(part).rows() for part in contents()))
+            else:
+                sure = any(part["covariance"].size for part in contents())
+                write_csv(place, map(track_of, contents()), sure=sure)
+        return [path]
+    how: Any = {"root_frame": root_frame, "optical": optical}
+    if several:
+        return save_people(PeopleTrack.joined(list(map(_people, contents()))), path, bodies=bodies, **how)
+    save(Track.joined(list(map(track_of, contents()))), path, body=bodies[ONE], **how)
+    return [path]
+
+
+def _fixed(parts: Iterator[Arrays], several: bool, left_out: Mapping[str, int]) -> Arrays:
+    """Arrays of a result that no part knows."""
+    if several:
+        return {"persons": np.array(sorted({one for part in parts for one in part["persons"].tolist()}))}
+    return {
+        "left_out_reasons": np.array(list(left_out), dtype=np.str_),
+        "left_out_counts": np.array(list(left_out.values()), dtype=np.int64),
+    }
+
+
+def _people(part: Arrays) -> PeopleTrack:
+    return PeopleTrack(part["stamps"], tracks_of(part))
+
+
+def _jumps(parts: Iterator[Arrays]) -> bool:
+    """Whether time jumps back between two parts: rows of several persons are in the order of time."""
+    ends = [(part["stamps"][0], part["stamps"][-1]) for part in parts]
+    return any(before[1] > after[0] for before, after in pairwise(ends))
+
+
+def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Path], list[Exception]]:
+    """Make the outputs of sessions that were killed, from what they left in a folder; returns the files, and what failed.
+
+    They are written into that folder, under another name if there is one in the place: NAME.recovered.csv.
+
+    Args:
+        folder: of the outputs.
+        taken: names that are not used, because they will be written.
+    """
+    done: list[Path] = []
+    failed: list[Exception] = []
+    others = {path.resolve() for path in taken}
+    for hidden in sorted(a_path(folder, error=VoodooError).glob(f".*{SUFFIX}")):
+        if not (hidden / KEPT).is_file() or hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)():
+            continue
+        try:
+            lock = locked(hidden)
+        except OSError as error:
+            failed.append(error)
+            continue
+        if lock is not None:
+            try:
+                _recover_one(hidden, others, done, failed)
+            except (VoodooError, OSError) as error:
+                failed.append(error)
+            finally:
+                os.close(lock)
+    return done, failed
+
+
+def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[Exception]) -> None:
+    with reading(hidden / KEPT, "what a session left", error=VoodooError):
+        note = json.loads(read_stored_text(hidden / KEPT, "what a session left", most=MOST_METADATA))
+        free = {Path(str(name)).name: _free(hidden.parent / Path(str(name)).name, taken) for name in note["paths"]}
+    if "several" not in note:  # a recording, or a folder that was being replaced
+        for name, path in free.items():
+            left = hidden / name
+            if path.suffix == ".mcap" and left.is_dir():
+                for bag in left.glob("*.mcap"):
+                    complete(bag, path)
+            elif left.exists():
+                move_whole(left, path)
+            done += [path] if path.exists() else []
+        removed(hidden)
+        return
+    bodies: dict[int, Body] = {}
+    parts: list[Path] = []
+    for path in sorted(hidden.glob("*.npz")):
+        try:
+            for part in _stored([path]):
+                content = dict(part)
+                texts = content.get(BODIES, np.empty(0)).tolist()
+                bodies.update(zip(content[BODY_OF].tolist() if texts else [], map(Body.from_toml, texts), strict=True))
+            parts.append(path)
+        except VoodooError as error:
+            failed.append(error)  # the others can be used
+    how: Any = {"several": bool(note["several"]), "root_frame": str(note["root_frame"]), "optical": note["optical"]}
+    some, errors = written(
+        free.values(), lambda path: _write(path, lambda: _stored(parts), bodies=bodies, left_out={}, **how)
+    )
+    done += some
+    failed += errors
+    if not errors:
+        removed(hidden)
+
+
+def _free(path: Path, taken: set[Path]) -> Path:
+    """A name that is not in use."""
+    found, number = path, 1
+    while found.exists() or found.resolve() in taken:
+        again = f"-{number}" if number > 1 else ""
+        known = path.suffix in FORMATS
+        name = f"{path.stem}.recovered{again}{path.suffix}" if known else f"{path.name}-recovered{again}"
+        found, number = path.with_name(name), number + 1
+    return found

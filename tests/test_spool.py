@@ -1,0 +1,174 @@
+"""Poses are on the disk while they are tracked: memory is flat, results are the same, and a kill costs little."""
+
+import gc
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commands import run
+from voodoo.export.people import PeopleTrack
+from voodoo.export.spool import Spool, recover
+from voodoo.export.track import Track
+from voodoo.pipeline.run import start_tracker, track
+from voodoo.recordings import open_recording, sample_path
+from voodoo.whole import KEPT
+
+PROGRAM = "import sys; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
+FORMATS = ("pose.csv", "pose.npz", "pose.bvh", "pose.trc")
+
+
+def started(folder: Path, *words: object, **environment: str) -> subprocess.Popen[str]:
+    """A command in a process of its own."""
+    known = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment}
+    command = [sys.executable, "-c", PROGRAM, *map(str, words)]
+    return subprocess.Popen(command, cwd=folder, env=known, stderr=subprocess.PIPE, text=True)
+
+
+def until(found, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not (result := found()):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    return result
+
+
+@pytest.mark.parametrize("people", ["1", "any"])
+def test_parts_are_the_whole(tmp_path, monkeypatch, people):
+    monkeypatch.chdir(tmp_path)
+    for together in (20, 1000):
+        monkeypatch.setattr("voodoo.cli.track.TOGETHER", together)
+        outputs = [word for name in FORMATS for word in ("--out", f"{together}/{name}")]
+        done = run("track", sample_path(), "--use", "depth", "--people", people, *outputs)
+        assert done.exit_code == 0, done.output
+    written = sorted(file.name for file in Path("20").iterdir())
+    assert written == sorted(file.name for file in Path("1000").iterdir()) and len(written) == 4
+    for name in written:
+        if name.endswith(".npz"):
+            one, other = (np.load(f"{folder}/{name}") for folder in (20, 1000))
+            assert set(one) == set(other)
+            for array in one:
+                np.testing.assert_array_equal(one[array], other[array], err_msg=array)
+        else:
+            assert Path("20", name).read_bytes() == Path("1000", name).read_bytes()
+
+
+def test_a_killed_command_is_completed_by_the_next_one(tmp_path):
+    """Its results take free names: there is one of an earlier command, and the next one will write the other."""
+    (tmp_path / "pose.csv").write_text("of before")
+    words = ("--loop", "--rate", "4", "--record", "take.mcap", "--out", "pose.csv", "--out", "pose.npz")
+    with started(tmp_path, "live", sample_path(), *words) as process:
+        until(lambda: len(list(tmp_path.glob(".pose.csv-*.voodoo/*.npz"))) >= 2)
+        in_use = recover(tmp_path)
+        process.kill()
+        process.stderr.read()
+    assert in_use == ([], []) and {file.name for file in tmp_path.iterdir() if file.name[0] != "."} == {"pose.csv"}
+    done = run("track", sample_path(), "--use", "depth", "--out", tmp_path / "pose.npz")
+    assert done.exit_code == 0 and done.stderr.count(": recovered ") == 3, done.stderr
+    assert (tmp_path / "pose.csv").read_text() == "of before"
+    assert len(Track.load(tmp_path / "pose.npz")) == 90
+    rows, exact = Track.load(tmp_path / "pose.recovered.csv"), Track.load(tmp_path / "pose.recovered.npz")
+    assert len(rows) == len(exact) >= 60 and rows.stamps.tolist() == exact.stamps.tolist()
+    assert len(open_recording(tmp_path / "take.mcap")) > 30
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+@pytest.mark.parametrize("people", ["1", "any"])
+def test_recover_makes_all_formats_of_a_killed_track(tmp_path, monkeypatch, people):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("voodoo.cli.track.TOGETHER", 30)
+    child = os.fork()
+    if not child:
+        kill = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL)  # noqa: E731
+        monkeypatch.setattr("voodoo.export.spool.Spool.write", kill)
+        run("track", sample_path(), "--people", people, *(word for name in FORMATS for word in ("--out", name)))
+    assert os.waitpid(child, 0)[1] == signal.SIGKILL
+    (hidden,) = tmp_path.iterdir()
+    assert json.loads((hidden / KEPT).read_text())["paths"] == list(FORMATS)
+    (hidden / "00000001.npz").write_bytes(b"damage")
+    done = run("recover", ".")
+    assert done.exit_code == 1 and "00000001.npz" in done.stderr and "4 files recovered" in done.stderr
+    result = (PeopleTrack if people == "any" else Track).load("pose.npz")
+    assert len(result) == 60 and not hidden.exists()
+
+
+def test_what_others_left_is_not_followed_out_of_the_folder(tmp_path):
+    hidden = tmp_path / "in" / ".pose.csv-abcdefgh.voodoo"
+    hidden.mkdir(parents=True)
+    (hidden / "out.mcap").write_text("recorded")
+    (hidden / KEPT).write_text(json.dumps({"paths": ["../out.mcap"]}))
+    done = run("recover", tmp_path / "in")
+    assert done.exit_code == 0 and [file.name for file in tmp_path.iterdir()] == ["in"]
+    assert (tmp_path / "in" / "out.mcap").read_text() == "recorded"
+    hidden.mkdir()
+    for note in ("[]", '{"paths": 3}', "{", '{"paths": ["a.csv"], "several": false}'):
+        (hidden / KEPT).write_text(note)
+        assert run("recover", tmp_path / "in").exit_code == 1
+    assert [file.name for file in (tmp_path / "in").iterdir()] == ["out.mcap", hidden.name]
+
+
+@pytest.mark.parametrize(
+    ("command", "name"), [("track", "SIGINT"), ("track", "SIGTERM"), ("track", "SIGHUP"), ("live", "SIGHUP")]
+)
+def test_every_signal_ends_a_command_with_what_there_is(tmp_path, command, name):
+    """For others of live see test_live_command.py."""
+    words = ("--overlay", "look.mp4") if command == "track" else ("--loop",)
+    with started(tmp_path, command, sample_path(), "--use", "depth", "--out", "pose.csv", *words) as process:
+        if command == "live":
+            until(lambda: "Hz" in process.stderr.readline())
+        else:
+            until(lambda: list(tmp_path.glob(".look.mp4-*/look.mp4")))
+        process.send_signal(getattr(signal, name))
+        messages = process.communicate(timeout=20)[1]
+    assert process.returncode == 128 + getattr(signal, name), messages
+    assert len(Track.load(tmp_path / "pose.csv")) > 0 and not list(tmp_path.glob(".*"))
+
+
+def test_a_signal_that_is_ignored_stays_ignored(tmp_path):
+    """As below nohup."""
+    command = f"trap '' HUP; exec {sys.executable} -c \"{PROGRAM}\" track {sample_path()} --use depth --out pose.csv"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(["sh", "-c", command], cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as process:
+        until(lambda: list(tmp_path.glob(".pose.csv-*")))
+        process.send_signal(signal.SIGHUP)
+    assert process.returncode == 0 and len(Track.load(tmp_path / "pose.csv")) == 90
+
+
+def test_what_cannot_be_drawn_or_shown_costs_no_pose(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for place in ("overlay.Overlay.draw", "overlay.Overlay.draw_people"):
+        monkeypatch.setattr(f"voodoo.visualization.{place}", lambda *_, **__: {}["a bug"])
+    for people in ("1", "any"):
+        done = run("track", sample_path(), "--people", people, "--out", "pose.csv", "--overlay", "look.mp4")
+        assert done.exit_code == 1 and re.search("not written: KeyError: 'a bug'", done.stderr)
+        assert len(Path("pose.csv").read_text().splitlines()) == 91 and not Path("look.mp4").exists()
+
+
+def test_memory_does_not_grow_with_the_recording(tmp_path):
+    """Each frame more takes less than 100 bytes, while it is tracked and while files are written."""
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    estimates = [step.estimate for step in track(recording, tracker)]
+    kept, peaks = [], []
+    tracemalloc.start()
+    for times in (1, 1, 9):
+        with Spool([tmp_path / "pose.csv", tmp_path / "pose.npz"], root_frame=lambda: "a", together=45) as spool:
+            for estimate in times * estimates:
+                spool.add(estimate, {1: tracker.body})
+            gc.collect()
+            kept.append(tracemalloc.get_traced_memory()[0])
+            tracemalloc.reset_peak()
+            assert spool.write()[1] == []
+        peaks.append(tracemalloc.get_traced_memory()[1])
+    tracemalloc.stop()
+    assert len(Track.load(tmp_path / "pose.csv")) == 9 * 90
+    assert kept[2] - kept[1] < 8 * 90 * 100, kept
+    assert peaks[2] - peaks[1] < 1e6, peaks  # all of them together are 6 MB
