@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -9,6 +11,7 @@ from typer.testing import CliRunner
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo.cli import running
+from voodoo.cli.common import NO_POSE
 from voodoo.errors import RecordingError
 from voodoo.evaluation import evaluate as evaluate_module
 from voodoo.export.track import Track
@@ -138,7 +141,7 @@ def test_track_without_start_searches_for_a_person(run):
 def test_nobody_found_is_a_result_and_one_line(run):
     run.recording = FakeRecording(frames=3, start=False)
     done = run("track", "somewhere", "--out", "pose.csv", "--out", "pose.npz")
-    assert_one_line(done, 0, "nobody was found in 3 frames")
+    assert_one_line(done, NO_POSE, "nobody was found in 3 frames")
     assert "3 frames, 3 searching; wrote pose.csv" in done.stdout
     for name in ("pose.csv", "pose.npz"):
         read = Track.load(name)
@@ -146,7 +149,7 @@ def test_nobody_found_is_a_result_and_one_line(run):
 
 
 def test_init_auto_leaves_the_recordings_start_alone(run):
-    assert run("track", "somewhere", "--init", "auto", "--out", "pose.csv").exit_code == 0
+    assert run("track", "somewhere", "--init", "auto", "--out", "pose.csv").exit_code == NO_POSE
     assert run.options == {"bare": True}
     assert Track.load("pose.csv").status == ("searching",) * 12  # this tracker finds nobody
     assert run("track", "somewhere", "--out", "pose.csv").exit_code == 0
@@ -189,7 +192,7 @@ def test_init_writes_what_init_reads(run):
     assert Init.load(Path("start.json")).joints["l_wrist"] == T_POSE["l_wrist"]
     assert_one_line(run("init", "somewhere", "--at", "7"), 1, "--at: expected 0 to 0.367 s", "found 7")
     run.tracker.found_at = None
-    assert_one_line(run("init", "somewhere"), 1, "found nobody")
+    assert_one_line(run("init", "somewhere"), NO_POSE, "found nobody")
 
 
 def test_boxes_to_leave_out(run):
@@ -402,3 +405,15 @@ def test_height_option_wins_over_the_start(run):
     assert start_tracker(recording).initial.height == 1.76
     assert start_tracker(recording, height=1.6).initial.height == 1.6
     assert start_tracker(recording, init=Init(height_m=1.5, joints=dict(T_POSE))).initial.height == 1.5
+
+
+def test_nothing_usable_is_no_pose(run):
+    run.recording, run.tracker.refuse_at = FakeRecording(frames=1), 0
+    assert_one_line(
+        run("track", "somewhere"), NO_POSE, "at least one frame that can be used", "1 that the tracker refuses"
+    )
+
+
+def test_the_module_is_the_command():
+    done = subprocess.run([sys.executable, "-m", "voodoo", "track"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("Usage: python -m voodoo track"), done.stderr

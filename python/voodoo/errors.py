@@ -47,6 +47,10 @@ class RecordingError(VoodooError):
         self.reason, self.hint = reason, hint
 
 
+class NoPoseError(VoodooError):
+    """Nothing in a recording could be used, or nobody was found in it."""
+
+
 class DetectorWarning(UserWarning):
     """A detector failed, and the tracker's step continued without it. The warning names the exception."""
 

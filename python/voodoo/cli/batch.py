@@ -66,7 +66,7 @@ def batch_command(
     from voodoo.cli.people import limit_of
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.config import Config
-    from voodoo.errors import VoodooError
+    from voodoo.errors import NoPoseError, VoodooError
     from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
@@ -102,6 +102,8 @@ def batch_command(
                         batch.take(row)
                         if row.status == FAILED:
                             print_message(f"{row.recording}: {row.error}")
+                        elif not row.persons:
+                            print_message(f"{row.recording}: nobody was found in {row.frames} frames")
                 finally:
                     batch.save()
                 interrupted = stop.is_set()
@@ -113,6 +115,8 @@ def batch_command(
         broken = [row for row in ours if row.status == FAILED]
         if broken:
             raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")
+        if batch.rows and not any(row.persons for row in batch.rows.values()):
+            raise NoPoseError(f"nobody was found in any of {len(batch.rows)} recordings")
 
 
 @contextmanager

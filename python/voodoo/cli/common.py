@@ -13,14 +13,22 @@ import typer
 
 from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.cli.terminal import Escaped
-from voodoo.errors import VoodooError, reason
+from voodoo.errors import NoPoseError, VoodooError, reason
 
 if TYPE_CHECKING:
     from voodoo.export.track import Track
 
 T = TypeVar("T")
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, by convention 128 + SIGINT."""
+FAILED, NO_POSE, INTERRUPTED, TERMINATED = 1, 3, 130, 143
+EXIT_CODES = {
+    0: "success; of a command that tracks: at least one pose",
+    FAILED: "refused or failed; one line names what was expected and found",
+    2: "a wrong option",
+    NO_POSE: "no pose: nothing could be used, or nobody was found; files that tell so are written",
+    INTERRUPTED: "ended by Ctrl-C (128 + SIGINT); the frames up to there are written",
+    TERMINATED: "`voodoo live` ended by SIGTERM (128 + 15); files are complete",
+}
+"""What the exit codes of all commands mean; Typer uses 2."""
 
 
 def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
@@ -126,7 +134,7 @@ def print_interrupted(interrupted: bool, done: str) -> None:
 
 @contextmanager
 def clear_errors() -> Iterator[None]:
-    """Convert expected errors to one line on stderr and exit code 1.
+    """Convert expected errors to one line on stderr and the exit code FAILED or NO_POSE.
 
     NumPy's warnings (e.g. on overflow in a damaged file) are suppressed; -W shows them.
     """
@@ -137,7 +145,7 @@ def clear_errors() -> Iterator[None]:
             yield
     except VoodooError as error:
         hint = getattr(error, "hint", "")
-        _fail(str(error), hint)
+        _fail(str(error), hint, code=NO_POSE if isinstance(error, NoPoseError) else FAILED)
     except MemoryError:
         _fail("expected enough memory for this recording, found too little")
     except OSError as error:
@@ -149,8 +157,8 @@ def print_message(message: str) -> None:
     typer.echo(f"voodoo: {' '.join(message.split())}", err=True)
 
 
-def _fail(message: str, hint: str = "") -> None:
+def _fail(message: str, hint: str = "", *, code: int = FAILED) -> None:
     print_message(message)
     if hint:
         typer.echo(hint, err=True)
-    raise typer.Exit(1)
+    raise typer.Exit(code)

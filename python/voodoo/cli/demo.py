@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from voodoo.cli.common import INTERRUPTED, clear_errors, refuse_missing, states
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError
 
 
 def demo_command(
@@ -39,7 +39,7 @@ def demo_command(
         refuse_missing([failure], f"wrote {out / 'pose.csv'}")
         save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
         if not result.found.any():
-            raise VoodooError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
+            raise NoPoseError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
         errors = compare(source, result)
         typer.echo(f"{source.name}: {len(result)} frames, {states(result)}")
         typer.echo(

@@ -31,7 +31,7 @@ from voodoo.cli.options import (
     TopicOption,
 )
 from voodoo.cli.paths import check_paths
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError
 
 
 def ik_command(
@@ -115,7 +115,7 @@ def ik_command(
             model=model,
         )
         if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
-            raise VoodooError(
+            raise NoPoseError(
                 f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
             )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))

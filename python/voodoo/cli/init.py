@@ -21,7 +21,7 @@ from voodoo.cli.options import (
     TopicOption,
     UseOption,
 )
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError, VoodooError
 
 
 def init_command(
@@ -49,7 +49,7 @@ def init_command(
 
     It is the pose in the first frame at or after S in which a person is found: joints in meters in the recording's root frame,
     the stature, and the frame's stamp. A start, truth or reference beside the recording is not read. If the pose is wrong, edit
-    the file before giving it to voodoo track. Exit code 1 if no person is found.
+    the file before giving it to voodoo track. Exit code 3 if no person is found.
 
     Examples
 
@@ -92,7 +92,7 @@ def init_command(
         settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
         estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
         if estimate is None:
-            raise VoodooError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
+            raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
         text = pose_as_init(estimate, tracker.body).to_json()
         if out is None:
             typer.echo(text)

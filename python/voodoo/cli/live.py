@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, clear_errors, numbers_of, print_message, refuse_both, topics_of
+from voodoo.cli.common import INTERRUPTED, TERMINATED, clear_errors, numbers_of, print_message, refuse_both, topics_of
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -26,9 +26,7 @@ from voodoo.cli.options import (
     UseOption,
     ViewOption,
 )
-
-TERMINATED = 143
-"""Exit code after SIGTERM."""
+from voodoo.errors import NoPoseError
 
 
 def live_command(
@@ -145,3 +143,5 @@ def live_command(
             raise typer.Exit(INTERRUPTED)
         if done.signal:
             raise typer.Exit(TERMINATED)
+        if not done.with_pose:
+            raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")

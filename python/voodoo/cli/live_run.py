@@ -81,9 +81,10 @@ class Wishes:
 
 @dataclass
 class Done:
-    """Result of a session: the signal that ended it ("": none), and the written files."""
+    """Result of a session: the signal that ended it ("": none), the number of steps with a person, and the written files."""
 
     signal: str = ""
+    with_pose: int = 0
     written: list[Path] = field(default_factory=list)
 
 
@@ -132,6 +133,7 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
                 if report is not None:
                     write_report(report, session)
         print_message(f"{session.line()}; {session.published} published")
+        done.with_pose = session.with_pose
         done.signal = signals[0] if signals else ""
         if files is not None:
             done.written += files.written

@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from voodoo.cli.common import INTERRUPTED, print_message, progressing, refuse_missing, wrote
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError, VoodooError
 
 if TYPE_CHECKING:
     from voodoo.evaluation.people import PeopleScore
@@ -98,8 +98,16 @@ def follow_people(
         typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {message}", err=True)
         raise typer.Exit(INTERRUPTED)
     typer.echo(message)
+    print_left_out(source, left_out)
     if not result.tracks:
-        typer.echo(f"voodoo: {source.name}: nobody was found in {len(result)} frames", err=True)
+        raise NoPoseError(f"{source.name}: nobody was found in {len(result)} frames")
+
+
+def print_left_out(source: Recording, left_out: LeftOut | None) -> None:
+    """Print on stderr what was left out."""
+    if left_out:
+        first = next(iter(left_out.first.values()))
+        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
 
 
 class _Followed(NamedTuple):
@@ -162,11 +170,14 @@ def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
 
 
 def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:
-    """Raise an error if a recording could not be tracked to its end.
+    """Raise an error if a recording could not be tracked to its end, or nobody was found in any.
 
     Raises:
         VoodooError: names the first.
+        NoPoseError: nobody was found.
     """
     failures = [score for score in scores if score.failure]
     if failures:
         raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
+    if scores and all(score.nobody for score in scores):
+        raise NoPoseError(f"nobody was found in {', '.join(score.name for score in scores[:3])}")

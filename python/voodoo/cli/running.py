@@ -12,7 +12,7 @@ import numpy as np
 from voodoo.cli.common import progressing
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError, VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Beginning
@@ -155,7 +155,7 @@ def run(
                 raise
             interrupted = True
     if not estimates:
-        raise VoodooError(
+        raise NoPoseError(
             f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
         )
     left = {} if left_out is None else left_out.counts

@@ -41,6 +41,7 @@ from voodoo.cli.options import (
     ViewOption,
 )
 from voodoo.cli.paths import check_paths
+from voodoo.errors import NoPoseError
 
 if TYPE_CHECKING:
     from voodoo.export.track import Track
@@ -204,7 +205,6 @@ def track_command(
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
                 follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer), left_out)
-            _print_left_out(source, left_out)
             return
         tracker = start_tracker(
             source,
@@ -248,20 +248,19 @@ def track_command(
         _print_warnings(source, result, left_out)
 
 
-def _print_left_out(source: Recording, left_out: LeftOut | None) -> None:
-    if left_out:
-        first = next(iter(left_out.first.values()))
-        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
-
-
 def _print_warnings(source: Recording, result: Track, left_out: LeftOut | None) -> None:
-    """Print on stderr what was left out, and possible reasons if no person was tracked."""
+    """Print on stderr what was left out, and possible reasons if no person was tracked.
+
+    Raises:
+        NoPoseError: nobody was found.
+    """
+    from voodoo.cli.people import print_left_out
     from voodoo.recordings.depth_range import depth_range
 
-    _print_left_out(source, left_out)
-    if not result.found.any():
-        print_message(f"{source.name}: nobody was found in {len(result)} frames")
+    print_left_out(source, left_out)
     if not {"tracking", "degraded"} & set(result.status):
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
+    if not result.found.any():
+        raise NoPoseError(f"{source.name}: nobody was found in {len(result)} frames")
