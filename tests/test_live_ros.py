@@ -8,13 +8,13 @@ import pytest
 
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
-from voodoo.export.ros2 import cdr
+from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr
 from voodoo.live import Faults, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
 from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
-from voodoo.live.ros2.publisher import TRACKED, Ros2Output
-from voodoo.live.ros2.types import IDS, STORE, dds_name, ros_name
+from voodoo.live.ros2.publisher import Ros2Output
+from voodoo.live.ros2.types import dds_name, ros_name
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
 from voodoo.pipeline.run import start_tracker, track
 from voodoo.pipeline.search import nobody
@@ -193,7 +193,7 @@ class FakeNode:
     def __init__(self):
         self.sent = []
 
-    def advertise(self, topic, kind, *, depth=10):
+    def advertise(self, topic, kind, *, depth=10, latched=False):
         node = self
 
         class Publication:
@@ -220,8 +220,15 @@ def test_what_is_published_has_the_stamps_of_the_data():
         return node.take()
 
     sent = publish(step.estimate.stamp, step.estimate)
-    body = "/humans/bodies/body_1"
-    assert set(sent) == {"/tf", f"{body}/joint_states", f"{body}/markers", f"{body}/pose", TRACKED}
+    body = "/humans/bodies/p1"
+    assert set(sent) == {
+        "/tf",
+        f"{body}/joint_states",
+        f"{body}/markers",
+        f"{body}/pose",
+        TRACKED,
+        "/human_description_p1",
+    }
     stamps = {
         (message.header.stamp.sec, message.header.stamp.nanosec)
         for message in (
@@ -232,9 +239,9 @@ def test_what_is_published_has_the_stamps_of_the_data():
     }
     assert stamps == {divmod(round(step.estimate.stamp * 1e9), 1_000_000_000)}
     names = {transform.child_frame_id: transform.header.frame_id for transform in sent["/tf"][0].transforms}
-    assert names["body_1"] == "base_link"
-    assert names["l_elbow_1"] == "l_shoulder_1"
-    assert sent[TRACKED][0].ids == ["1"]
+    assert names["body_p1"] == "base_link"
+    assert names["l_elbow_p1"] == "l_shoulder_p1"
+    assert sent[TRACKED][0].ids == ["p1"]
     gone = publish(step.estimate.stamp + 0.1, nobody(step.estimate.stamp + 0.1))
     assert set(gone) == {f"{body}/markers", TRACKED}
     assert [marker.action for marker in gone[f"{body}/markers"][0].markers] == [3], "they are deleted"

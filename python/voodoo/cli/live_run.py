@@ -277,4 +277,4 @@ def warm_up() -> None:
     for number in range(3):
         item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
         step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
-    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="1", topic="/warm")
+    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="p1")

@@ -119,8 +119,8 @@ def track_command(
 
     --people any or N tracks several persons, detected in depth images; no start is read. The .csv then begins with stamp_s,
     person, status, residual_m and has a row for every person who is present; person is an id from 1, which is kept when a person
-    returns. The .npz and bags have all persons (frames body_1, body_2, ...); .bvh and .trc have one file per person: NAME_1.bvh,
-    ...
+    returns. The .npz and bags have all persons (frames body_p1, body_p2, ...); .bvh and .trc have one file per person:
+    NAME_1.bvh, ...
 
     Examples
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from voodoo.export.bvh import write_bvh
 from voodoo.export.files import bag_folder, check_target, is_bag
 from voodoo.export.people import PeopleTrack
-from voodoo.export.ros2 import write_people_bag
+from voodoo.export.ros2 import person_id, write_people_bag
 from voodoo.export.trc import write_trc
 from voodoo.export.upright import upright
 from voodoo.model.body import Body
@@ -48,7 +48,7 @@ def save_people(
             written.append(own)
         return written
     if is_bag(path):
-        people = {str(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
+        people = {person_id(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
         with appearing_whole(path) as place, bag_folder(place) as folder:
             write_people_bag(folder, people, root_frame=root_frame, optical=optical)
     else:
