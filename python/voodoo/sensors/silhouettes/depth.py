@@ -86,7 +86,8 @@ def from_depth(
     height, width = depth.image.shape
     places = {site: known_place(site, position) for site, position in known.items()}
     points, valid = depth_points(depth)
-    solid = valid & (points[:, 2] > _FLOOR_M) if level else valid
+    solid = valid.copy()
+    solid[valid] = points[:, 2] > _FLOOR_M if level else True
     z = np.where(solid.reshape(height, width), meters(depth), np.nan)
     view = CameraView(depth.camera, depth.root_from_sensor)
     seeds = []
