@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
@@ -65,6 +65,18 @@ def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
             raise VoodooError(f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}")
         numbers[name] = number
     return numbers
+
+
+def loader_words(
+    topic: Sequence[str] | None, option: Sequence[str] | None, *, frame: str | None = None, layout: str | None = None
+) -> dict[str, Any]:
+    """Options of `open_recording` from --topic, --option, --frame and --layout, without those that are not given.
+
+    Raises:
+        VoodooError: see `topics_of` and `numbers_of`.
+    """
+    given = {"root_frame": frame, "layout": layout}
+    return topics_of(topic) | numbers_of(option) | {name: word for name, word in given.items() if word is not None}
 
 
 def refuse_both(name: str, value: object, **others: object) -> None:

@@ -10,13 +10,12 @@ import typer
 
 from voodoo.cli.common import (
     clear_errors,
-    numbers_of,
+    loader_words,
     print_interrupted,
     progressing,
     refuse_both,
     refuse_missing,
     states,
-    topics_of,
     wrote,
 )
 from voodoo.cli.options import (
@@ -24,6 +23,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -74,6 +74,7 @@ def ik_command(
     frame: FrameOption = None,
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Compute postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
@@ -100,7 +101,7 @@ def ik_command(
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         beginning = beginning_of(init)
-        source = opened(recording, loader, frame, **topics_of(topic), **numbers_of(option))
+        source = opened(recording, loader, frame, **loader_words(topic, option, layout=layout))
         files = out or [Path(f"{source.name}_ik.csv")]
         for file in files:
             check_target(file)

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
+from voodoo.cli.common import clear_errors, loader_words, refuse_both
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
     ExcludeOption,
     FrameOption,
     HeightOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -44,6 +45,7 @@ def init_command(
     frame: FrameOption = None,
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Find the first pose and write it as JSON for --init of voodoo track.
 
@@ -70,7 +72,7 @@ def init_command(
         refuse_both("--body", body, **{"--height": height, "--model": model})
         kinds, boxes = kinds_of(use), boxes_of(exclude)
         left_out = LeftOut()
-        options = topics_of(topic) | numbers_of(option)
+        options = loader_words(topic, option, layout=layout)
         source = opened(recording, loader, frame, bare=True, left_out=left_out, **options)
         about = source.info()
         after = about.start_stamp

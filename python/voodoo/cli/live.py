@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, TERMINATED, clear_errors, numbers_of, print_message, refuse_both, topics_of
+from voodoo.cli.common import INTERRUPTED, TERMINATED, clear_errors, loader_words, print_message, refuse_both
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -17,6 +17,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -85,6 +86,7 @@ def live_command(
     topic: TopicOption = None,
     option: LoaderNumberOption = None,
     loader: LoaderOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
 
@@ -130,7 +132,7 @@ def live_command(
             serve=serve,
             publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,
         )
-        options: dict[str, Any] = {**topics_of(topic), **numbers_of(option)}
+        options = loader_words(topic, option, layout=layout)
         if loader is not None:
             options["loader"] = loader
         source = entered(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
+from voodoo.cli.common import clear_errors, loader_words, refuse_both
 from voodoo.cli.options import (
     FrameOption,
     HeightOption,
@@ -30,13 +30,11 @@ def info_command(
 ) -> None:
     """Print the contents of a recording: sensors, topics, frames, rates, root frame, reference and range of depths."""
     from voodoo.cli.running import opened
-    from voodoo.pipeline.inputs import loader_options
     from voodoo.recordings.depth_range import depth_range
     from voodoo.recordings.left_out import LeftOut
 
     with clear_errors():
-        options = topics_of(topic) | numbers_of(option) | loader_options(recording, loader, markers=None, layout=layout)
-        source = opened(recording, loader, frame, left_out=LeftOut(), **options)
+        source = opened(recording, loader, frame, left_out=LeftOut(), **loader_words(topic, option, layout=layout))
         typer.echo(str(source.info()))
         depth = depth_range(source)
         if depth is not None:

@@ -178,6 +178,8 @@ def track_command(
             options["background"] = background
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
+        if layout is not None and not keypoints and not any("layout" in each for each in (options, *taken)):
+            raise typer.BadParameter("--layout is for keypoints, of --keypoints or a Pose2Sim folder")
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
             opened(
