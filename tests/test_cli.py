@@ -218,7 +218,7 @@ def test_eval_can_search_for_the_person(run):
     [
         ("{", ("start.json", "JSON")),
         ('{"joints": {}}', ("start.json", "joints")),
-        ('{"height_m": 1.7}', ("start.json", "joints", "required")),
+        ('{"height_m": 1.7}', ("start.json", "joints", "found none")),
         ('{"joints": {"l_knee": [1, 2]}}', ("start.json", "joints.l_knee")),
         ('{"joints": {"l_knee": [1, 2, "x"]}}', ("start.json", "joints.l_knee.2", "'x'")),
         ('{"joints": {"l_knee": [1, 2, NaN]}}', ("start.json",)),
