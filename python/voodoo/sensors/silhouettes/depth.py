@@ -101,10 +101,8 @@ def from_depth(
     mask = _connected(z, seeds)
     if scene is not None and seeds:
         before = scene.before(z)
-        near = np.zeros(len(points), dtype=bool)
-        for place in places.values():
-            with np.errstate(invalid="ignore"):
-                near |= np.square(points - place).sum(axis=1) < _REACH_M**2
+        near = valid.copy()
+        near[valid] = np.any([np.square(points - place).sum(axis=1) < _REACH_M**2 for place in places.values()], axis=0)
         close = near.reshape(height, width)
         mask = (mask & (before | close)) | (before & close)
     return filled(without_specks(mask & np.isfinite(z), smallest=_SPECK_PX))
