@@ -47,10 +47,10 @@ def run(monkeypatch, tmp_path):
 
 def assert_one_line(result, code, *words):
     assert result.exit_code == code
-    assert result.stderr.count("\n") == 1, result.stderr
-    assert result.stderr.startswith("voodoo: ")
+    first, *more = result.stderr.splitlines()
+    assert first.startswith("voodoo: ") and all(line.startswith("  ") for line in more), result.stderr
     for word in words:
-        assert word in result.stderr
+        assert word in " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize(
@@ -417,3 +417,39 @@ def test_nothing_usable_is_no_pose(run):
 def test_the_module_is_the_command():
     done = subprocess.run([sys.executable, "-m", "voodoo", "track"], capture_output=True, text=True, check=False)
     assert done.returncode == 2 and done.stderr.startswith("Usage: python -m voodoo track"), done.stderr
+
+
+def test_eval_is_json_or_ten_rows(run):
+    Path("a_depth.mat").touch()
+    rows = [line for line in run("eval", "a_depth.mat", "--jobs", "1").stdout.splitlines() if line.startswith("| ")]
+    assert len(rows) == 11 and rows[0] == "| | |"
+    done = run("eval", "a_depth.mat", "--jobs", "1", "--json", "--out", "report")
+    report = json.loads(done.stdout)
+    assert report["recordings"][0]["tracking_class"] == 2 and report["summaries"][0]["sequences"] == 1
+    assert "NaN" not in done.stdout and "wrote report/sequences.csv" in done.stderr
+    run.tracker.refuse_at = 2
+    failed = run("eval", "a_depth.mat", "--jobs", "1", "--json")
+    assert failed.exit_code == 1 and "frame 2" in json.loads(failed.stdout)["recordings"][0]["failure"]
+
+
+def test_progress_in_a_pipe_is_lines(run, monkeypatch):
+    monkeypatch.setattr("voodoo.cli.common._LINE_S", 0.0)
+    done = run("track", "somewhere", "--out", "pose.csv")
+    assert "voodoo: fake: 7 of 12\n" in done.stderr and "\r" not in done.stderr and "\x1b" not in done.stderr
+
+
+def test_no_line_is_long(run):
+    run.recording = None
+    names = " ".join(f"--with somewhere{number}" for number in range(40))
+    for line in run("track", "nowhere/" + "folder " * 60, *names.split()).stderr.splitlines():
+        assert len(line) <= 200
+
+
+@pytest.mark.parametrize("words", [(), ("--out", "pose.npz")])
+def test_a_minus_is_csv_on_stdout_and_nothing_else(run, words):
+    done = run("track", "somewhere", "--out", "-", *words)
+    assert done.exit_code == 0 and "12 frames, 12 tracking" in done.stderr, done.output
+    Path("read.csv").write_text(done.stdout)
+    assert run("track", "somewhere", "--out", "pose.csv").exit_code == 0
+    assert Path("read.csv").read_text() == Path("pose.csv").read_text() and not Path("-").exists()
+    assert all(name in done.stderr for name in words[1:])

@@ -149,12 +149,12 @@ def test_the_bag_has_the_frames_of_everybody(followed, tmp_path):
             if connection.topic == "/tf":
                 for item in bag.deserialize(raw, connection.msgtype).transforms:
                     children.setdefault(item.child_frame_id, []).append(item.header.frame_id)
-    assert {f"/humans/bodies/body_{one}/joint_states" for one in (1, 2)} <= topics
+    assert {f"/humans/bodies/p{one}/joint_states" for one in (1, 2)} <= topics
     assert stamps == sorted(stamps)
     for one in (1, 2):
-        assert set(children[f"body_{one}"]) == {"odom"}
-        assert len(children[f"body_{one}"]) == len(result.tracks[one])
-        assert f"l_elbow_{one}" in children
+        assert set(children[f"body_p{one}"]) == {"odom"}
+        assert len(children[f"body_p{one}"]) == len(result.tracks[one])
+        assert f"l_elbow_p{one}" in children
 
 
 def test_files_of_nobody_are_written_all_the_same(tmp_path):

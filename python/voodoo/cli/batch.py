@@ -11,10 +11,11 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, loader_words, print_interrupted, print_message, progressing
+from voodoo.cli.common import clear_errors, loader_words, print_interrupted, print_message, progressing, reporting
 from voodoo.cli.options import (
     ConfigOption,
     FrameOption,
+    JsonOption,
     LayoutOption,
     LoaderNumberOption,
     LoaderOption,
@@ -54,6 +55,7 @@ def batch_command(
     option: LoaderNumberOption = None,
     layout: LayoutOption = None,
     strict: StrictOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Track many recordings, on this machine or on a cluster, one task each.
 
@@ -85,7 +87,7 @@ def batch_command(
     from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
-    with clear_errors():
+    with clear_errors(), reporting(as_json) as report:
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         _, limit = limit_of(people)
@@ -126,8 +128,11 @@ def batch_command(
         ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
         done = sum(row.status == DONE for row in ours)
         message = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
+        if report is not None:
+            report |= {"out": out, "recordings": list(batch.rows.values())}
         print_interrupted(interrupted, message)
-        typer.echo(message)
+        if report is None:
+            typer.echo(message)
         broken = [row for row in ours if row.status == FAILED]
         if broken:
             raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+import time
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from voodoo.export.track import Track
 
 T = TypeVar("T")
+WIDTH = 200
+"""Longest line that is printed, but for names without spaces."""
+_LINE_S = 5.0
 FAILED, NO_POSE, INTERRUPTED, TERMINATED = 1, 3, 130, 143
 EXIT_CODES = {
     0: "success; of a command that tracks: at least one pose",
@@ -95,8 +100,14 @@ def states(result: Track) -> str:
     return ", ".join(f"{result.status.count(word)} {word}" for word in dict.fromkeys(result.status))
 
 
+def print_result(message: str, targets: Iterable[Path]) -> None:
+    """The last lines of a command on stdout; on stderr if a target is stdout."""
+    print_text(message, err=Path("-") in targets)
+
+
 def wrote(files: Sequence[Path]) -> str:
     """The end of a message that names the written files; empty without any."""
+    files = [file for file in files if str(file) != "-"]
     return f"; wrote {' and '.join(map(str, files))}" if files else ""
 
 
@@ -111,13 +122,21 @@ def refuse_missing(failures: Iterable[Exception | None], done: str) -> None:
 
 
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Show a progress bar on stderr, if it is a terminal."""
+    """Show a progress bar on stderr; if it is no terminal, a line every few seconds."""
+    if not sys.stderr.isatty():
+        told = time.monotonic()
+        for count, item in enumerate(items, 1):
+            yield item
+            if time.monotonic() - told > _LINE_S:
+                told = time.monotonic()
+                print_message(f"{words}: {count} of {total}")
+        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(file=getattr(sys.stderr, "stream", sys.stderr))  # whose commands are Rich's own
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:
+    with Progress(*columns, console=console, transient=True) as progress:
         with redirect_stderr(Escaped(sys.stderr)):  # Rich writes lines above the bar
             yield from progress.track(items, total=total, description=words)
 
@@ -165,8 +184,46 @@ def clear_errors() -> Iterator[None]:
 
 
 def print_message(message: str) -> None:
-    """One line on stderr."""
-    typer.echo(f"voodoo: {' '.join(message.split())}", err=True)
+    """One line on stderr, or several if it is long."""
+    print_text(f"voodoo: {' '.join(message.split())}", err=True)
+
+
+def print_text(text: str, *, err: bool = False) -> None:
+    """Lines on stdout or stderr; one of more than WIDTH characters goes on in the next line."""
+    from textwrap import wrap
+
+    for line in text.splitlines():
+        how: Any = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
+        typer.echo(line if len(line) <= WIDTH else "\n".join(wrap(line, WIDTH, drop_whitespace=True, **how)), err=err)
+
+
+def print_json(value: object) -> None:
+    """A value on stdout as JSON: dataclasses are objects, what is not known (NaN) is null."""
+    import json
+
+    typer.echo(json.dumps(_plain(value), indent=2, ensure_ascii=False))
+
+
+@contextmanager
+def reporting(as_json: bool) -> Iterator[dict[str, Any] | None]:
+    """An object that is printed as JSON at the end, whatever happens; None without --json."""
+    report: dict[str, Any] = {}
+    try:
+        yield report if as_json else None
+    finally:
+        if report:
+            print_json(report)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    value = {name: getattr(value, name) for name in getattr(value, "__dataclass_fields__", ())} or value
+    if isinstance(value, Mapping):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
 def _fail(message: str, hint: str = "", *, code: int = FAILED) -> None:

@@ -12,6 +12,7 @@ from voodoo.cli.common import (
     clear_errors,
     loader_words,
     print_interrupted,
+    print_result,
     progressing,
     refuse_both,
     refuse_missing,
@@ -19,6 +20,7 @@ from voodoo.cli.common import (
     wrote,
 )
 from voodoo.cli.options import (
+    RESULTS,
     BodyOption,
     FrameOption,
     HeightOption,
@@ -67,7 +69,7 @@ def ik_command(
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help="Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable; by default NAME_ik.csv.",
+            help=f"{RESULTS}; by default NAME_ik.csv.",
         ),
     ] = None,
     topic: TopicOption = None,
@@ -132,8 +134,8 @@ def ik_command(
         done, failed = written(files, write)
         for name, values in errors.items():
             if np.isfinite(values).any():
-                typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
+                print_result(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error", files)
         message = f"{len(result)} frames, {states(result)}{wrote(done)}"
         refuse_missing(failed, message)
         print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
-        typer.echo(message)
+        print_result(message, files)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import typer
 
-from voodoo.cli.common import INTERRUPTED, print_message, progressing, refuse_missing, wrote
+from voodoo.cli.common import INTERRUPTED, print_message, print_result, progressing, refuse_missing, wrote
 from voodoo.errors import NoPoseError, VoodooError
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def follow_people(
     if interrupted:
         typer.echo(f"voodoo: interrupted, the rest of {len(source)} frames is missing: {message}", err=True)
         raise typer.Exit(INTERRUPTED)
-    typer.echo(message)
+    print_result(message, outputs.targets)
     print_left_out(source, left_out)
     if not result.tracks:
         raise NoPoseError(f"{source.name}: nobody was found in {len(result)} frames")
@@ -160,13 +160,18 @@ def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Map
     return evaluate_result(paths[0], result, loader=loader, options=options)
 
 
-def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
+def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
     """Print and write the table of several persons."""
     from voodoo.evaluation.people_report import people_markdown, write_people
 
-    typer.echo(people_markdown(scores))
+    if report is not None:
+        report["people"] = scores
+    else:
+        typer.echo(people_markdown(scores))
     if out is not None:
-        typer.echo("wrote " + ", ".join(str(file) for file in write_people(out, scores)))
+        (typer.echo if report is None else print_message)(
+            "wrote " + ", ".join(str(file) for file in write_people(out, scores))
+        )
 
 
 def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:

@@ -12,6 +12,7 @@ from voodoo.cli.common import (
     clear_errors,
     numbers_of,
     print_message,
+    print_result,
     refuse_both,
     refuse_missing,
     states,
@@ -242,7 +243,7 @@ def track_command(
         if interrupted:
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
-        typer.echo(message)
+        print_result(message, targets)
         if turned:
             print_message(turned)
         if doubt := lying_words(result, source.root_frame, optical=optical):

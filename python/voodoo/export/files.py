@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +23,8 @@ from voodoo.whole import appearing_whole
 
 FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
 """Suffixes; a path without one is a ROS 2 bag folder."""
+STDOUT = Path("-")
+"""The target that is CSV on standard output."""
 
 
 def check_target(path: Path) -> None:
@@ -32,6 +36,8 @@ def check_target(path: Path) -> None:
     Raises:
         VoodooError: another suffix, a bag folder that exists, or a place where nothing can be written.
     """
+    if path == STDOUT:
+        return
     if path.suffix not in FORMATS and not is_folder(path):
         raise VoodooError(
             f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
@@ -53,7 +59,7 @@ def is_folder(path: Path) -> bool:
 
 def is_bag(path: Path) -> bool:
     """Whether a name is that of a bag: an .mcap file or a folder."""
-    return path.suffix == ".mcap" or is_folder(path)
+    return path.suffix == ".mcap" or (path != STDOUT and is_folder(path))
 
 
 def upright_words(paths: Sequence[Path], root_frame: str, *, optical: bool | None = None) -> str:
@@ -93,6 +99,18 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
     return done, failed
 
 
+@contextmanager
+def on_stdout(path: Path) -> Iterator[Path]:
+    """The file to write: `path`, or for STDOUT a temporary .csv, which is printed at the end."""
+    if path != STDOUT:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "stdout.csv"
+        yield file
+        sys.stdout.write(file.read_text(encoding="utf-8"))
+
+
 def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool | None = None) -> None:
     """Write a track: .csv, .npz, .bvh, .trc, .mcap, or a ROS 2 bag folder.
 
@@ -108,8 +126,9 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         OSError: the file cannot be written.
     """
     check_target(path)
-    if path.suffix in SUFFIXES:
-        track.save(path)
+    if path == STDOUT or path.suffix in SUFFIXES:
+        with on_stdout(path) as file:
+            track.save(file)
         return
     with appearing_whole(path) as place:
         if path.suffix == ".bvh":

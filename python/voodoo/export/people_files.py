@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from voodoo.export.bvh import write_bvh
-from voodoo.export.files import bag_folder, check_target, is_bag
+from voodoo.export.files import bag_folder, check_target, is_bag, on_stdout
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import person_id, write_people_bag
 from voodoo.export.trc import write_trc
@@ -52,5 +52,6 @@ def save_people(
         with appearing_whole(path) as place, bag_folder(place) as folder:
             write_people_bag(folder, people, root_frame=root_frame, optical=optical)
     else:
-        result.save(path)
+        with on_stdout(path) as file:
+            result.save(file)
     return [path]
