@@ -122,8 +122,8 @@ def test_track_without_start_searches_for_a_person(run):
     run.recording = FakeRecording(frames=8, start=False)
     run.tracker.found_at, run.tracker.gone_at = 2, 6
     done = run("track", "somewhere", "--out", "pose.csv", "--out", "pose.npz", "--overlay", "look.mp4")
-    assert done.exit_code == 0 and done.stderr == "", done.output
-    assert "8 frames, 4 searching, 4 tracking" in done.stdout
+    assert_one_line(done, 0, "only 50 % of the frames are tracking")
+    assert "8 frames, 4 searching, 4 tracking" in done.stdout and "50 % searching, 50 % tracking (docs" in done.stdout
     rows = [row.split(",") for row in Path("pose.csv").read_text().splitlines()[1:]]
     assert [float(row[0]) for row in rows] == run.recording.stamps.tolist()
     status = ["searching"] * 2 + ["tracking"] * 4 + ["searching"] * 2

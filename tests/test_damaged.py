@@ -70,7 +70,8 @@ def test_every_good_frame_has_a_pose(entries, start, undamaged, request, change,
     np.testing.assert_array_equal(result.stamps, undamaged.stamps[kept])
     assert result.found.all() and set(result.status) <= {"tracking", "degraded"}
     assert result.left_out == words
-    assert (f"left out {LeftOut.words(words)}" in reported) if words else reported == ""
+    assert all(f"left out {count} {reason} (the first: " in reported for reason, count in words.items())
+    assert reported.count("left out ") == len(words), "each reason once"
     gone = undamaged.stamps[list(missing)]
     settled = [not ((stamp > gone) & (stamp < gone + SETTLED_S)).any() for stamp in result.stamps]
     off = np.linalg.norm(result.joints - undamaged.joints[kept], axis=2)[settled]

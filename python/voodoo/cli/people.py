@@ -104,10 +104,12 @@ def follow_people(
 
 
 def print_left_out(source: Recording, left_out: LeftOut | None) -> None:
-    """Print on stderr what was left out."""
-    if left_out:
-        first = next(iter(left_out.first.values()))
-        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
+    """Print on stderr what was left out: a message for each reason, with the first one."""
+    if left_out is None:
+        return
+    for reason, count in left_out.counts.items():
+        first = left_out.first[reason]
+        print_message(f"{source.name}: left out {count} {reason} (the first: {first}); --strict refuses them")
 
 
 class _Followed(NamedTuple):
@@ -129,7 +131,8 @@ def _run(
     estimates, interrupted = [], False
     bodies: dict[int, Body] = {}
     rate = source.info().rate_hz
-    drawing = None if outputs.overlay is None else Overlay(source)
+    with nullcontext() if left_out is None else left_out.aside():
+        drawing = None if outputs.overlay is None else Overlay(source)
     writer = (
         None if outputs.overlay is None else PictureWriter(outputs.overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
     )

@@ -126,7 +126,8 @@ def run(
     estimates, seconds, pictures, interrupted = [], [], [], False
     chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
     rate = source.info().rate_hz
-    drawing = Overlay(source)
+    with nullcontext() if left_out is None else left_out.aside():
+        drawing = Overlay(source)
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
     with writer or nullcontext():
         try:

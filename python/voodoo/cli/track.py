@@ -139,6 +139,7 @@ def track_command(
     """
     from dataclasses import replace
 
+    from voodoo.cli.closing import closing_doubts, closing_lines
     from voodoo.cli.people import Outputs, body_of, follow_people, limit_of, no_starts
     from voodoo.cli.running import (
         bare_for,
@@ -158,6 +159,7 @@ def track_command(
     from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
     from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
+    from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.sensors.settings import FrontEndSettings
@@ -228,7 +230,7 @@ def track_command(
                 draw_regions=draw_regions,
             )
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
-            result, _, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
+            result, seconds, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
         optical = source.info().camera_root
 
         def write(path: Path) -> list[Path]:
@@ -243,10 +245,16 @@ def track_command(
         if interrupted:
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
-        print_result(message, targets)
+        size = stature_of(tracker.body) if result.found.any() else None
+        print_result("\n".join([message, *closing_lines(result, seconds, source.info(), stature=size)]), targets)
         if turned:
             print_message(turned)
         if doubt := lying_words(result, source.root_frame, optical=optical):
+            print_message(f"{source.name}: {doubt}")
+        told = height or getattr(beginning, "height_m", None)
+        if told is None and beginning is None and source.start is not None:
+            told = source.start.get("height_m")
+        for doubt in closing_doubts(result, stature=size, told=told) if result.found.any() else ():
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, result, left_out)
 
