@@ -166,7 +166,7 @@ def test_signals_finish_files(tmp_path, number):
     ("words", "messages"),
     [
         (["nowhere"], "found no such file"),
-        (["ros2:"], "ros2:TOPIC"),
+        (["ros2:,"], "ros2:TOPIC"),
         ([sample_path(), "--rate", "0"], "rate: expected a number above 0"),
         ([sample_path(), "--out", "pose.xyz"], "expected a name that ends in"),
         ([sample_path(), "--calibration", "a.toml"], "a recording brings its own"),

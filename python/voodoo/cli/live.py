@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import INTERRUPTED, TERMINATED, clear_errors, loader_words, print_message, refuse_both
+from voodoo.cli.common import (
+    INTERRUPTED,
+    TERMINATED,
+    clear_errors,
+    loader_words,
+    print_message,
+    print_text,
+    refuse_both,
+)
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -94,6 +102,9 @@ def live_command(
     Every second a line on stderr has rate, latency, drops and the status of each person.
     Faults of the source are reported there and counted.
 
+    voodoo live ros2: prints the topics that are published, with type and rate. A message on /voodoo/reset (std_msgs/Empty)
+    forgets everybody and searches again.
+
     Examples
 
     voodoo live walk_bag/ --rate 1 --out walk.csv --report walk.json
@@ -111,6 +122,11 @@ def live_command(
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         refuse_both("--view", view or None, **{"--serve": serve})
+        if list(sources) == ["ros2:"]:
+            from voodoo.live.ros2.listing import listing
+
+            print_text("\n".join(listing() or ["nothing is published on this network"]))
+            return
         several, limit = limit_of(people)
         for target in out or ():
             check_target(target)

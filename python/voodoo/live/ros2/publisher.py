@@ -8,11 +8,12 @@ from typing import Any
 from voodoo._core import Estimate
 from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
 from voodoo.live.follow import Step
-from voodoo.live.ros2.dds import Node, Publication
+from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
 from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
+RESET = "/voodoo/reset"
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -22,6 +23,7 @@ class Ros2Output(Output):
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
     Stamps are those of the data. Persons that are lost or searched for are not listed as tracked and have no transforms.
+    A message on RESET (std_msgs/Empty) lets everybody be searched for again.
 
     Args:
         root_frame: returns the frame of the poses, once a frame has arrived.
@@ -39,6 +41,7 @@ class Ros2Output(Output):
         self._displayed: set[int] = set()
         self._bodies: dict[int, Body] = {}
         self._described: dict[int, float] = {}
+        self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
         self._publish_on(TRACKED, IDS, 1)
         # Subscribers can discover these topics before the first pose.
@@ -48,6 +51,8 @@ class Ros2Output(Output):
 
     def publish(self, step: Step) -> None:
         """See Output."""
+        if self._resets.take() and self.on_reset is not None:
+            self.on_reset()
         observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
         for number in sorted(observed):
             self._write_person(number, step.estimates[number], step.bodies[number])
