@@ -18,8 +18,10 @@ from voodoo.export.track import Track
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Init, start_tracker
+from voodoo.sensors.adapters.skin import SKIN
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import FrontEndSettings
+from voodoo.visualization.ink import LEFT, RIGHT
 
 
 @pytest.fixture
@@ -311,6 +313,9 @@ def test_demo(run, monkeypatch):
     assert "12 frames, 1 searching, 11 tracking" in result.stdout
     assert "mean joint error  3.0 cm" in result.stdout
     assert sorted(path.name for path in Path("here").iterdir()) == ["overlay.mp4", "pose.csv", "sheet.png"]
+    legend = cv2.imread("here/sheet.png")[-36:].reshape(-1, 3)
+    for color in (LEFT, RIGHT, SKIN):
+        assert (np.abs(legend.astype(int) - color).max(axis=1) < 4).sum() > 20, color
 
 
 def test_eval_writes_reports_and_prints_the_table(run):

@@ -26,6 +26,7 @@ def demo_command(
     from voodoo.pipeline.start import AUTO, start_tracker
     from voodoo.recordings.sample import sample_path
     from voodoo.visualization.image_writer import save_picture
+    from voodoo.visualization.overlay import legend
     from voodoo.visualization.sheet import contact_sheet
 
     with clear_errors():
@@ -37,7 +38,8 @@ def demo_command(
             raise typer.Exit(INTERRUPTED)
         result.save(out / "pose.csv")
         refuse_missing([failure], f"wrote {out / 'pose.csv'}")
-        save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
+        pictures = contact_sheet(sheet, columns=3)
+        save_picture(out / "sheet.png", np.vstack([pictures, legend(pictures.shape[1])]))
         if not result.found.any():
             raise NoPoseError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
         errors = compare(source, result)
