@@ -165,10 +165,10 @@ def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Map
 
 def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
     """Print and write the table of several persons."""
-    from voodoo.evaluation.people_report import people_markdown, write_people
+    from voodoo.evaluation.people_report import DERIVED, people_markdown, write_people
 
     if report is not None:
-        report["people"] = scores
+        report["people"] = [{**vars(score), **{name: getattr(score, name) for name in DERIVED}} for score in scores]
     else:
         typer.echo(people_markdown(scores))
     if out is not None:
