@@ -9,10 +9,13 @@ from pydantic_core.core_schema import ErrorType
 
 import voodoo
 from voodoo.errors import BodyError, ConfigError, MeasurementError, RecordingError, VoodooError
+from voodoo.export.people_rows import read_rows
+from voodoo.export.track import Track
 from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
 from voodoo.pipeline.start import Init, start_tracker
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
@@ -199,3 +202,13 @@ def test_no_kind_of_pydantics_errors_is_passed_on():
         context = dict.fromkeys(("gt", "ge", "lt", "le", "min_length", "max_length", "expected", "error"), 1)
         said = expectation({"type": kind, "ctx": context, "input": "x", "msg": "Input should be 7"})
         assert "Input" not in said and (kind == "value_error" or said.startswith("expected "))
+
+
+@pytest.mark.parametrize(
+    "read", [Track.load, read_rows, lambda path: read_positions(path, ("stamp_s",))], ids=["track", "people", "truth"]
+)
+def test_a_header_is_not_dumped(read, tmp_path):
+    (tmp_path / "a.csv").write_text("time," + ",".join(f"{'column' * 8}{number}" for number in range(50)) + "\n1,2\n")
+    with pytest.raises(VoodooError, match=r"expected columns .*stamp_s.*, found time, column") as refused:
+        read(tmp_path / "a.csv")
+    assert len(str(refused.value).removeprefix(str(tmp_path))) < 180 and "['" not in str(refused.value)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from os import PathLike, fspath
@@ -119,6 +119,11 @@ def reason(error: Exception) -> str:
 def shortened(text: str, *, most: int = 300) -> str:
     """Shortened text for a message, since content of a file may have megabytes."""
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def columns_in(header: Sequence[str]) -> str:
+    """The first names of a table's header, for a message."""
+    return shortened(", ".join(header) or "none", most=60)
 
 
 def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Path:
