@@ -21,7 +21,8 @@ from voodoo.live.assembly import Assembler
 from voodoo.live.clock import HostClock
 from voodoo.live.ros2.feed import CAMERA_INFO, IMAGE, TF, RosFeed
 
-BODY, CLOCK = "/humans/bodies/body_1", HostClock()
+PERSON, CLOCK = "p1", HostClock()
+BODY = f"/humans/bodies/{PERSON}"
 
 
 class Skeletons(Node):
@@ -52,8 +53,8 @@ class Skeletons(Node):
             self.frames.feed(arrival, CLOCK.now())
             frame = self.frames.flush(CLOCK.now())
             if frame is not None:
-                step, where = self.follower.step(frame), {"root_frame": self.feed.root_frame, "topic": BODY}
-                for name, message in instant(step.estimates[1], step.bodies[1], person="1", **where).items():
+                step, where = self.follower.step(frame), {"root_frame": self.feed.root_frame, "person": PERSON}
+                for name, message in instant(step.estimates[1], step.bodies[1], **where).items():
                     if name in self.outputs:
                         self.outputs[name].publish(cdr(message))
 

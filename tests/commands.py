@@ -14,11 +14,15 @@ def run(*arguments):
 
 
 def refused(done, *words):
-    """Checks that a command ended with one line of an error, which names `words`."""
+    """Checks that a command ended with one message of an error, which names `words`; its lines are short."""
     assert done.exit_code == 1, done.output
-    assert done.stderr.startswith("voodoo: ") and done.stderr.count("\n") == 1 and len(done.stderr) < 1000, done.stderr
+    first, *more = done.stderr.splitlines()
+    assert first.startswith("voodoo: ") and all(line.startswith("  ") for line in more), done.stderr
+    assert all(len(line) <= 200 or len(line.split()) == 1 for line in (first, *more)), done.stderr
+    said = " ".join(done.stderr.split())
+    assert len(said) < 1000, said
     for word in words:
-        assert word in done.stderr, done.stderr
+        assert word in said, said
 
 
 def load_script(path):

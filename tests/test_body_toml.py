@@ -97,12 +97,12 @@ def test_names_of_any_kind_survive():
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('name = "thing"', "", ["name", "required"]),
-        ('name = "thing"', "name = 3", ["name", "string"]),
-        ('name = "thing"', 'name = "thing"\ncolor = "red"', ["color", "not permitted"]),
-        ("length = 0.2", "length = -0.2", ["limbs.base.shape.length", "greater than 0", "-0.2"]),
+        ('name = "thing"', "", ["name", "found none"]),
+        ('name = "thing"', "name = 3", ["name", "a word"]),
+        ('name = "thing"', 'name = "thing"\ncolor = "red"', ["color", "known key"]),
+        ("length = 0.2", "length = -0.2", ["limbs.base.shape.length", "a number above 0", "-0.2"]),
         ("length = 0.2", "length = inf", ["limbs.base.shape.length", "finite"]),
-        ("length = 0.2, ", "", ["limbs.base.shape.length", "required"]),
+        ("length = 0.2, ", "", ["limbs.base.shape.length", "found none"]),
         ("length = 0.2", "length = 5e9", ["limbs.base.shape", "length"]),
         ("a0 = 0.1, b0 = 0.1, a1 = 0.08", "a0 = 0.0, b0 = 0.1, a1 = 0.0", ["limbs.base.shape", "a0 and a1", "flat"]),
         ('parent = "base"', 'parent = "leg"', ["limbs.arm.parent", "base", "leg"]),

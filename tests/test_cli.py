@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -9,14 +11,17 @@ from typer.testing import CliRunner
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo.cli import running
+from voodoo.cli.common import NO_POSE
 from voodoo.errors import RecordingError
 from voodoo.evaluation import evaluate as evaluate_module
 from voodoo.export.track import Track
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Init, start_tracker
+from voodoo.sensors.adapters.skin import SKIN
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import FrontEndSettings
+from voodoo.visualization.ink import LEFT, RIGHT
 
 
 @pytest.fixture
@@ -44,10 +49,10 @@ def run(monkeypatch, tmp_path):
 
 def assert_one_line(result, code, *words):
     assert result.exit_code == code
-    assert result.stderr.count("\n") == 1, result.stderr
-    assert result.stderr.startswith("voodoo: ")
+    first, *more = result.stderr.splitlines()
+    assert first.startswith("voodoo: ") and all(line.startswith("  ") for line in more), result.stderr
     for word in words:
-        assert word in result.stderr
+        assert word in " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize(
@@ -119,8 +124,8 @@ def test_track_without_start_searches_for_a_person(run):
     run.recording = FakeRecording(frames=8, start=False)
     run.tracker.found_at, run.tracker.gone_at = 2, 6
     done = run("track", "somewhere", "--out", "pose.csv", "--out", "pose.npz", "--overlay", "look.mp4")
-    assert done.exit_code == 0 and done.stderr == "", done.output
-    assert "8 frames, 4 searching, 4 tracking" in done.stdout
+    assert_one_line(done, 0, "only 50 % of the frames are tracking")
+    assert "8 frames, 4 searching, 4 tracking" in done.stdout and "50 % searching, 50 % tracking (docs" in done.stdout
     rows = [row.split(",") for row in Path("pose.csv").read_text().splitlines()[1:]]
     assert [float(row[0]) for row in rows] == run.recording.stamps.tolist()
     status = ["searching"] * 2 + ["tracking"] * 4 + ["searching"] * 2
@@ -138,7 +143,7 @@ def test_track_without_start_searches_for_a_person(run):
 def test_nobody_found_is_a_result_and_one_line(run):
     run.recording = FakeRecording(frames=3, start=False)
     done = run("track", "somewhere", "--out", "pose.csv", "--out", "pose.npz")
-    assert_one_line(done, 0, "nobody was found in 3 frames")
+    assert_one_line(done, NO_POSE, "nobody was found in 3 frames")
     assert "3 frames, 3 searching; wrote pose.csv" in done.stdout
     for name in ("pose.csv", "pose.npz"):
         read = Track.load(name)
@@ -146,7 +151,7 @@ def test_nobody_found_is_a_result_and_one_line(run):
 
 
 def test_init_auto_leaves_the_recordings_start_alone(run):
-    assert run("track", "somewhere", "--init", "auto", "--out", "pose.csv").exit_code == 0
+    assert run("track", "somewhere", "--init", "auto", "--out", "pose.csv").exit_code == NO_POSE
     assert run.options == {"bare": True}
     assert Track.load("pose.csv").status == ("searching",) * 12  # this tracker finds nobody
     assert run("track", "somewhere", "--out", "pose.csv").exit_code == 0
@@ -189,7 +194,7 @@ def test_init_writes_what_init_reads(run):
     assert Init.load(Path("start.json")).joints["l_wrist"] == T_POSE["l_wrist"]
     assert_one_line(run("init", "somewhere", "--at", "7"), 1, "--at: expected 0 to 0.367 s", "found 7")
     run.tracker.found_at = None
-    assert_one_line(run("init", "somewhere"), 1, "found nobody")
+    assert_one_line(run("init", "somewhere"), NO_POSE, "found nobody")
 
 
 def test_boxes_to_leave_out(run):
@@ -215,7 +220,7 @@ def test_eval_can_search_for_the_person(run):
     [
         ("{", ("start.json", "JSON")),
         ('{"joints": {}}', ("start.json", "joints")),
-        ('{"height_m": 1.7}', ("start.json", "joints", "required")),
+        ('{"height_m": 1.7}', ("start.json", "joints", "found none")),
         ('{"joints": {"l_knee": [1, 2]}}', ("start.json", "joints.l_knee")),
         ('{"joints": {"l_knee": [1, 2, "x"]}}', ("start.json", "joints.l_knee.2", "'x'")),
         ('{"joints": {"l_knee": [1, 2, NaN]}}', ("start.json",)),
@@ -308,6 +313,9 @@ def test_demo(run, monkeypatch):
     assert "12 frames, 1 searching, 11 tracking" in result.stdout
     assert "mean joint error  3.0 cm" in result.stdout
     assert sorted(path.name for path in Path("here").iterdir()) == ["overlay.mp4", "pose.csv", "sheet.png"]
+    legend = cv2.imread("here/sheet.png")[-36:].reshape(-1, 3)
+    for color in (LEFT, RIGHT, SKIN):
+        assert (np.abs(legend.astype(int) - color).max(axis=1) < 4).sum() > 20, color
 
 
 def test_eval_writes_reports_and_prints_the_table(run):
@@ -402,3 +410,51 @@ def test_height_option_wins_over_the_start(run):
     assert start_tracker(recording).initial.height == 1.76
     assert start_tracker(recording, height=1.6).initial.height == 1.6
     assert start_tracker(recording, init=Init(height_m=1.5, joints=dict(T_POSE))).initial.height == 1.5
+
+
+def test_nothing_usable_is_no_pose(run):
+    run.recording, run.tracker.refuse_at = FakeRecording(frames=1), 0
+    assert_one_line(
+        run("track", "somewhere"), NO_POSE, "at least one frame that can be used", "1 that the tracker refuses"
+    )
+
+
+def test_the_module_is_the_command():
+    done = subprocess.run([sys.executable, "-m", "voodoo", "track"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("Usage: python -m voodoo track"), done.stderr
+
+
+def test_eval_is_json_or_ten_rows(run):
+    Path("a_depth.mat").touch()
+    rows = [line for line in run("eval", "a_depth.mat", "--jobs", "1").stdout.splitlines() if line.startswith("| ")]
+    assert len(rows) == 11 and rows[0] == "| | |"
+    done = run("eval", "a_depth.mat", "--jobs", "1", "--json", "--out", "report")
+    report = json.loads(done.stdout)
+    assert report["recordings"][0]["tracking_class"] == 2 and report["summaries"][0]["sequences"] == 1
+    assert "NaN" not in done.stdout and "wrote report/sequences.csv" in done.stderr
+    run.tracker.refuse_at = 2
+    failed = run("eval", "a_depth.mat", "--jobs", "1", "--json")
+    assert failed.exit_code == 1 and "frame 2" in json.loads(failed.stdout)["recordings"][0]["failure"]
+
+
+def test_progress_in_a_pipe_is_lines(run, monkeypatch):
+    monkeypatch.setattr("voodoo.cli.common._LINE_S", 0.0)
+    done = run("track", "somewhere", "--out", "pose.csv")
+    assert "voodoo: fake: 7 of 12\n" in done.stderr and "\r" not in done.stderr and "\x1b" not in done.stderr
+
+
+def test_no_line_is_long(run):
+    run.recording = None
+    names = " ".join(f"--with somewhere{number}" for number in range(40))
+    for line in run("track", "nowhere/" + "folder " * 60, *names.split()).stderr.splitlines():
+        assert len(line) <= 200
+
+
+@pytest.mark.parametrize("words", [(), ("--out", "pose.npz")])
+def test_a_minus_is_csv_on_stdout_and_nothing_else(run, words):
+    done = run("track", "somewhere", "--out", "-", *words)
+    assert done.exit_code == 0 and "12 frames, 12 tracking" in done.stderr, done.output
+    Path("read.csv").write_text(done.stdout)
+    assert run("track", "somewhere", "--out", "pose.csv").exit_code == 0
+    assert Path("read.csv").read_text() == Path("pose.csv").read_text() and not Path("-").exists()
+    assert all(name in done.stderr for name in words[1:])

@@ -147,7 +147,7 @@ def test_two_steps_from_the_front_page(question: str):
 def test_names_exist(page: Path):
     """`voodoo.x.Y` in the text can be imported; scripts, examples and files of the crates are there."""
     code = re.findall(r"`([^`]+)`", re.sub(r"\s+", " ", prose(page)))
-    for path in {match for text in code for match in re.findall(r"\bvoodoo(?:\.\w+)+", text)}:
+    for path in {match for text in code for match in re.findall(r"(?<![/\w])voodoo(?:\.\w+)+", text)}:
         parts, found = path.split(".")[1:], voodoo
         for count, part in enumerate(parts, 1):
             if not hasattr(found, part):

@@ -82,7 +82,7 @@ def test_what_was_recorded_is_tracked_again(run):
         np.testing.assert_allclose(again.root_from_sensor, first.root_from_sensor, atol=1e-12)
     assert {sensor.kind for sensor in recording.info().sensors} == {"depth", "scan", "color"}
     names = {topic.name for topic in recording._bag.topics}
-    assert {"/tf", "/humans/bodies/body_1/joint_states", "/humans/bodies/body_1/markers"} <= names
+    assert {"/tf", "/humans/bodies/p1/joint_states", "/humans/bodies/p1/markers"} <= names
 
 
 def test_it_reports_that_it_stores_pictures_of_people(run):
@@ -166,7 +166,7 @@ def test_signals_finish_files(tmp_path, number):
     ("words", "messages"),
     [
         (["nowhere"], "found no such file"),
-        (["ros2:"], "ros2:TOPIC"),
+        (["ros2:,"], "ros2:TOPIC"),
         ([sample_path(), "--rate", "0"], "rate: expected a number above 0"),
         ([sample_path(), "--out", "pose.xyz"], "expected a name that ends in"),
         ([sample_path(), "--calibration", "a.toml"], "a recording brings its own"),

@@ -1,5 +1,6 @@
 """ROS 2 messages of a live source, without a network: what they become, and what is published."""
 
+import time
 from itertools import pairwise
 
 import cv2
@@ -8,13 +9,19 @@ import pytest
 
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
-from voodoo.export.ros2 import cdr
-from voodoo.live import Faults, Step
+from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr
+from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
+from voodoo.live.ros2.dds import Offer
 from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
-from voodoo.live.ros2.publisher import TRACKED, Ros2Output
-from voodoo.live.ros2.types import IDS, STORE, dds_name, ros_name
+from voodoo.live.ros2.listing import listing
+from voodoo.live.ros2.publisher import RESET, Ros2Output
+from voodoo.live.ros2.types import dds_name, ros_name
+from voodoo.live.session import Output, Session
+from voodoo.live.source import SourceGone
+from voodoo.live.sources.played import PlayedSource
+from voodoo.live.sources.ros2 import Ros2Source
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
 from voodoo.pipeline.run import start_tracker, track
 from voodoo.pipeline.search import nobody
@@ -191,9 +198,10 @@ class FakeNode:
     """Keeps what is published."""
 
     def __init__(self):
-        self.sent = []
+        self.sent, self.heard = [], {}
+        self.offered, self.published = {}, {}
 
-    def advertise(self, topic, kind, *, depth=10):
+    def advertise(self, topic, kind, *, depth=10, latched=False):
         node = self
 
         class Publication:
@@ -201,6 +209,23 @@ class FakeNode:
                 node.sent.append((topic, STORE.deserialize_cdr(message, kind)))
 
         return Publication()
+
+    def subscribe(self, topic, offer, *, depth=5):
+        self.heard[topic] = [b""] * self.published.get(topic, 0)
+        node = self
+
+        class Subscription:
+            def take(self):
+                taken, node.heard[topic] = node.heard[topic], []
+                return taken
+
+        return Subscription()
+
+    def offers(self):
+        return self.offered
+
+    def wait(self, seconds):
+        time.sleep(seconds)
 
     def take(self):
         sent, self.sent = self.sent, []
@@ -220,8 +245,15 @@ def test_what_is_published_has_the_stamps_of_the_data():
         return node.take()
 
     sent = publish(step.estimate.stamp, step.estimate)
-    body = "/humans/bodies/body_1"
-    assert set(sent) == {"/tf", f"{body}/joint_states", f"{body}/markers", f"{body}/pose", TRACKED}
+    body = "/humans/bodies/p1"
+    assert set(sent) == {
+        "/tf",
+        f"{body}/joint_states",
+        f"{body}/markers",
+        f"{body}/pose",
+        TRACKED,
+        "/human_description_p1",
+    }
     stamps = {
         (message.header.stamp.sec, message.header.stamp.nanosec)
         for message in (
@@ -232,9 +264,9 @@ def test_what_is_published_has_the_stamps_of_the_data():
     }
     assert stamps == {divmod(round(step.estimate.stamp * 1e9), 1_000_000_000)}
     names = {transform.child_frame_id: transform.header.frame_id for transform in sent["/tf"][0].transforms}
-    assert names["body_1"] == "base_link"
-    assert names["l_elbow_1"] == "l_shoulder_1"
-    assert sent[TRACKED][0].ids == ["1"]
+    assert names["body_p1"] == "base_link"
+    assert names["l_elbow_p1"] == "l_shoulder_p1"
+    assert sent[TRACKED][0].ids == ["p1"]
     gone = publish(step.estimate.stamp + 0.1, nobody(step.estimate.stamp + 0.1))
     assert set(gone) == {f"{body}/markers", TRACKED}
     assert [marker.action for marker in gone[f"{body}/markers"][0].markers] == [3], "they are deleted"
@@ -262,3 +294,56 @@ def test_a_whole_recording_goes_through_the_bus():
         assert found.camera == item.camera
         np.testing.assert_allclose(found.root_from_sensor, item.root_from_sensor, atol=1e-12)
     assert str(rig.steps[-1].estimates[1].status) == "tracking"
+
+
+def test_what_is_published_is_listed_with_type_and_rate():
+    node = FakeNode()
+    kinds = {"/tf": TF, "/depth": IMAGE, "/scan": SCAN, "/speech": "std_msgs/msg/String"}
+    node.offered = {topic: Offer(kind, reliable=True, latched=False) for topic, kind in kinds.items()}
+    node.published = {"/depth": 6, "/tf": 3}
+    lines = listing(node, seconds=0.2)
+    assert [line.split()[0] for line in lines] == ["/depth", "/scan", "/speech", "/tf"], "what is tracked comes first"
+    depth, scan, speech, tf = (line.split("  ")[1:] for line in lines)
+    assert depth[0] == IMAGE and 15.0 < float(depth[1].split()[0]) <= 30.0 and scan[1] == "0.0 Hz"
+    assert speech == ["std_msgs/msg/String"] and tf[0] == TF
+
+
+def test_a_wrong_topic_says_which_there_are(monkeypatch):
+    node = FakeNode()
+    node.offered = {
+        "/depth": Offer(IMAGE, reliable=True, latched=False),
+        "/tf": Offer(TF, reliable=True, latched=False),
+    }
+    monkeypatch.setattr("voodoo.live.sources.ros2.Node", lambda: node)
+    monkeypatch.setattr("voodoo.live.sources.ros2._DISCOVERY_S", 0.0)
+    with pytest.raises(SourceGone, match=r"/wrong: expected somebody .* published are /depth$"):
+        Ros2Source(["/wrong"]).open(HandClock(1.0), Faults(None))
+
+
+def test_a_message_lets_everybody_be_searched_for_again():
+    node, asked = FakeNode(), []
+    output = Ros2Output(lambda: "base_link", node=node)
+    output.on_reset = lambda: asked.append(True)
+    step = Step(LiveFrame(2.0, (), 1, 0.0, 0.0, False), {1: nobody(2.0)}, {1: voodoo.Body.human()}, 0.0)
+    output.publish(step)
+    assert asked == []
+    node.heard[RESET] = [b"", b""]
+    output.publish(step)
+    assert asked == [True]
+    # and the session forgets everybody
+    messages, statuses = [], []
+
+    class Asks(Output):
+        def publish(self, step):
+            statuses.append(str(step.estimates[1].status))
+            if len(statuses) == 15:
+                self.on_reset()
+
+    source = PlayedSource(open_recording(sample_path(), use=("depth",)), rate=3.0)
+    with Live([source], on_message=messages.append) as live:
+        session = Session(live, lambda _: follower_of(), outputs=[Asks()])
+        while session.wait(0.05):
+            pass
+        session.finish()
+    assert any(message.startswith("reset") for message in messages)
+    assert statuses[14] != "searching" and "searching" in statuses[15:20] and statuses[-1] == "tracking"

@@ -1,15 +1,21 @@
 """What cannot be meant is refused by name, with what was expected and what was found."""
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
+from pydantic_core.core_schema import ErrorType
 
 import voodoo
 from voodoo.errors import BodyError, ConfigError, MeasurementError, RecordingError, VoodooError
+from voodoo.export.people_rows import read_rows
+from voodoo.export.track import Track
+from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
-from voodoo.pipeline.start import start_tracker
+from voodoo.pipeline.start import Init, start_tracker
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
@@ -50,14 +56,14 @@ def skin(image, camera=CAMERA):
             ConfigError,
             "config: expected a voodoo.Config, found dict",
         ),
-        (lambda: voodoo.Joint(name="grip", weight="x"), BodyError, "Joint: weight: input should be a valid number"),
-        (lambda: voodoo.Joint(weight=2.0), BodyError, "Joint: name: field required"),
+        (lambda: voodoo.Joint(name="grip", weight="x"), BodyError, "Joint: weight: expected a number, found"),
+        (lambda: voodoo.Joint(weight=2.0), BodyError, "Joint: name: expected an entry, found none"),
         (
             lambda: voodoo.Joint(name="grip", on_parent={"position": (0.0, NAN, 0.0)}),
             BodyError,
-            "Joint: on_parent.position.1: input should be a finite number, found nan",
+            "Joint: on_parent.position.1: expected a finite number, found nan",
         ),
-        (lambda: voodoo.Place(rotation="x"), BodyError, "Place: rotation: input should be a valid tuple, found 'x'"),
+        (lambda: voodoo.Place(rotation="x"), BodyError, "Place: rotation: expected a list of numbers, found 'x'"),
         (lambda: voodoo.Body.from_toml(None), BodyError, "body: expected TOML text, found NoneType"),
         (
             lambda: voodoo.render_depth(voodoo.Body.human(height=1.7), [HERE], camera=CAMERA),
@@ -167,3 +173,42 @@ def test_inputs_that_the_recording_has_not(recording):
 def test_a_marker_that_stands_for_no_site(recording):
     with pytest.raises(VoodooError, match=r"marker LWRA: expected one of the sites .*l_wrist.*, found 'l_wirst'"):
         start_tracker(recording, markers=MarkerMap(sites={"LWRA": "l_wirst"}))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"joints": {}}', "joints: expected at least 1 entries, found {}"),
+        ('{"height_m": 1.7}', "joints: expected an entry, found none"),
+        ('{"joints": 3}', "joints: expected a table of names, found 3"),
+        ('{"joints": {"l_knee": [1, 2]}}', "joints.l_knee.2: expected an entry, found none"),
+        ('{"joints": {"l_knee": [1, 2, 3, 4]}}', "joints.l_knee: expected at most 3 entries"),
+        ('{"joints": {"l_knee": [1, 2, "x"]}}', "joints.l_knee.2: expected a number, found 'x'"),
+        ('{"height_m": 176, "joints": {"l_knee": [1, 2, 3]}}', "height_m: expected a number below 3, found 176"),
+        ('{"heigth_m": 1.7, "joints": {"l_knee": [1, 2, 3]}}', "heigth_m: expected a known key, found 1.7"),
+        ("{", "expected JSON, found EOF"),
+    ],
+)
+def test_refusals_of_files_are_sentences_of_our_own(text, words, tmp_path):
+    (tmp_path / "start.json").write_text(text)
+    with pytest.raises(VoodooError) as refused:
+        Init.load(tmp_path / "start.json")
+    assert words in str(refused.value) and "should" not in str(refused.value)
+
+
+def test_no_kind_of_pydantics_errors_is_passed_on():
+    """Also those that no file causes today: an unknown kind is still expected and found."""
+    for kind in get_args(ErrorType):
+        context = dict.fromkeys(("gt", "ge", "lt", "le", "min_length", "max_length", "expected", "error"), 1)
+        said = expectation({"type": kind, "ctx": context, "input": "x", "msg": "Input should be 7"})
+        assert "Input" not in said and (kind == "value_error" or said.startswith("expected "))
+
+
+@pytest.mark.parametrize(
+    "read", [Track.load, read_rows, lambda path: read_positions(path, ("stamp_s",))], ids=["track", "people", "truth"]
+)
+def test_a_header_is_not_dumped(read, tmp_path):
+    (tmp_path / "a.csv").write_text("time," + ",".join(f"{'column' * 8}{number}" for number in range(50)) + "\n1,2\n")
+    with pytest.raises(VoodooError, match=r"expected columns .*stamp_s.*, found time, column") as refused:
+        read(tmp_path / "a.csv")
+    assert len(str(refused.value).removeprefix(str(tmp_path))) < 180 and "['" not in str(refused.value)

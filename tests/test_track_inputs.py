@@ -103,7 +103,7 @@ def test_every_format_reports_the_same_to_an_independent_reader(run):
             tf = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages() if c.topic == "/tf"]
         assert len(tf) == FRAMES
         assert tf[0].transforms[0].header.frame_id == "base_link"
-        assert tf[0].transforms[0].child_frame_id == "body_voodoo"
+        assert tf[0].transforms[0].child_frame_id == "body_p1"
 
 
 def test_outputs_are_refused_before_the_work(run):

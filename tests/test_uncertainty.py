@@ -122,7 +122,7 @@ def test_a_bag_has_the_body_with_its_covariance_and_ellipsoids(tmp_path, estimat
             topic: [
                 reader.deserialize(raw, connection.msgtype)
                 for connection, _, raw in reader.messages()
-                if connection.topic == f"/humans/bodies/voodoo/{topic}"
+                if connection.topic == f"/humans/bodies/p1/{topic}"
             ]
             for topic in ("pose", "markers")
         }

@@ -14,6 +14,7 @@ import typer.main
 
 from voodoo import Config
 from voodoo.cli import app as command_line_app
+from voodoo.cli.common import EXIT_CODES
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -32,6 +33,13 @@ def command_line() -> str:
     """Every command with its arguments and options."""
     group: Any = typer.main.get_command(command_line_app)
     return "\n".join(line for name, command in group.commands.items() for line in _command(name, command))
+
+
+def exit_codes() -> str:
+    """The table of exit codes."""
+    return "\n".join(
+        ["| exit code | meaning |", "|---|---|", *(f"| {code} | {words} |" for code, words in EXIT_CODES.items())]
+    )
 
 
 def _command(name: str, command: Any) -> list[str]:  # noqa: ANN401 - a class of whichever click typer brings
@@ -125,7 +133,7 @@ def project_file(name: str) -> str:
     return LINK.sub(link, (ROOT / name).read_text(encoding="utf-8"))
 
 
-GENERATED = {"command_line": command_line, "configuration": configuration}
+GENERATED = {"command_line": command_line, "exit_codes": exit_codes, "configuration": configuration}
 
 
 def fill(app: Sphinx, docname: str, source: list[str]) -> None:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 import voodoo._core as _core
 from voodoo.errors import ConfigError
-from voodoo.model.joint import short
+from voodoo.model.joint import expectation
 from voodoo.model.toml_io import commented, edited, parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
@@ -43,7 +43,7 @@ def _message(what: str, error: ValidationError) -> str:
         if item["type"] == "extra_forbidden":
             problems.append(f"{key}: unknown key; known are {', '.join(_FIELDS)}")
         else:
-            problems.append(f"{key}: {item['msg'][0].lower()}{item['msg'][1:]}, found {short(item['input'])}")
+            problems.append(f"{key}: {expectation(item)}")
     return f"{what}: " + "; ".join(problems)
 
 

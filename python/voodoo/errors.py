@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from os import PathLike, fspath
@@ -45,6 +45,10 @@ class RecordingError(VoodooError):
         """Store the message, reason and hint."""
         super().__init__(message)
         self.reason, self.hint = reason, hint
+
+
+class NoPoseError(VoodooError):
+    """Nothing in a recording could be used, or nobody was found in it."""
 
 
 class DetectorWarning(UserWarning):
@@ -115,6 +119,11 @@ def reason(error: Exception) -> str:
 def shortened(text: str, *, most: int = 300) -> str:
     """Shortened text for a message, since content of a file may have megabytes."""
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def columns_in(header: Sequence[str]) -> str:
+    """The first names of a table's header, for a message."""
+    return shortened(", ".join(header) or "none", most=60)
 
 
 def a_path(path: object, *, error: type[VoodooError], name: str = "path") -> Path:

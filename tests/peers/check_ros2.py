@@ -13,10 +13,9 @@ import pytest
 from live_camera import CAMERA, pictures
 
 import voodoo
-from voodoo.export.ros2 import cdr
+from voodoo.export.ros2 import STORE, cdr
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
 from voodoo.live.ros2.dds import Node, Offer
-from voodoo.live.ros2.types import STORE
 from voodoo.measurements import DepthImage, LaserScan, PointCloud
 
 HERE = Path(__file__).resolve().parent
@@ -76,7 +75,7 @@ def test_depth_arrives_and_skeletons_come_back(images, tmp_path, quality):
     assert set(stamps) <= set(theirs["sent"]), "the stamps of the data"
     assert stamps == sorted(stamps)
     assert np.median([latency for _, latency in theirs["states"]]) < 0.040
-    assert "l_elbow_1" in theirs["names"]
+    assert "l_elbow_p1" in theirs["names"]
     assert set(report["faults"]) <= {"stalled", "gone"}, report["faults"]
     print(report["latency_ms"], np.percentile([latency for _, latency in theirs["states"]], (50, 99)))
 
@@ -205,7 +204,7 @@ def test_bodies_before_a_camera_that_moves_come_back_as_transforms(images, tmp_p
         out.write(cdr(transforms("odom", "base_link", due, odom_from_base)))
         for raw in received.take():
             for one in STORE.deserialize_cdr(raw, kind).transforms:
-                if one.child_frame_id == "body_1":
+                if one.child_frame_id == "body_p1":
                     assert one.header.frame_id == "odom"
                     stamp = one.header.stamp.sec * 1_000_000_000 + one.header.stamp.nanosec
                     bodies[stamp] = one.transform.translation
@@ -241,7 +240,7 @@ def test_the_node_for_those_who_have_ros(images):
     stamps = [stamp for stamp, _ in theirs["states"]]
     assert len(stamps) == len(theirs["markers"]) > 0.2 * COUNT
     assert set(stamps) <= set(theirs["sent"])
-    assert "l_elbow_1" in theirs["names"]
+    assert "l_elbow_p1" in theirs["names"]
 
 
 def test_offers_are_visible_with_their_quality():

@@ -36,8 +36,8 @@ class Peer(Node):
         qos = qos_profile_sensor_data if sensor_data else QoSProfile(depth=queue)
         self.pictures = self.create_publisher(Image, topic, qos)
         self.infos = self.create_publisher(CameraInfo, topic.rsplit("/", 1)[0] + "/camera_info", qos)
-        self.create_subscription(JointState, "/humans/bodies/body_1/joint_states", self.take_state, 50)
-        self.create_subscription(MarkerArray, "/humans/bodies/body_1/markers", self.take_markers, 50)
+        self.create_subscription(JointState, "/humans/bodies/p1/joint_states", self.take_state, 50)
+        self.create_subscription(MarkerArray, "/humans/bodies/p1/markers", self.take_markers, 50)
         self.sent, self.states, self.markers, self.names = [], [], [], []
 
     def send(self, number):

@@ -7,8 +7,20 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, print_interrupted, print_message, progressing
-from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, PeopleOption, StrictOption, UseOption
+from voodoo.cli.common import clear_errors, loader_words, print_interrupted, print_message, progressing, reporting
+from voodoo.cli.options import (
+    ConfigOption,
+    FrameOption,
+    JsonOption,
+    LayoutOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    PeopleOption,
+    StrictOption,
+    TopicOption,
+    UseOption,
+)
 from voodoo.cli.signals import deferred
 
 
@@ -37,8 +49,13 @@ def batch_command(
     model: ModelOption = None,
     use: UseOption = None,
     people: PeopleOption = "1",
+    topic: TopicOption = None,
+    frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
     strict: StrictOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Track many recordings, on this machine or on a cluster, one task each.
 
@@ -66,11 +83,11 @@ def batch_command(
     from voodoo.cli.people import limit_of
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.config import Config
-    from voodoo.errors import VoodooError
+    from voodoo.errors import NoPoseError, VoodooError
     from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
-    with clear_errors():
+    with clear_errors(), reporting(as_json) as report:
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         _, limit = limit_of(people)
@@ -80,6 +97,7 @@ def batch_command(
             init=init,
             model=model,
             loader=loader,
+            options=loader_words(topic, option, frame=frame, layout=layout),
             people=limit,
             strict=strict,
             config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},
@@ -105,14 +123,21 @@ def batch_command(
                         batch.take(row)
                         if row.status == FAILED:
                             print_message(f"{row.recording}: {row.error}")
+                        elif not row.persons:
+                            print_message(f"{row.recording}: nobody was found in {row.frames} frames")
                 finally:
                     batch.save()
                 interrupted = stop.is_set()
         ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
         done = sum(row.status == DONE for row in ours)
         message = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
+        if report is not None:
+            report |= {"out": out, "recordings": list(batch.rows.values())}
         print_interrupted(interrupted, message)
-        typer.echo(message)
+        if report is None:
+            typer.echo(message)
         broken = [row for row in ours if row.status == FAILED]
         if broken:
             raise VoodooError(f"{len(broken)} recordings failed, the first: {broken[0].recording}: {broken[0].error}")
+        if batch.rows and not any(row.persons for row in batch.rows.values()):
+            raise NoPoseError(f"nobody was found in any of {len(batch.rows)} recordings")

@@ -3,21 +3,37 @@
 from __future__ import annotations
 
 import sys
+import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr
+from math import isfinite
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import typer
 
 from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.cli.terminal import Escaped
-from voodoo.errors import VoodooError, reason
+from voodoo.errors import NoPoseError, VoodooError, reason
 
 T = TypeVar("T")
+WIDTH = 200
+"""Longest line that is printed, but for names without spaces."""
+_LINE_S = 5.0
+FAILED, NO_POSE = 1, 3
+EXIT_CODES = {
+    0: "success; of a command that tracks: at least one pose",
+    FAILED: "refused or failed; one line names what was expected and found",
+    2: "a wrong option",
+    NO_POSE: "no pose: nothing could be used, or nobody was found; files that tell so are written",
+    INTERRUPTED: "ended by Ctrl-C (128 + SIGINT); the frames up to there are written",
+    143: "ended by SIGTERM (128 + 15), as by Ctrl-C",
+    129: "ended by SIGHUP (128 + 1), as by Ctrl-C",
+}
+"""What the exit codes of all commands mean; Typer uses 2."""
 
 
 def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
@@ -56,6 +72,18 @@ def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
     return numbers
 
 
+def loader_words(
+    topic: Sequence[str] | None, option: Sequence[str] | None, *, frame: str | None = None, layout: str | None = None
+) -> dict[str, Any]:
+    """Options of `open_recording` from --topic, --option, --frame and --layout, without those that are not given.
+
+    Raises:
+        VoodooError: see `topics_of` and `numbers_of`.
+    """
+    given = {"root_frame": frame, "layout": layout}
+    return topics_of(topic) | numbers_of(option) | {name: word for name, word in given.items() if word is not None}
+
+
 def refuse_both(name: str, value: object, **others: object) -> None:
     """Reject options that exclude another one; None: not given.
 
@@ -72,8 +100,14 @@ def states(status: Iterable[str]) -> str:
     return ", ".join(f"{count} {word}" for word, count in Counter(status).items())
 
 
+def print_result(message: str, targets: Iterable[Path]) -> None:
+    """The last lines of a command on stdout; on stderr if a target is stdout."""
+    print_text(message, err=Path("-") in targets)
+
+
 def wrote(files: Sequence[Path]) -> str:
     """The end of a message that names the written files; empty without any."""
+    files = [file for file in files if str(file) != "-"]
     return f"; wrote {' and '.join(map(str, files))}" if files else ""
 
 
@@ -88,13 +122,21 @@ def refuse_missing(failures: Iterable[Exception | None], done: str) -> None:
 
 
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
-    """Show a progress bar on stderr, if it is a terminal."""
+    """Show a progress bar on stderr; if it is no terminal, a line every few seconds."""
+    if not sys.stderr.isatty():
+        told = time.monotonic()
+        for count, item in enumerate(items, 1):
+            yield item
+            if time.monotonic() - told > _LINE_S:
+                told = time.monotonic()
+                print_message(f"{words}: {count} of {total}")
+        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(file=getattr(sys.stderr, "stream", sys.stderr))  # whose commands are Rich's own
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:
+    with Progress(*columns, console=console, transient=True) as progress:
         with redirect_stderr(Escaped(sys.stderr)):  # Rich writes lines above the bar
             yield from progress.track(items, total=total, description=words)
 
@@ -123,7 +165,7 @@ def print_interrupted(interrupted: bool, done: str) -> None:
 
 @contextmanager
 def clear_errors() -> Iterator[None]:
-    """Convert expected errors to one line on stderr and exit code 1.
+    """Convert expected errors to one line on stderr and the exit code FAILED or NO_POSE.
 
     NumPy's warnings (e.g. on overflow in a damaged file) are suppressed; -W shows them.
     """
@@ -134,7 +176,7 @@ def clear_errors() -> Iterator[None]:
             yield
     except VoodooError as error:
         hint = getattr(error, "hint", "")
-        _fail(str(error), hint)
+        _fail(str(error), hint, code=NO_POSE if isinstance(error, NoPoseError) else FAILED)
     except MemoryError:
         _fail("expected enough memory for this recording, found too little")
     except OSError as error:
@@ -142,12 +184,50 @@ def clear_errors() -> Iterator[None]:
 
 
 def print_message(message: str) -> None:
-    """One line on stderr."""
-    typer.echo(f"voodoo: {' '.join(message.split())}", err=True)
+    """One line on stderr, or several if it is long."""
+    print_text(f"voodoo: {' '.join(message.split())}", err=True)
 
 
-def _fail(message: str, hint: str = "") -> None:
+def print_text(text: str, *, err: bool = False) -> None:
+    """Lines on stdout or stderr; one of more than WIDTH characters goes on in the next line."""
+    from textwrap import wrap
+
+    for line in text.splitlines():
+        how: Any = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
+        typer.echo(line if len(line) <= WIDTH else "\n".join(wrap(line, WIDTH, drop_whitespace=True, **how)), err=err)
+
+
+def print_json(value: object) -> None:
+    """A value on stdout as JSON: dataclasses are objects, what is not known (NaN) is null."""
+    import json
+
+    typer.echo(json.dumps(_plain(value), indent=2, ensure_ascii=False))
+
+
+@contextmanager
+def reporting(as_json: bool) -> Iterator[dict[str, Any] | None]:
+    """An object that is printed as JSON at the end, whatever happens; None without --json."""
+    report: dict[str, Any] = {}
+    try:
+        yield report if as_json else None
+    finally:
+        if report:
+            print_json(report)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    value = {name: getattr(value, name) for name in getattr(value, "__dataclass_fields__", ())} or value
+    if isinstance(value, Mapping):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if isfinite(value) else None
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
+
+
+def _fail(message: str, hint: str = "", *, code: int = FAILED) -> None:
     print_message(message)
     if hint:
         typer.echo(hint, err=True)
-    raise typer.Exit(1)
+    raise typer.Exit(code)

@@ -9,7 +9,7 @@ import typer
 
 from voodoo.cli.common import clear_errors, refuse_missing, states
 from voodoo.cli.signals import INTERRUPTED
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError
 
 
 def demo_command(
@@ -30,6 +30,7 @@ def demo_command(
     from voodoo.pipeline.start import AUTO, start_tracker
     from voodoo.recordings.sample import sample_path
     from voodoo.visualization.image_writer import save_picture
+    from voodoo.visualization.overlay import legend
     from voodoo.visualization.sheet import contact_sheet
 
     with clear_errors():
@@ -46,9 +47,10 @@ def demo_command(
         result = Track.of(estimates, body=tracker.body)
         result.save(out / "pose.csv")
         refuse_missing(failures, f"wrote {out / 'pose.csv'}")
-        save_picture(out / "sheet.png", contact_sheet(sheet, columns=3))
+        pictures = contact_sheet(sheet, columns=3)
+        save_picture(out / "sheet.png", np.vstack([pictures, legend(pictures.shape[1])]))
         if not result.found.any():
-            raise VoodooError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
+            raise NoPoseError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
         errors = compare(source, result)
         typer.echo(f"{source.name}: {len(result)} frames, {states(result.status)}")
         typer.echo(

@@ -8,8 +8,27 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, print_interrupted, progressing, until_interrupted
-from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
+from voodoo.cli.common import (
+    clear_errors,
+    loader_words,
+    print_interrupted,
+    print_message,
+    print_text,
+    progressing,
+    reporting,
+    until_interrupted,
+)
+from voodoo.cli.options import (
+    ConfigOption,
+    FrameOption,
+    JsonOption,
+    LayoutOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    TopicOption,
+    UseOption,
+)
 from voodoo.cli.signals import deferred
 
 
@@ -38,14 +57,18 @@ def eval_command(
             metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
         ),
     ] = None,
+    topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Track recordings with ground truth or a reference skeleton, and evaluate the result.
 
-    Prints the table over all sequences. With --out also sequences.csv (a row per recording), frames/NAME.csv (a row per frame),
-    summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be tracked to its
-    end. Ctrl-C keeps the recordings that are done and ends with exit code 130.
+    Prints ten rows over all sequences. --out writes all measures: sequences.csv (a row per recording), frames/NAME.csv (a row
+    per frame), summary.csv, summary.md, errors.png and calibration.png. Ends with exit code 1 if a recording could not be
+    tracked to its end. Ctrl-C keeps the recordings that are done and ends with exit code 130.
 
     A recording with truth_people.csv beside it is tracked with --people any and evaluated for MOTA, IDF1, identity switches,
     false bodies and joints. With --result a .csv of any program is evaluated: stamp_s, person, status, residual_m, then
@@ -68,49 +91,66 @@ def eval_command(
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.figure import new_figure
     from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
-    from voodoo.evaluation.report import markdown, write_reports
+    from voodoo.evaluation.report import brief, write_reports
     from voodoo.evaluation.search import find_recordings
+    from voodoo.evaluation.summary import summarize
     from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
-    with clear_errors():
+    with clear_errors(), reporting(as_json) as report:
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         automatic = None if init is None else AUTO
+        options = loader_words(topic, option, frame=frame, layout=layout)
         config_of(config)  # an invalid file is one error here instead of one per recording
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
             check_outputs([out], paths)
         if result is not None:
-            show_people([judged(paths, result, loader, frame)], out)
+            show_people([judged(paths, result, loader, options)], out, report=report)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         several = [path for path in paths if has_people(path)]
         judgments = list(
             progressing(
-                evaluate_all_people(several, config_file=config, loader=loader, model=model, use=kinds),
+                evaluate_all_people(
+                    several, config_file=config, loader=loader, options=options, model=model, use=kinds
+                ),
                 "following everybody",
                 len(several),
             )
         )
         if several:
-            show_people(judgments, out)
+            show_people(judgments, out, report=report)
             refuse_failures(judgments)
         paths = [path for path in paths if path not in several]
         if not paths:
             return
         if out is not None:
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
+        done = evaluate_all(
+            paths,
+            config_file=config,
+            loader=loader,
+            options=options,
+            model=model,
+            use=kinds,
+            init=automatic,
+            jobs=jobs,
+        )
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
-        if scores:
-            typer.echo(markdown(scores, tables))
+        if report is not None:
+            report |= {"summaries": summarize(scores), "recordings": scores}
+        elif scores:
+            print_text(brief(scores))
+            if out is None:
+                typer.echo("--out DIR writes all measures, a row for every recording, and one for every frame")
         if out is not None and scores:
             with deferred():
                 files = write_reports(out, scores, tables, picture=not interrupted)
-            typer.echo("wrote " + ", ".join(str(file) for file in files))
+            (print_message if as_json else typer.echo)("wrote " + ", ".join(str(file) for file in files))
         print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
         refuse_failures(scores)

@@ -10,13 +10,13 @@ import typer
 
 from voodoo.cli.common import (
     clear_errors,
-    numbers_of,
+    loader_words,
     print_interrupted,
+    print_result,
     progressing,
     refuse_both,
     refuse_missing,
     states,
-    topics_of,
     wrote,
 )
 from voodoo.cli.options import (
@@ -25,6 +25,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -33,7 +34,7 @@ from voodoo.cli.options import (
 )
 from voodoo.cli.paths import check_paths
 from voodoo.cli.signals import deferred
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError
 
 
 def ik_command(
@@ -76,6 +77,7 @@ def ik_command(
     frame: FrameOption = None,
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Compute postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
@@ -102,7 +104,7 @@ def ik_command(
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         beginning = beginning_of(init)
-        source = opened(recording, loader, frame, **topics_of(topic), **numbers_of(option))
+        source = opened(recording, loader, frame, **loader_words(topic, option, layout=layout))
         files = out or [Path(f"{source.name}_ik.csv")]
         for file in files:
             check_target(file)
@@ -117,7 +119,7 @@ def ik_command(
             model=model,
         )
         if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
-            raise VoodooError(
+            raise NoPoseError(
                 f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
             )
         known = None if sites is None else tuple(name.strip() for name in sites.split(","))
@@ -134,8 +136,8 @@ def ik_command(
             done, failed = written(files, write)
         for name, values in errors.items():
             if np.isfinite(values).any():
-                typer.echo(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error")
+                print_result(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error", files)
         message = f"{len(result)} frames, {states(result.status)}{wrote(done)}"
         refuse_missing(failed, message)
         print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
-        typer.echo(message)
+        print_result(message, files)

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
+from voodoo.cli.common import clear_errors, loader_words, refuse_both
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
     ExcludeOption,
     FrameOption,
     HeightOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -21,7 +22,7 @@ from voodoo.cli.options import (
     TopicOption,
     UseOption,
 )
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError, VoodooError
 
 
 def init_command(
@@ -44,12 +45,13 @@ def init_command(
     frame: FrameOption = None,
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Find the first pose and write it as JSON for --init of voodoo track.
 
     It is the pose in the first frame at or after S in which a person is found: joints in meters in the recording's root frame,
     the stature, and the frame's stamp. A start, truth or reference beside the recording is not read. If the pose is wrong, edit
-    the file before giving it to voodoo track. Exit code 1 if no person is found.
+    the file before giving it to voodoo track. Exit code 3 if no person is found.
 
     Examples
 
@@ -70,7 +72,7 @@ def init_command(
         refuse_both("--body", body, **{"--height": height, "--model": model})
         kinds, boxes = kinds_of(use), boxes_of(exclude)
         left_out = LeftOut()
-        options = topics_of(topic) | numbers_of(option)
+        options = loader_words(topic, option, layout=layout)
         source = opened(recording, loader, frame, bare=True, left_out=left_out, **options)
         about = source.info()
         after = about.start_stamp
@@ -92,7 +94,7 @@ def init_command(
         settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
         estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
         if estimate is None:
-            raise VoodooError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
+            raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
         text = pose_as_init(estimate, tracker.body).to_json()
         if out is None:
             typer.echo(text)

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, numbers_of, print_message, refuse_both, topics_of
+from voodoo.cli.common import (
+    clear_errors,
+    loader_words,
+    print_message,
+    print_text,
+    refuse_both,
+)
 from voodoo.cli.options import (
     BodyOption,
     ConfigOption,
@@ -17,6 +23,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    LayoutOption,
     LoaderNumberOption,
     LoaderOption,
     ModelOption,
@@ -27,6 +34,7 @@ from voodoo.cli.options import (
     ViewOption,
 )
 from voodoo.cli.signals import INTERRUPTED
+from voodoo.errors import NoPoseError
 
 
 def live_command(
@@ -93,12 +101,16 @@ def live_command(
     topic: TopicOption = None,
     option: LoaderNumberOption = None,
     loader: LoaderOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
 
     Ends after --duration, with the recording, or with Ctrl-C, SIGTERM or SIGHUP; then files are completed.
     Every second a line on stderr has rate, latency, drops and the status of each person.
     Faults of the source are reported there and counted.
+
+    voodoo live ros2: prints the topics that are published, with type and rate. A message on /voodoo/reset (std_msgs/Empty)
+    forgets everybody and searches again.
 
     Examples
 
@@ -114,12 +126,17 @@ def live_command(
     from voodoo.cli.people import limit_of, no_starts
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
-    from voodoo.export.files import check_target
+    from voodoo.export.files import STDOUT, check_target
     from voodoo.pipeline.start import beginning_of
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         refuse_both("--view", view or None, **{"--serve": serve})
+        if list(sources) == ["ros2:"]:
+            from voodoo.live.ros2.listing import listing
+
+            print_text("\n".join(listing() or ["nothing is published on this network"]))
+            return
         several, limit = limit_of(people)
         for target in out or ():
             check_target(target)
@@ -142,7 +159,7 @@ def live_command(
             serve=serve,
             publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,
         )
-        options: dict[str, Any] = {**topics_of(topic), **numbers_of(option)}
+        options = loader_words(topic, option, layout=layout)
         if loader is not None:
             options["loader"] = loader
         source = entered(
@@ -151,6 +168,9 @@ def live_command(
         recover_before([*wishes.targets, *([record] if record is not None else [])])
         done = run(source, wishes, duration=duration, report=report)
         for path in done.written:
-            print_message(f"wrote {path}")
+            if path != STDOUT:
+                print_message(f"wrote {path}")
         if done.ended:
             raise typer.Exit(INTERRUPTED)
+        if not done.with_pose:
+            raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")

@@ -84,9 +84,10 @@ class Wishes:
 
 @dataclass
 class Done:
-    """Result of a session: whether a signal ended it, and the written files."""
+    """Result of a session: whether a signal ended it, the number of steps with a person, and the written files."""
 
     ended: bool = False
+    with_pose: int = 0
     written: list[Path] = field(default_factory=list)
 
 
@@ -135,7 +136,7 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
                 if report is not None:
                     write_report(report, session)
         print_message(f"{session.line()}; {session.published} published")
-        done.ended = ended.is_set()
+        done.ended, done.with_pose = ended.is_set(), session.with_pose
         if files is not None:
             done.written += files.written
         done.written += [path for path in (wishes.record, report) if path is not None and path.exists()]
@@ -291,4 +292,4 @@ def warm_up() -> None:
     for number in range(3):
         item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
         step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
-    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="1", topic="/warm")
+    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="p1")

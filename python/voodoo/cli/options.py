@@ -137,10 +137,14 @@ DepthRangeOption = Annotated[
         help="Remove depth outside these limits in meters, and flying pixels at edges.",
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout, and nothing else there.")]
 ViewOption = Annotated[
     bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
 ]
-RESULTS = "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, or a folder (ROS 2 bag); repeatable"
+RESULTS = (
+    "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, a folder (ROS 2 bag), or - for CSV on stdout; "
+    "repeatable"
+)
 OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}.")]
 OutOrNameOption = Annotated[
     list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}; by default NAME.csv.")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from voodoo.errors import VoodooError
+from voodoo.cli.common import print_message
+from voodoo.errors import NoPoseError, VoodooError
 
 if TYPE_CHECKING:
     from voodoo.evaluation.people import PeopleScore
@@ -80,30 +81,38 @@ def pictured_people(people: People, spool: Spool) -> dict[str, Any]:
     return {"take": take, "draw": draw, "show": show}
 
 
-def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:
+def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Mapping[str, Any]) -> PeopleScore:
     """Evaluate a result file of one recording."""
     from voodoo.evaluation.people_evaluate import evaluate_result
 
     if len(paths) != 1:
         raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-    return evaluate_result(paths[0], result, loader=loader, root_frame=frame)
+    return evaluate_result(paths[0], result, loader=loader, options=options)
 
 
-def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:
+def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
     """Print and write the table of several persons."""
-    from voodoo.evaluation.people_report import people_markdown, write_people
+    from voodoo.evaluation.people_report import DERIVED, people_markdown, write_people
 
-    typer.echo(people_markdown(scores))
+    if report is not None:
+        report["people"] = [{**vars(score), **{name: getattr(score, name) for name in DERIVED}} for score in scores]
+    else:
+        typer.echo(people_markdown(scores))
     if out is not None:
-        typer.echo("wrote " + ", ".join(str(file) for file in write_people(out, scores)))
+        (typer.echo if report is None else print_message)(
+            "wrote " + ", ".join(str(file) for file in write_people(out, scores))
+        )
 
 
 def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:
-    """Raise an error if a recording could not be tracked to its end.
+    """Raise an error if a recording could not be tracked to its end, or nobody was found in any.
 
     Raises:
         VoodooError: names the first.
+        NoPoseError: nobody was found.
     """
     failures = [score for score in scores if score.failure]
     if failures:
         raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
+    if scores and all(score.nobody for score in scores):
+        raise NoPoseError(f"nobody was found in {', '.join(score.name for score in scores[:3])}")

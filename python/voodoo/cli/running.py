@@ -14,7 +14,7 @@ from voodoo.cli.common import progressing
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
-from voodoo.errors import VoodooError
+from voodoo.errors import NoPoseError, VoodooError
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import Beginning
 from voodoo.recordings.left_out import LeftOut
@@ -139,7 +139,7 @@ def run(
         left_out: told if no frame can be used.
 
     Raises:
-        VoodooError: no frames.
+        NoPoseError: no frames.
     """
     seconds, pictures, interrupted = array("d"), [], False
     failures: list[Exception] = []
@@ -150,7 +150,8 @@ def run(
 
     def drawn(step: Any) -> None:  # noqa: ANN401 - of one person or several
         if not drawing:
-            drawing.append(Overlay(source))
+            with nullcontext() if left_out is None else left_out.aside():
+                drawing.append(Overlay(source))
         picture = draw(drawing[0], step)
         if writer is not None:
             writer.write(picture)
@@ -177,7 +178,7 @@ def run(
                 raise
             failures.append(error)
     if not seconds:
-        raise VoodooError(
+        raise NoPoseError(
             f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
         )
     outputs = [(path, output.failure) for path, output in ((overlay, writer), (save, viewer)) if output is not None]

@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, numbers_of, refuse_both, topics_of
+from voodoo.cli.common import clear_errors, loader_words, print_json, print_text, refuse_both
 from voodoo.cli.options import (
     FrameOption,
     HeightOption,
+    JsonOption,
     LayoutOption,
     LoaderNumberOption,
     LoaderOption,
@@ -27,22 +28,32 @@ def info_command(
     loader: LoaderOption = None,
     option: LoaderNumberOption = None,
     layout: LayoutOption = None,
+    as_json: JsonOption = False,
 ) -> None:
-    """Print the contents of a recording: sensors, topics, frames, rates, root frame, reference and range of depths."""
+    """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
+    camera size, bits, calibration, field of view and range of depths."""
     from voodoo.cli.running import opened
-    from voodoo.pipeline.inputs import loader_options
     from voodoo.recordings.depth_range import depth_range
+    from voodoo.recordings.first_images import doubts, first_images
     from voodoo.recordings.left_out import LeftOut
 
     with clear_errors():
-        options = topics_of(topic) | numbers_of(option) | loader_options(recording, loader, markers=None, layout=layout)
-        source = opened(recording, loader, frame, left_out=LeftOut(), **options)
-        typer.echo(str(source.info()))
-        depth = depth_range(source)
-        if depth is not None:
-            typer.echo(f"  depths     {depth}")
-            if depth.warning:
-                typer.echo(f"  note       {depth.warning}")
+        left_out = LeftOut()
+        source = opened(recording, loader, frame, left_out=left_out, **loader_words(topic, option, layout=layout))
+        about = source.info()
+        with left_out.aside():
+            depth = depth_range(source)
+        images, damage = first_images(source)
+        notes = [*doubts(about, left_out), damage, "" if depth is None else depth.warning]
+        if as_json:
+            print_json(
+                {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}
+                | {"notes": [*about.notes, *filter(None, notes)]}
+            )
+            return
+        lines = [str(about), *(f"  image      {image}" for image in images)]
+        lines += [] if depth is None else [f"  depths     {depth}"]
+        print_text("\n".join([*lines, *(f"  note       {note}" for note in notes if note)]))
 
 
 def config_command() -> None:

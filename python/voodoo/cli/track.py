@@ -11,6 +11,7 @@ from voodoo.cli.common import (
     clear_errors,
     numbers_of,
     print_message,
+    print_result,
     refuse_both,
     refuse_missing,
     states,
@@ -41,7 +42,7 @@ from voodoo.cli.options import (
 )
 from voodoo.cli.paths import check_paths
 from voodoo.cli.signals import INTERRUPTED, deferred
-from voodoo.names import SEARCHING
+from voodoo.errors import NoPoseError
 
 if TYPE_CHECKING:
     from voodoo.export.spool import Spool
@@ -123,7 +124,7 @@ def track_command(
 
     --people any or N tracks several persons, detected in depth images; no start is read. The .csv then begins with stamp_s,
     person, status, residual_m and has a row for every person who is present; person is an id from 1, which is kept when a person
-    returns. The .npz, .glb and bags have all persons (frames body_1, ...); others have one file per person: NAME_1.bvh, ...
+    returns. The .npz, .glb and bags have all persons (frames body_p1, ...); others have one file per person: NAME_1.bvh, ...
 
     Examples
 
@@ -141,6 +142,7 @@ def track_command(
     """
     from dataclasses import replace
 
+    from voodoo.cli.closing import closing_doubts, closing_lines
     from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import (
@@ -164,6 +166,7 @@ def track_command(
     from voodoo.pipeline.people import track_people
     from voodoo.pipeline.run import track
     from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
+    from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.sensors.settings import FrontEndSettings
@@ -185,6 +188,8 @@ def track_command(
             options["background"] = background
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
+        if layout is not None and not keypoints and not any("layout" in each for each in (options, *taken)):
+            raise typer.BadParameter("--layout is for keypoints, of --keypoints or a Pose2Sim folder")
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
             opened(
@@ -256,22 +261,35 @@ def track_command(
         if done.interrupted:
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
-        typer.echo(message)
+        size = None if several or not spool.found else stature_of(tracker.body)
+        if not several:
+            message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
+        print_result(message, targets)
         if sample is not None and (doubt := lying_words(sample, source.root_frame, optical=optical)):
+            print_message(f"{source.name}: {doubt}")
+        told = height or getattr(beginning, "height_m", None)
+        if told is None and beginning is None and source.start is not None:
+            told = source.start.get("height_m")
+        for doubt in closing_doubts(spool.states, stature=size, told=told) if spool.found and not several else ():
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, spool, left_out)
 
 
 def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -> None:
-    """Print on stderr what was left out, and possible reasons if no person was tracked."""
+    """Print on stderr what was left out, and possible reasons if no person was tracked.
+
+    Raises:
+        NoPoseError: nobody was found.
+    """
     from voodoo.recordings.depth_range import depth_range
 
-    if left_out:
-        first = next(iter(left_out.first.values()))
-        print_message(f"{source.name}: left out {left_out} (the first: {first}); --strict refuses them")
-    if not spool.states.keys() - {SEARCHING}:
-        print_message(f"{source.name}: nobody was found in {spool.frames} frames")
+    if left_out is not None:
+        for reason, count in left_out.counts.items():
+            first = left_out.first[reason]
+            print_message(f"{source.name}: left out {count} {reason} (the first: {first}); --strict refuses them")
     if not {"tracking", "degraded"} & spool.states.keys():
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
+    if not spool.found:
+        raise NoPoseError(f"{source.name}: nobody was found in {spool.frames} frames")

@@ -10,7 +10,7 @@ pixels that it is evaluated with:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -91,17 +91,18 @@ def witness(
     distances, about, overlaps = [np.empty(0)], [np.empty(0, dtype=bool)], [np.empty(0)]
     for item in recorded.measurements if estimate.joints else ():
         if isinstance(item, DepthImage):
-            points, valid = depth_points(item)
+            points, valid = depth_points(item, box=_box(tracker.body, estimate, truth, selection))
         elif isinstance(item, PointCloud):
             points = transform(item.root_from_sensor, item.points)
             valid = np.ones(len(points), dtype=bool)
         else:
             continue
-        person = np.zeros(len(points), dtype=bool)
-        person[valid] = _select(points[valid], tracker.body, estimate, truth, selection)
-        if person.any():
-            distances.append(np.abs(tracker.distance(points[person])).astype(np.float64))
-            about.append(near_joints(points[person], truth))
+        chosen = _select(points, tracker.body, estimate, truth, selection)
+        person = np.zeros(len(valid), dtype=bool)
+        person[valid], points = chosen, points[chosen]
+        if len(points):
+            distances.append(np.abs(tracker.distance(points)).astype(np.float64))
+            about.append(np.ones(len(points), dtype=bool) if selection == "truth" else near_joints(points, truth))
         if isinstance(item, DepthImage):
             overlaps.append(np.array([_overlap(item, person, tracker.body, estimate)]))
     return FrameWitness(np.concatenate(distances), np.concatenate(about), mean_or_nan(np.concatenate(overlaps)))
@@ -109,24 +110,33 @@ def witness(
 
 def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArray:
     """Which points (N, 3) lie within a capsule of CAPSULES; segments without both joints are left out."""
-    known = [
-        (joints[start], joints[end], radius)
-        for start, end, radius in CAPSULES
-        if start in joints and end in joints and np.isfinite([joints[start], joints[end]]).all()
-    ]
+    known = _capsules(joints)
     near = np.zeros(len(points), dtype=bool)
     if not known:
         return near
     # Most pixels are far from all persons.
-    low = np.min([np.minimum(a, b) - radius for a, b, radius in known], axis=0)
-    high = np.max([np.maximum(a, b) + radius for a, b, radius in known], axis=0)
-    inside = np.flatnonzero(_in_box(points, low, high))
+    inside = np.flatnonzero(_in_box(points, *_around(known)))
     about = points[inside]
     for a, b, radius in known:
         axis, offset = b - a, about - a
         t = np.clip(offset @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
-        near[inside] |= np.linalg.norm(offset - t[:, None] * axis, axis=1) <= radius
+        offset -= t[:, None] * axis
+        near[inside] |= np.einsum("ij,ij->i", offset, offset) <= radius * radius
     return near
+
+
+def _capsules(joints: Mapping[str, FloatArray]) -> list[tuple[FloatArray, FloatArray, float]]:
+    return [
+        (joints[start], joints[end], radius)
+        for start, end, radius in CAPSULES
+        if start in joints and end in joints and np.isfinite([joints[start], joints[end]]).all()
+    ]
+
+
+def _around(capsules: Sequence[tuple[FloatArray, FloatArray, float]]) -> tuple[FloatArray, FloatArray]:
+    low = np.min([np.minimum(a, b) - radius for a, b, radius in capsules], axis=0)
+    high = np.max([np.maximum(a, b) + radius for a, b, radius in capsules], axis=0)
+    return low, high
 
 
 def _in_box(points: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
@@ -141,14 +151,24 @@ def _select(
     truth: Mapping[str, FloatArray],
     selection: Selection,
 ) -> BoolArray:
-    if selection == "segmented":
-        return np.ones(len(points), dtype=bool)
     if selection == "truth":
         return near_joints(points, truth)
+    box = _box(body, estimate, truth, selection)
+    return np.ones(len(points), dtype=bool) if box is None else _in_box(points, *box)
+
+
+def _box(
+    body: Body, estimate: Estimate, truth: Mapping[str, FloatArray], selection: Selection
+) -> tuple[FloatArray, FloatArray] | None:
+    """Low and high corner [m] of what holds everything that is selected; None: everything is."""
+    if selection == "segmented":
+        return None
+    if selection == "truth":
+        known = _capsules(truth)
+        return _around(known) if known else (np.zeros(3), np.zeros(3))
     rings = [transform(estimate.world_from_limb[limb.name], limb_rings(limb.shape)) for limb in body.limbs]
     corners = np.concatenate(rings).reshape(-1, 3)
-    low, high = corners.min(axis=0) - _BOX_MARGIN_M, corners.max(axis=0) + _BOX_MARGIN_M
-    return _in_box(points, low, high)
+    return corners.min(axis=0) - _BOX_MARGIN_M, corners.max(axis=0) + _BOX_MARGIN_M
 
 
 def _overlap(depth: DepthImage, person: BoolArray, body: Body, estimate: Estimate) -> float:

@@ -6,13 +6,13 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -57,6 +57,7 @@ def evaluate(
     *,
     config: Config | None = None,
     loader: str | None = None,
+    options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
@@ -66,7 +67,7 @@ def evaluate(
     Args:
         path: of the recording.
         config: None means the defaults.
-        loader: see open_recording.
+        loader, options: see open_recording.
         model: see start_tracker.
         use: kinds of inputs; None: all.
         init: "auto" ignores the start of the recording and searches for a person, as for recordings without a start.
@@ -74,7 +75,7 @@ def evaluate(
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, **{"loader": loader} | pictures_alone(path, loader, use))
+    recording = open_recording(path, **{"loader": loader, **(options or {})} | pictures_alone(path, loader, use))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []
@@ -141,6 +142,7 @@ def evaluate_all(
     *,
     config_file: Path | None = None,
     loader: str | None = None,
+    options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
@@ -155,6 +157,7 @@ def evaluate_all(
             str(path),
             None if config_file is None else str(config_file),
             loader,
+            dict(options or {}),
             model,
             None if use is None else tuple(use),
             init,
@@ -213,13 +216,14 @@ def _task(
     path: str,
     config_file: str | None,
     loader: str | None,
+    options: Mapping[str, Any],
     model: HumanModel | None,
     use: Sequence[str] | None,
     init: Automatic | None,
 ) -> tuple[Score, FrameTable | None]:
     try:
         config = None if config_file is None else Config.load(config_file)
-        return evaluate(Path(path), config=config, loader=loader, model=model, use=use, init=init)
+        return evaluate(Path(path), config=config, loader=loader, options=options, model=model, use=use, init=init)
     except (VoodooError, OSError) as error:
         return Score(Path(path).name, Path(path), failure=str(error)), None
 

@@ -89,6 +89,11 @@ class PeopleScore:
     step_s: float = np.nan
 
     @property
+    def nobody(self) -> bool:
+        """Whether the result has no person."""
+        return not self.ids
+
+    @property
     def mota(self) -> float:
         """1 - (missed + extra + switches) / expected; NaN if no person is expected."""
         return 1.0 - (self.missed + self.extra + self.switches) / self.expected if self.expected else float("nan")

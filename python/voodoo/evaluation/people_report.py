@@ -26,7 +26,7 @@ _HEADER = (
     "joint error, cm",
     "ms a frame",
 )
-_DERIVED = ("mota", "idf1", "false_a_minute")
+DERIVED = ("mota", "idf1", "false_a_minute")
 
 
 def people_markdown(scores: Sequence[PeopleScore]) -> str:
@@ -56,9 +56,9 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     names = [item.name for item in fields(PeopleScore)]
     with appearing_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*names, *_DERIVED])
+        writer.writerow([*names, *DERIVED])
         for score in scores:
-            writer.writerow([_cell(getattr(score, name)) for name in (*names, *_DERIVED)])
+            writer.writerow([_cell(getattr(score, name)) for name in (*names, *DERIVED)])
     with appearing_whole(text) as part:
         part.write_text(people_markdown(scores), encoding="utf-8")
     return [table, text]

@@ -100,6 +100,28 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
     return "\n".join(text) + "\n"
 
 
+_BRIEF = (
+    "error_m", "within_10cm", "depth_within_5cm", "silhouette_iou", "angle_error_deg", "first_pose_s", "lost_share",
+    "searching_share", "step_s",
+)  # fmt: skip
+"""What the first screen tells beside the classes."""
+
+
+def brief(scores: Sequence[Score]) -> str:
+    """The ten rows of `markdown` that tell most, for each kind of comparison, and the failures."""
+    text = []
+    for summary in summarize(scores):
+        if summary.sequences:
+            zero, one, two = summary.classes
+            text += [f"## Against {summary.kind}: {summary.sequences} sequences\n", "| | |", "|---|---|"]
+            text += [f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |"]
+            text += [
+                f"| {words} | {_word(summary.means[name], form)} |" for name, words, form in _LINES if name in _BRIEF
+            ]
+    text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
+    return "\n".join(text)
+
+
 def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> dict[str, list[Deviations]]:
     """Errors and standard deviations, grouped by kind of reference."""
     found: dict[str, list[Deviations]] = {}

@@ -95,6 +95,11 @@ class Score:
     angle_spread_deg: float = np.nan
     left_out_share: float = np.nan
 
+    @property
+    def nobody(self) -> bool:
+        """Whether no frame has a person."""
+        return self.searching_share == 1.0
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrameTable:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,6 +34,8 @@ ONE_PERSON: Mapping[str, Callable[[Path, Track, Body], None]] = {
 """Writers of formats that hold one person with z up, by suffix."""
 FORMATS = (*SUFFIXES, *ONE_PERSON, ".glb", ".mcap")
 """Suffixes; a path without one is a ROS 2 bag folder."""
+STDOUT = Path("-")
+"""The target that is CSV on standard output."""
 
 
 def check_target(path: Path) -> None:
@@ -43,6 +47,8 @@ def check_target(path: Path) -> None:
     Raises:
         VoodooError: another suffix, a bag folder that exists, or a place where nothing can be written.
     """
+    if path == STDOUT:
+        return
     if path.suffix not in FORMATS and not is_folder(path):
         raise VoodooError(
             f"{path}: expected a name that ends in {', '.join(FORMATS)}, or a new folder for a ROS 2 bag, found "
@@ -64,12 +70,17 @@ def is_folder(path: Path) -> bool:
 
 def is_bag(path: Path) -> bool:
     """Whether a name is that of a bag: an .mcap file or a folder."""
-    return path.suffix == ".mcap" or is_folder(path)
+    return path.suffix == ".mcap" or (path != STDOUT and is_folder(path))
+
+
+def is_table(path: Path) -> bool:
+    """Whether a name is that of arrays or rows in the root frame: .csv, .npz, or STDOUT."""
+    return path == STDOUT or path.suffix in SUFFIXES
 
 
 def upright_words(paths: Sequence[Path], root_frame: str, *, optical: bool | None = None) -> str:
     """Which of the files `save` turns upright, in one line; "" if none."""
-    turned = [str(path) for path in paths if path.suffix not in SUFFIXES]
+    turned = [str(path) for path in paths if not is_table(path)]
     if not turned or not (is_optical(root_frame) if optical is None else optical):
         return ""
     return f"{', '.join(turned)}: turned upright, since the root frame {root_frame} is a camera's (y down, not level)"
@@ -106,6 +117,19 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
     return done, failed
 
 
+@contextmanager
+def on_stdout(path: Path) -> Iterator[Path]:
+    """The file to write: `path`, or for STDOUT a temporary .csv, which is printed at the end."""
+    if path != STDOUT:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "stdout.csv"
+        yield file
+        with file.open(encoding="utf-8", newline="") as text:
+            shutil.copyfileobj(text, sys.stdout)
+
+
 def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool | None = None) -> None:
     """Write a track in the format of the suffix, or a ROS 2 bag folder.
 
@@ -121,8 +145,9 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         OSError: the file cannot be written.
     """
     check_target(path)
-    if path.suffix in SUFFIXES:
-        track.save(path)
+    if is_table(path):
+        with on_stdout(path) as file:
+            track.save(file)
         return
     with appearing_whole(path) as place:
         if path.suffix in ONE_PERSON:

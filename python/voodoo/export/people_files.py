@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag
+from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag, on_stdout
 from voodoo.export.glb import write_glb
 from voodoo.export.people import PeopleTrack
-from voodoo.export.ros2 import write_people_bag
+from voodoo.export.ros2 import person_id, write_people_bag
 from voodoo.export.upright import upright
 from voodoo.model.body import Body
 from voodoo.whole import appearing_whole
@@ -44,7 +44,7 @@ def save_people(
             written.append(own)
         return written
     if is_bag(path):
-        people = {str(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
+        people = {person_id(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
         with appearing_whole(path) as place, bag_folder(place) as folder:
             write_people_bag(folder, people, root_frame=root_frame, optical=optical)
     elif path.suffix == ".glb":
@@ -54,5 +54,6 @@ def save_people(
         with appearing_whole(path) as place:
             write_glb(place, {f"{path.stem}_{one}": (track, bodies[one]) for one, track in shown.items()})
     else:
-        result.save(path)
+        with on_stdout(path) as file:
+            result.save(file)
     return [path]

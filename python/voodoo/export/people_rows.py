@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError, reading
+from voodoo.errors import VoodooError, columns_in, reading
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import stored_arrays
 
@@ -76,7 +76,7 @@ def read_rows(path: Path) -> PeopleRows:
     names = tuple(cell.removesuffix("_x") for cell in header[4:first:3])
     angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:])
     if header != header_of(names, angle_names):
-        raise VoodooError(f"{path}: expected columns {', '.join(FIRST)}, NAME_x, ..., found {header[:6]}")
+        raise VoodooError(f"{path}: expected columns {', '.join(FIRST)}, NAME_x, ..., found {columns_in(header)}")
     table = np.full((len(rows), len(header)), np.nan)
     for index, row in enumerate(rows):
         where = f"{path}, line {index + 2}"

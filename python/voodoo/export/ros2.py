@@ -14,25 +14,44 @@ from typing import Any
 
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.conventions import NAMES
+from voodoo.export.human_frames import frame_poses
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import UPRIGHT_FROM_OPTICAL, upright
+from voodoo.export.urdf import urdf
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
 
-FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
-"""REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
-
+BODIES = "/humans/bodies"
+TRACKED = f"{BODIES}/tracked"
+"""Topic of the ids of all persons who have transforms."""
+IDS, STRING = "hri_msgs/msg/IdsList", "std_msgs/msg/String"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
+"""Release whose definitions are used; the messages used here have the same fields in other releases."""
+STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
 _TF = "tf2_msgs/msg/TFMessage"
 _POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
+
+
+def person_id(number: int) -> str:
+    """The REP-155 id of a person in `tracked`, topics and frames: it begins with a letter, as names in topics must."""
+    return f"p{number}"
+
+
+def description(body: Body, person: str) -> dict[str, Any]:
+    """Topic -> message (std_msgs/String) of the person's URDF in the body's current sizes."""
+    return {f"/human_description_{person}": _new(STRING, data=urdf(body, person))}
+
+
+def tracked(stamp: float, persons: Sequence[str], *, root_frame: str) -> dict[str, Any]:
+    """Topic -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s]."""
+    return {TRACKED: _new(IDS, header=_header(round(stamp * 1e9), root_frame), ids=list(persons))}
 
 
 def write_bag(
@@ -41,13 +60,14 @@ def write_bag(
     body: Body,
     *,
     root_frame: str,
-    person: str = "voodoo",
+    person: str = "p1",
     markers: bool = True,
     optical: bool | None = None,
 ) -> None:
     """Write a new bag folder.
 
-    Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
+    Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/tracked` (hri_msgs/IdsList), `/human_description_<person>`
+    (std_msgs/String, URDF, once at the beginning), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
     `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints, and
     where these are known ellipsoids of one standard deviation about them). If the covariance is known,
     `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
@@ -69,10 +89,7 @@ def write_bag(
             of another body.
         OSError: the bag cannot be written.
     """
-    if not person.isidentifier():
-        raise VoodooError(f"person: expected a name, found {person!r}")
-    human = _Human(track, body, person, f"/humans/bodies/{person}", root_frame, optical=optical)
-    _write(path, [human], markers=markers)
+    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, markers=markers, optical=optical)
 
 
 def write_people_bag(
@@ -85,12 +102,11 @@ def write_people_bag(
 ) -> None:
     """Write a new bag folder of several people.
 
-    As `write_bag`, with frames `body_<person>`, `torso_<person>`, ... and topics `/humans/bodies/body_<person>/...`: a name in a
-    ROS 2 topic does not begin with a digit.
+    As `write_bag`, with frames `body_<person>`, `torso_<person>`, ... and topics `/humans/bodies/<person>/...` for each of them.
 
     Args:
         path: the folder, which must not exist.
-        people: REP-155 id -> track with limb poses, and body in the sizes it was tracked with.
+        people: REP-155 id, which begins with a letter -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
         markers: also write the markers.
         optical: see `write_bag`.
@@ -99,24 +115,22 @@ def write_people_bag(
         VoodooError: as `write_bag`.
         OSError: the bag cannot be written.
     """
-    humans = [
-        _Human(track, body, name, f"/humans/bodies/body_{name}", root_frame, optical=optical)
-        for name, (track, body) in people.items()
-    ]
+    for name in people:
+        if not name.isidentifier():
+            raise VoodooError(f"person: expected a name, found {name!r}")
+    humans = [_Human(track, body, name, root_frame, optical=optical) for name, (track, body) in people.items()]
     _write(path, humans, markers=markers)
 
 
 class _Human:
     """The messages of one person."""
 
-    def __init__(
-        self, track: Track, body: Body, person: str, topic: str, root_frame: str, *, optical: bool | None = None
-    ) -> None:
+    def __init__(self, track: Track, body: Body, person: str, root_frame: str, *, optical: bool | None = None) -> None:
         if not root_frame:
             raise VoodooError("root_frame: expected a name, found none")
         self._given_root = root_frame
         track, self.root = upright(track, root_frame, optical=optical)
-        self.track, self.body, self.person, self.topic = track, body, person, topic
+        self.track, self.body, self.person, self.topic = track, body, person, f"{BODIES}/{person}"
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
         self._posed, self._displayed = skeleton(track, body), track.found
@@ -166,48 +180,31 @@ def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None
     path = Path(path)
     if path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    kinds = {"/tf": _TF}
+    kinds = {"/tf": _TF, TRACKED: IDS}
     for human in humans:
-        kinds |= human.kinds(markers)
+        kinds |= human.kinds(markers) | {f"/human_description_{human.person}": STRING}
     frames = sorted(
         (float(stamp), number, index)
         for number, human in enumerate(humans)
         for index, stamp in enumerate(human.track.stamps)
     )
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
+        there: dict[float, list[str]] = {}
         for stamp, number, index in frames:
-            for name, message in humans[number].messages(index, markers=markers).items():
+            there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])
+        connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
+        first = (
+            {}
+            if not frames
+            else {name: text for one in humans for name, text in description(one.body, one.person).items()}
+        )
+        for stamp, number, index in frames:
+            messages = first | humans[number].messages(index, markers=markers)
+            if stamp in there:
+                messages |= tracked(stamp, there.pop(stamp), root_frame=humans[number].root)
+            first = {}
+            for name, message in messages.items():
                 writer.write(connect[name], round(stamp * 1e9), STORE.serialize_cdr(message, message.__msgtype__))
-
-
-def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[str, tuple[str | None, FloatArray]]:
-    """Frames of one instant: name -> (parent, root_from_frame (4, 4)); the parent of `body_` is None, the root
-    frame."""
-    sites = dict(zip(track.joint_names, track.joints[index], strict=True))
-    bones = posed.bones
-    limb_frames = [f"{FRAMES.get(bone.name, bone.name)}_{person}" for bone in bones]
-    body_frame = f"body_{person}"
-    trunk = posed.rotations[index, 0]
-    frames: dict[str, tuple[str | None, FloatArray]] = {
-        body_frame: (None, _pose(trunk, _middle(sites, "hip", posed.heads[index, 0])))
-    }
-    for number, bone in enumerate(bones):
-        place, turn = posed.heads[index, number], posed.rotations[index, number]
-        parent = body_frame if bone.parent is None or bone.name.endswith("_thigh") else limb_frames[bone.parent]
-        if bone.name in ("torso", "thorax"):
-            place = _middle(sites, "shoulder", place)
-        elif bone.parent is None:
-            place = frames[body_frame][1][:3, 3]
-        elif bone.name == "head" and "head_center" in sites:
-            place = sites["head_center"]
-        frames[limb_frames[number]] = (parent, _pose(turn, place))
-        # In bodies without hand or foot, the forearm or calf carries the frame of the wrist or ankle.
-        for limb, end, site in (("_forearm", "_hand", "_wrist"), ("_calf", "_foot", "_ankle")):
-            side = bone.name.removesuffix(limb)
-            if bone.name.endswith(limb) and side + end not in track.limb_names and side + site in sites:
-                frames[f"{side}{site}_{person}"] = (limb_frames[number], _pose(turn, sites[side + site]))
-    return frames
 
 
 def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, person: str, nanoseconds: int) -> list[Any]:
@@ -348,22 +345,7 @@ def _point(position: FloatArray) -> Any:  # noqa: ANN401
     return _new("geometry_msgs/msg/Point", x=x, y=y, z=z)
 
 
-def _pose(turn: FloatArray, place: FloatArray) -> FloatArray:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = turn, place
-    return pose
-
-
-def _middle(sites: dict[str, FloatArray], joint: str, otherwise: FloatArray) -> FloatArray:
-    both = [sites.get(f"{side}_{joint}") for side in "lr"]
-    if both[0] is None or both[1] is None:
-        return otherwise
-    return np.asarray((both[0] + both[1]) / 2.0)
-
-
-def instant(
-    estimate: Estimate, body: Body, *, root_frame: str, person: str, topic: str, markers: bool = True
-) -> dict[str, Any]:
+def instant(estimate: Estimate, body: Body, *, root_frame: str, person: str, markers: bool = True) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
 
     Args:
@@ -371,14 +353,13 @@ def instant(
         body: in its current sizes.
         root_frame: frame of the estimate; if it is an optical frame by its name, see `write_bag`.
         person: REP-155 id.
-        topic: begins the names of the person's topics, e.g. "/humans/bodies/body_1".
         markers: also make the markers.
 
     Raises:
         VoodooError: a stamp before zero.
     """
     # Angles are not needed; if nobody was found, the names come from the body.
-    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, topic, root_frame)
+    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, root_frame)
     return human.messages(0, markers=markers)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,13 +20,13 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, reading, reason
 from voodoo.export.cut_off import complete
-from voodoo.export.files import FORMATS, check_target, save, written
+from voodoo.export.files import FORMATS, STDOUT, check_target, is_table, on_stdout, save, written
 from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
 from voodoo.export.people_rows import write_rows
-from voodoo.export.result_file import SUFFIXES
 from voodoo.export.track import BODIES, BODY_OF, Arrays, Track, arrays_of, track_of, tracks_of, write_arrays, write_csv
 from voodoo.model.body import Body
+from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
@@ -73,7 +74,8 @@ class Spool:
         for path in paths:
             check_target(path)
         self._paths, self._root, self._optical, self._several = list(paths), root_frame, optical, several
-        self._hidden = Hidden(paths[0])
+        self._kept_for = [path for path in paths if path != STDOUT]
+        self._hidden = Hidden(self._kept_for[0] if self._kept_for else Path(tempfile.gettempdir()) / "stdout.csv")
         self._together = together
         self._waiting: list[Estimate | PeopleEstimate] = []
         self._made: dict[str, npt.NDArray[Any]] | None = None
@@ -100,17 +102,22 @@ class Spool:
         if len(self._waiting) >= self._together:
             self._put_away()
 
+    @property
+    def found(self) -> bool:
+        """Whether a frame has a pose."""
+        return bool(self.states.keys() - {SEARCHING})
+
     def _put_away(self) -> None:
         arrays = dict(self._last())
-        needed = any(path.suffix not in SUFFIXES for path in self._paths)
+        needed = not all(map(is_table, self._paths))
         if needed and time.monotonic() - self._bodies_at >= _BODIES_S:
             arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
             arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
         path = self._hidden.folder / f"{len(self._parts):08d}.npz"
         with appearing_whole(path) as place, place.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
-        if not self._parts:
-            self._keep(self._paths)
+        if not self._parts and self._kept_for:
+            self._keep(self._kept_for)
         self._bodies_at = time.monotonic() if BODIES in arrays else self._bodies_at
         self._parts.append(path)
         self._waiting.clear()
@@ -164,7 +171,7 @@ class Spool:
             try:
                 return _write(path, contents, several=self._several, left_out=left_out or {}, **how)
             except OSError:
-                failing.append(path)
+                failing.extend([path] if path != STDOUT else [])
                 raise
 
         done, failed = written(self._paths, write)
@@ -198,7 +205,7 @@ class Spool:
         """
         if error is None:
             return
-        if isinstance(error, VoodooError) or not self._parts:
+        if isinstance(error, VoodooError) or not (self._parts and self._kept_for):
             self._hidden.remove()
             return
         with suppress(OSError):
@@ -231,8 +238,8 @@ def _write(
 ) -> list[Path]:
     """Write one output. A part is in memory at a time, in formats other than .csv and .npz all."""
     check_target(path)
-    if path.suffix in SUFFIXES and not (several and _jumps(contents())):
-        with appearing_whole(path) as place:
+    if is_table(path) and not (several and _jumps(contents())):
+        with on_stdout(path) as file, appearing_whole(file) as place:
             if path.suffix == ".npz":
                 write_arrays(place, contents, _fixed(contents(), several, left_out))
             elif several:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, a_path, reading
+from voodoo.errors import VoodooError, a_path, columns_in, reading
 from voodoo.export.collected import angles_of_estimates, covariances_of
 from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
 from voodoo.export.result_file import check_suffix
@@ -275,7 +275,7 @@ class Track:
         # Later versions add columns behind these, which are ignored.
         limbs = {cell.removesuffix(_STATUS): i for i, cell in enumerate(header) if i >= last and cell.endswith(_STATUS)}
         if header[:last] != _header(names, angle_names) or len(set(header)) != len(header):
-            raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {header[:5]}")
+            raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {columns_in(header)}")
         for line, row in enumerate(rows, start=2):
             if len(row) != len(header):
                 raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")

@@ -20,6 +20,7 @@ class Inbox(Closing):
         """Start empty."""
         super().__init__()
         self.dropped = 0
+        self._awake = False
         self._items: list[tuple[Arrival, float]] = []
 
     def put(self, arrival: Arrival, now: float) -> None:
@@ -34,9 +35,17 @@ class Inbox(Closing):
             self._items.append((arrival, now))
             self._changed.notify()
 
-    def take(self, timeout: float) -> list[tuple[Arrival, float]]:
-        """All arrivals in order; empty if nothing arrives within `timeout` [s]."""
+    def wake(self) -> None:
+        """Let `take` return without an arrival, now or at its next call: what a waiting frame waits for may be there."""
         with self._changed:
-            self._wait(timeout)
+            self._awake = True
+            self._changed.notify()
+
+    def take(self, timeout: float) -> list[tuple[Arrival, float]]:
+        """All arrivals in order; empty if nothing arrives within `timeout` [s], or after `wake`."""
+        with self._changed:
+            if not self._awake:
+                self._wait(timeout)
+            self._awake = False
             items, self._items = self._items, []
             return items

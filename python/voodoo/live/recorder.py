@@ -10,10 +10,9 @@ import cv2
 import numpy as np
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 
 from voodoo.errors import VoodooError
-from voodoo.export.ros2 import cdr, instant
+from voodoo.export.ros2 import STORE, cdr, description, instant, person_id, tracked
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
@@ -21,7 +20,6 @@ from voodoo.model.camera import Camera
 from voodoo.model.rotations import quaternions
 from voodoo.whole import Hidden, move_whole
 
-_STORE = get_typestore(Stores.ROS2_HUMBLE)
 _TF = "tf2_msgs/msg/TFMessage"
 _QUALITY = 95
 
@@ -58,6 +56,7 @@ class Recorder(Output):
         self._topics: dict[str, Connection] = {}
         self._cameras: dict[str, Camera] = {}
         self._poses: dict[str, FloatArray] = {}
+        self._described: set[str] = set()
         self._at = 0
         self.frames = 0
 
@@ -67,10 +66,16 @@ class Recorder(Output):
         for item in sorted(step.frame.measurements, key=lambda item: item.stamp == step.stamp):
             self._write_item(item)
         for number, estimate in step.estimates.items():
-            topic = f"/humans/bodies/body_{number}"
-            messages = instant(estimate, step.bodies[number], root_frame=self._root(), person=str(number), topic=topic)
+            person = person_id(number)
+            messages = instant(estimate, step.bodies[number], root_frame=self._root(), person=person)
+            if estimate.joints and person not in self._described:
+                messages |= description(step.bodies[number], person)
+                self._described.add(person)
             for topic, message in messages.items():
                 self._write(topic, message)
+        there = [person_id(number) for number, one in step.estimates.items() if one.joints]
+        for topic, message in tracked(step.stamp, there, root_frame=self._root()).items():
+            self._write(topic, message)
         self.frames += 1
 
     def _write_item(self, item: Measurement) -> None:
@@ -106,7 +111,7 @@ class Recorder(Output):
 
     def _write(self, topic: str, message: Any) -> None:  # noqa: ANN401
         if topic not in self._topics:
-            self._topics[topic] = self._writer.add_connection(topic, message.__msgtype__, typestore=_STORE)
+            self._topics[topic] = self._writer.add_connection(topic, message.__msgtype__, typestore=STORE)
         self._at += 1
         self._writer.write(self._topics[topic], self._at, cdr(message))
 
@@ -218,7 +223,7 @@ def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
 
 
 def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
-    return _STORE.types[kind](**fields)
+    return STORE.types[kind](**fields)
 
 
 def _header(stamp: float, frame: str) -> Any:  # noqa: ANN401

@@ -27,11 +27,13 @@ class Output(ABC):
         name: name in messages.
         prompt: latency is measured until it has taken the pose; other outputs may lag behind.
         waiting: queue capacity in steps; when it is exceeded, the oldest is dropped and counted.
+        on_reset: lets everybody be searched for again; set by the session.
     """
 
     name: str
     prompt: bool = False
     waiting: int = 1
+    on_reset: Callable[[], None] | None = None
 
     @abstractmethod
     def publish(self, step: Step) -> None:
@@ -103,6 +105,9 @@ class Session:
         self.latency, self.tracking = Latencies(), Latencies()
         self.published = self.with_pose = self.refused = 0
         self._make = follower
+        self._is_reset = threading.Event()
+        for output in outputs:
+            output.on_reset = self.reset
         self._last: Step | None = None
         self._times: deque[float] = deque(maxlen=512)
         self._began = live.clock.now()
@@ -121,6 +126,10 @@ class Session:
             for frame in self.live:
                 if follower is None:
                     follower = self._make(frame)
+                if self._is_reset.is_set():
+                    self._is_reset.clear()
+                    follower.restart(back=True, gone=True)
+                    self.live.faults.log("reset: everybody is looked for again")
                 step = self._step(follower, frame)
                 if step is not None:
                     self.tracking.add(step.seconds)
@@ -155,6 +164,10 @@ class Session:
         self._times.append(now)
         self._first = now if self._first is None else self._first
         self._end, self._last = now, step
+
+    def reset(self) -> None:
+        """Forget everybody before the next frame, and search again."""
+        self._is_reset.set()
 
     # What is known
 

@@ -237,6 +237,7 @@ class Live:
                 for arrival in source.read(_TICK_S):
                     # Images of the first source define the frames.
                     self.deliver(arrival if source is self.sources[0] else replace(arrival, drives=False))
+                self._inbox.wake()  # transforms and calibrations are no arrivals, but frames wait for them
             except SourceEnded:
                 break
             except SourceGone as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -91,8 +92,41 @@ def problems(values: dict[str, Any], error: ValidationError) -> str:
             parts.append(str(name if isinstance(name, str) else part))
         return ".".join(parts)
 
-    found = [f"{key(item['loc'])}: {item['msg'].lower()}, found {short(item['input'])}" for item in error.errors()]
-    return "; ".join(found)
+    return "; ".join(f"{key(item['loc'])}: {expectation(item)}" for item in error.errors())
+
+
+_EXPECTED = {
+    "missing": "an entry",
+    "json_invalid": "JSON",
+    "finite_number": "a finite number",
+    "greater_than": "a number above {gt:g}",
+    "greater_than_equal": "a number from {ge:g}",
+    "less_than": "a number below {lt:g}",
+    "less_than_equal": "a number up to {le:g}",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+    "string_too_short": "a word",
+    "literal_error": "one of {expected}",
+    "extra_forbidden": "a known key",
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "string": "a word",
+    "dict": "a table of names",
+    "list": "a list",
+    "tuple": "a list of numbers",
+}
+"""What pydantic's types of errors expect; of a family of types by its first word."""
+
+
+def expectation(problem: Mapping[str, Any]) -> str:
+    """An error of pydantic as "expected ..., found ..."."""
+    kind, context = str(problem["type"]), problem.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    words = _EXPECTED.get(kind) or _EXPECTED.get(kind.split("_")[0], "another value")
+    found = "none" if kind == "missing" else context["error"] if kind == "json_invalid" else short(problem["input"])
+    return f"expected {words.format(**context)}, found {found}"
 
 
 def _child(node: object, part: str | int) -> object:

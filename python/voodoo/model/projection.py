@@ -98,7 +98,10 @@ def limb_silhouette(
         None if a part of the limb is behind the camera.
     """
     points = transform(root_from_limb, limb_rings(shape).reshape(-1, 3))
-    pixels, _ = view.project(points)
+    return _hull(view.project(points)[0])
+
+
+def _hull(pixels: FloatArray) -> npt.NDArray[np.float32] | None:
     if not np.isfinite(pixels).all():
         return None
     hull = cv2.convexHull(pixels.astype(np.float32))
@@ -108,8 +111,9 @@ def limb_silhouette(
 def body_mask(body: Body, estimate: Estimate, view: View, *, width: int, height: int) -> npt.NDArray[np.bool_]:
     """Pixels (height, width) whose centers lie inside the silhouette of a limb."""
     mask = np.zeros((height, width), dtype=bool)
-    for limb in body.limbs:
-        contour = limb_silhouette(limb.shape, estimate.world_from_limb[limb.name], view)
+    points = [transform(estimate.world_from_limb[limb.name], limb_rings(limb.shape)) for limb in body.limbs]
+    for pixels in view.project(np.reshape(points, (-1, 3)))[0].reshape(len(points), -1, 2):
+        contour = _hull(pixels)
         if contour is not None and len(contour) >= 3:
             _fill(mask, contour.astype(np.float64))
     return mask
@@ -125,9 +129,15 @@ def _fill(mask: npt.NDArray[np.bool_], contour: FloatArray) -> None:
     high = np.clip(np.floor(contour.max(axis=0)) + 1, 0, (width, height)).astype(int)
     if (high <= low).any():
         return
-    x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+    x, y = np.arange(low[0], high[0]), np.arange(low[1], high[1])[:, None]
     edge = np.roll(contour, -1, axis=0) - contour
-    side = edge[:, 0, None, None] * (y - contour[:, 1, None, None]) - edge[:, 1, None, None] * (
-        x - contour[:, 0, None, None]
-    )
-    mask[low[1] : high[1], low[0] : high[0]] |= (side >= 0.0).all(axis=0) | (side <= 0.0).all(axis=0)
+    edge, start = edge[edge[:, 1] != 0.0], contour[edge[:, 1] != 0.0]
+    if not len(edge):
+        return
+    # Where the line of each edge crosses the rows: a row is inside between the edges that go down and those that go up.
+    crossing = start[:, 0] + edge[:, 0] / edge[:, 1] * (y - start[:, 1])
+    down = edge[:, 1] > 0.0
+    if crossing[:, down].mean() > crossing[:, ~down].mean():
+        down = ~down
+    first, last = crossing[:, down].max(axis=1), crossing[:, ~down].min(axis=1)
+    mask[low[1] : high[1], low[0] : high[0]] |= (x >= first[:, None]) & (x <= last[:, None])

@@ -17,7 +17,7 @@ from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.joint import short
+from voodoo.model.joint import expectation, short
 from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
@@ -297,5 +297,4 @@ def _first_problem(error: ValidationError) -> str:
     """The first error of pydantic as "key: what was expected, found what"."""
     problem = error.errors(include_url=False)[0]
     key = ".".join(str(part) for part in problem["loc"])
-    found = "" if problem["type"] in ("missing", "json_invalid") else f", found {short(problem['input'])}"
-    return f"{key}: {problem['msg']}{found}" if key else f"{problem['msg']}{found}"
+    return f"{key}: {expectation(problem)}" if key else expectation(problem)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.errors import RecordingError, reading
+from voodoo.errors import RecordingError, columns_in, reading
 from voodoo.measurements import FloatArray
 from voodoo.stored import read_stored_text
 
@@ -28,7 +28,7 @@ def read_positions(path: Path, first: tuple[str, ...]) -> tuple[tuple[str, ...],
         names = tuple(cell.removesuffix("_x") for cell in header[len(first) :: 3])
         if header != [*first, *(f"{name}_{axis}" for name in names for axis in "xyz")] or len(set(names)) != len(names):
             expected = ", ".join((*first, "NAME_x", "NAME_y", "NAME_z", "..."))
-            raise RecordingError(f"{path}: expected columns {expected}, found {header[: len(first) + 3]}...")
+            raise RecordingError(f"{path}: expected columns {expected}, found {columns_in(header)}")
         cells = array("d")  # a list takes thirty times the size of the file
         for line, row in enumerate(rows, start=2):
             if len(row) != len(header):

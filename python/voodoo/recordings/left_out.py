@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 from voodoo.errors import VoodooError
 
@@ -38,6 +39,15 @@ class LeftOut:
     def add_error(self, error: VoodooError) -> None:
         """Count the measurement that raised an error."""
         self.add(getattr(error, "reason", "refused"), error)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """What is read inside is read again, and not counted here."""
+        before = dict(self.counts), dict(self.first)
+        try:
+            yield
+        finally:
+            self.counts, self.first = before
 
     def __len__(self) -> int:
         """Number of left-out measurements."""

@@ -21,9 +21,11 @@ from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.adapters.drawing import Pictured
+from voodoo.sensors.adapters.points import SCAN
+from voodoo.sensors.adapters.skin import SKIN
 from voodoo.visualization.body_drawing import draw_body
 from voodoo.visualization.canvas import OverlayCanvas, same_place
-from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, Picture, person_color, point
+from voodoo.visualization.ink import INK, LEFT, MIDDLE, PAPER, RIGHT, SUBPIXEL, Color, Picture, person_color, point
 from voodoo.visualization.people_drawing import draw_people
 from voodoo.visualization.sheet import contact_sheet, in_rows
 
@@ -176,9 +178,17 @@ def caption(picture: Picture, text: str, estimate: Estimate) -> None:
     write_parts(picture, parts)
 
 
-def write_parts(picture: Picture, parts: Sequence[tuple[str, Color]]) -> None:
-    """Write text in several colors into the top left corner."""
-    size = picture.shape[0] / 1100.0
+def legend(width: int) -> Picture:
+    """A strip (36, width, 3) that tells what the colors of the model and of the status mean."""
+    strip = np.full((36, width, 3), PAPER, dtype=np.uint8)
+    sides = [("left limbs of the person", LEFT), ("right limbs", RIGHT), ("trunk and head", MIDDLE), ("joints", INK)]
+    write_parts(strip, [*sides, ("skin", SKIN), ("laser", SCAN), ("status:", INK), *_STATUS.items()], size=0.55)
+    return strip
+
+
+def write_parts(picture: Picture, parts: Sequence[tuple[str, Color]], *, size: float | None = None) -> None:
+    """Write text in several colors into the top left corner; size: of the letters, None: by the height of the picture."""
+    size = picture.shape[0] / 1100.0 if size is None else size
     x, y = round(22 * size), round(42 * size)
     for part, color in parts:
         for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):  # a dark rim keeps the text legible over bright depth

@@ -107,9 +107,9 @@ class Node:
         """Subscribe to a topic."""
         return Subscription(self._participant, self._waitset, topic, offer, depth)
 
-    def advertise(self, topic: str, kind: str, *, depth: int = 10) -> Publication:
-        """Publish on a topic, reliably, while the returned publication is alive."""
-        made = Publication(self._participant, topic, kind, depth)
+    def advertise(self, topic: str, kind: str, *, depth: int = 10, latched: bool = False) -> Publication:
+        """Publish on a topic, reliably, while the returned publication is alive; latched: late subscribers get the last."""
+        made = Publication(self._participant, topic, kind, depth, latched)
         if self._is_quiet:
             _quiet.add(made.key)
         return made
@@ -168,13 +168,13 @@ class Subscription:
 class Publication:
     """A publication on a topic."""
 
-    def __init__(self, participant: Any, topic: str, kind: str, depth: int) -> None:  # noqa: ANN401
+    def __init__(self, participant: Any, topic: str, kind: str, depth: int, latched: bool) -> None:  # noqa: ANN401
         """Advertise."""
         from cyclonedds.pub import DataWriter
         from cyclonedds.topic import Topic
 
         self._type = dds_type(kind)
-        self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, False, depth))
+        self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, latched, depth))
 
     @property
     def key(self) -> str:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from voodoo.errors import RecordingError, reading
+from voodoo.export.ros2 import STORE
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Fault, Faults, kind_of
-from voodoo.live.ros2.types import STORE
 from voodoo.live.source import Arrival
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera

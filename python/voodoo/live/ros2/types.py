@@ -10,14 +10,9 @@ from functools import cache
 from typing import Any
 
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from voodoo.errors import VoodooError
-
-IDS = "hri_msgs/msg/IdsList"
-STORE = get_typestore(Stores.ROS2_HUMBLE)
-"""Release whose definitions are used; the messages used here have the same fields in other releases."""
-STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
+from voodoo.export.ros2 import STORE
 
 _BASE = {
     "int8": "int8", "int16": "int16", "int32": "int32", "int64": "int64", "uint8": "uint8", "uint16": "uint16",

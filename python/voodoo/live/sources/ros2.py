@@ -85,7 +85,11 @@ class Ros2Source(Source):
         until = time.monotonic() + _DISCOVERY_S
         while not self._discover():
             if time.monotonic() > until:
-                raise SourceGone(f"{self._topics[0]}: expected somebody who publishes it, found nobody yet")
+                there = [topic for topic, offer in self._node.offers().items() if offer.kind in MEASURED]
+                raise SourceGone(
+                    f"{self._topics[0]}: expected somebody who publishes it, found nobody yet; "
+                    f"published are {', '.join(sorted(there)) or 'no images, clouds or scans'}"
+                )
             self._node.wait(_POLL_S)
 
     def _discover(self) -> bool:

@@ -30,7 +30,7 @@ def source_of(
         rate: for a recording: playback speed relative to real time.
         loop: for a recording: start again at its end.
         root_frame: for a recording or ROS 2: root frame to use instead of its own.
-        options: options of the recording's loader.
+        options: options of the recording's loader; ROS 2 topics take meters_per_unit and tf_max_age.
         calibration: a calibration.toml. For a camera or a topic, only the pose in it (`root_frame` and `root_from_sensor`) is
             used; for a folder, all of it.
 
@@ -38,6 +38,13 @@ def source_of(
         VoodooError: no such recording, or an option out of range.
     """
     kind, colon, rest = str(word).partition(":")
+    chosen = dict(options or {})
+    if kind in (REALSENSE, ROS2, GROW) and (colon or kind == REALSENSE):
+        known = ("meters_per_unit", "tf_max_age") if kind == ROS2 else ()
+        if unknown := sorted(set(chosen) - set(known)):
+            raise VoodooError(
+                f"{word}: expected options of {', '.join(known) or 'no loader'}, found {', '.join(unknown)}"
+            )
     if kind == REALSENSE:
         from voodoo.live.sources.realsense import RealSenseSource
 
@@ -45,7 +52,8 @@ def source_of(
     if kind == ROS2 and colon:
         from voodoo.live.sources.ros2 import Ros2Source
 
-        return Ros2Source([topic for topic in rest.split(",") if topic], root_frame=root_frame, calibration=calibration)
+        topics = [topic for topic in rest.split(",") if topic]
+        return Ros2Source(topics, root_frame=root_frame, calibration=calibration, **chosen)
     if kind == GROW and colon:
         from voodoo.live.sources.growing import GrowingSource
 
@@ -56,7 +64,6 @@ def source_of(
         raise VoodooError(f"{word}: expected no calibration, a recording brings its own, found {calibration}")
     if not 0.0 < rate < 1e6:
         raise VoodooError(f"rate: expected a number above 0, found {rate}")
-    chosen = dict(options or {})
     if root_frame is not None:
         chosen["root_frame"] = root_frame
     left_out = LeftOut()

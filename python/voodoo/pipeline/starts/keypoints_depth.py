@@ -76,8 +76,8 @@ def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame
 
 def _points_in_view(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, FloatArray]:
     """Pixels (N, 2) of the points of a depth image in the image of the keypoints, and their depths there (N,) [m]."""
-    points, valid = depth_points(depth)
-    local = in_sensor(item.root_from_sensor, points[valid])
+    points, _ = depth_points(depth)
+    local = in_sensor(item.root_from_sensor, points)
     local = local[local[:, 2] > 0.0]
     return item.camera.project(local), np.ascontiguousarray(local[:, 2])
 

@@ -86,7 +86,8 @@ def from_depth(
     height, width = depth.image.shape
     places = {site: known_place(site, position) for site, position in known.items()}
     points, valid = depth_points(depth)
-    solid = valid & (points[:, 2] > _FLOOR_M) if level else valid
+    solid = valid.copy()
+    solid[valid] = points[:, 2] > _FLOOR_M if level else True
     z = np.where(solid.reshape(height, width), meters(depth), np.nan)
     view = CameraView(depth.camera, depth.root_from_sensor)
     seeds = []
@@ -100,10 +101,8 @@ def from_depth(
     mask = _connected(z, seeds)
     if scene is not None and seeds:
         before = scene.before(z)
-        near = np.zeros(len(points), dtype=bool)
-        for place in places.values():
-            with np.errstate(invalid="ignore"):
-                near |= np.square(points - place).sum(axis=1) < _REACH_M**2
+        near = valid.copy()
+        near[valid] = np.any([np.square(points - place).sum(axis=1) < _REACH_M**2 for place in places.values()], axis=0)
         close = near.reshape(height, width)
         mask = (mask & (before | close)) | (before & close)
     return filled(without_specks(mask & np.isfinite(z), smallest=_SPECK_PX))

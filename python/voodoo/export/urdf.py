@@ -1,0 +1,95 @@
+"""A robot description of a person (URDF), with the frames and joints of REP-155 that transforms and joint states name."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+
+from voodoo.export.human_frames import FRAMES, frame_poses
+from voodoo.export.skeleton import bones, skeleton
+from voodoo.export.track import Track
+from voodoo.model.body import Body
+from voodoo.model.rotations import euler_angles
+from voodoo.tracker import Tracker
+
+_X, _Y, _Z = np.eye(3)
+_JOINTS = {"torso": (("waist", _Y),), "head": (("r_head", _X), ("y_head", _Z), ("p_head", -_Y))}
+for _side, _s in (("l", 1.0), ("r", -1.0)):
+    _JOINTS |= {
+        f"{_side}_shoulder": (
+            (f"{_side}_y_shoulder", -_s * _Z),
+            (f"{_side}_p_shoulder", _s * _X),
+            (f"{_side}_r_shoulder", _s * _Z),
+        ),
+        f"{_side}_elbow": ((f"{_side}_elbow", -_Y),),
+        f"{_side}_hip": ((f"{_side}_y_hip", -_Z), (f"{_side}_p_hip", _s * _X), (f"{_side}_r_hip", -_Y)),
+        f"{_side}_knee": ((f"{_side}_knee", -_Y),),
+    }
+"""Frame -> the joints between its parent and it, with their axes, see `voodoo.export.joint_angles`; others are fixed."""
+
+
+def urdf(body: Body, person: str) -> str:
+    """The description of a body in its current sizes, at rest: links are the frames of /tf, limbs are cylinders.
+
+    What joint states leave out, the twist of an elbow and the turn of a hand, is only in /tf.
+
+    Args:
+        body: of the person.
+        person: REP-155 id.
+    """
+    rest = {}
+    for bone in bones(body):
+        rest[bone.name] = np.eye(4)
+        rest[bone.name][:3, :3], rest[bone.name][:3, 3] = bone.rest, bone.head - bone.rest @ bone.head_in_limb
+    estimate = Tracker(body, detector=None).reset_pose(rest)
+    names, limb_names = estimate.joint_names, estimate.limb_names
+    poses = np.array([estimate.limb_poses])
+    track = Track(np.zeros(1), ("tracking",), np.zeros(1), names, estimate.joint_positions[None], limb_names, poses)
+    frames = frame_poses(track, skeleton(track, body), 0, person)
+    robot = ElementTree.Element("robot", name=f"human_{person}")
+    limbs = {f"{FRAMES.get(limb.name, limb.name)}_{person}": limb for limb in body.limbs}
+    for name, (parent, pose) in frames.items():
+        link = ElementTree.SubElement(robot, "link", name=name)
+        if name in limbs:
+            shape, place = limbs[name].shape, rest[limbs[name].name]
+            visual = ElementTree.SubElement(link, "visual")
+            middle = place[:3, 3] + 0.5 * shape.length * place[:3, 2] - pose[:3, 3]
+            _origin(visual, middle, euler_angles(place[None, :3, :3], "ZYX")[0][::-1])
+            radius = (shape.a0 + shape.a1 + shape.b0 + shape.b1) / 4.0
+            size = {"radius": f"{radius:.4f}", "length": f"{shape.length:.4f}"}
+            ElementTree.SubElement(ElementTree.SubElement(visual, "geometry"), "cylinder", size)
+        if parent is None:
+            continue
+        offset, above = pose[:3, 3] - frames[parent][1][:3, 3], parent
+        turns = _JOINTS.get(name.removesuffix(f"_{person}"), ())
+        for number, (joint, axis) in enumerate(turns, 1):
+            below = name if number == len(turns) else f"{joint}_{person}"
+            if below != name:
+                ElementTree.SubElement(robot, "link", name=below)
+            made = _joint(robot, f"{joint}_{person}", "continuous", above, below, offset)
+            ElementTree.SubElement(made, "axis", xyz=_words(axis))
+            offset, above = np.zeros(3), below
+        if not turns:
+            _joint(robot, f"{name}_fixed", "fixed", parent, name, offset)
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _joint(
+    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, offset: npt.NDArray[np.float64]
+) -> ElementTree.Element:
+    joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
+    _origin(joint, offset, np.zeros(3))
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
+    return joint
+
+
+def _origin(above: ElementTree.Element, place: npt.NDArray[np.float64], turn: npt.NDArray[np.float64]) -> None:
+    ElementTree.SubElement(above, "origin", xyz=_words(place), rpy=_words(turn))
+
+
+def _words(values: npt.NDArray[np.float64]) -> str:
+    return " ".join(f"{value:.4f}" for value in np.round(values, 4) + 0.0)

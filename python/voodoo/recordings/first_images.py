@@ -1,0 +1,91 @@
+"""The first image of every camera of a recording, as it is in the file, and what its summary does not show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from voodoo.errors import VoodooError
+from voodoo.measurements import ColorImage, DepthImage
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.recording import Recording, RecordingInfo
+
+_FRAMES = 10
+"""Frames in which the first images are looked for."""
+FIXED_FRAMES = ("odom", "map", "world")
+"""Root frames that stay where they are while a robot drives."""
+
+
+@dataclass(frozen=True)
+class FirstImage:
+    """A decoded image.
+
+    Args:
+        sensor: its name.
+        size: width and height of the image [px].
+        calibrated: width and height of the calibration [px].
+        bits: of a value, e.g. "16-bit unsigned".
+        meters_per_unit: scale of depth; None for color.
+        field_of_view: horizontal and vertical [deg], by the calibration.
+    """
+
+    sensor: str
+    size: tuple[int, int]
+    calibrated: tuple[int, int]
+    bits: str
+    meters_per_unit: float | None
+    field_of_view: tuple[float, float]
+
+    def __str__(self) -> str:
+        """One line."""
+        scale = "" if self.meters_per_unit is None else f", a unit is {self.meters_per_unit:g} m"
+        (width, height), (wide, high), (across, up) = self.size, self.calibrated, self.field_of_view
+        return (
+            f"{self.sensor}: {width}x{height}, {self.bits}{scale}; calibrated for {wide}x{high}, "
+            f"field of view {across:.0f} x {up:.0f} deg"
+        )
+
+
+def first_images(recording: Recording) -> tuple[list[FirstImage], str]:
+    """The first image of every camera, and why reading ended early ("": it did not)."""
+    found: dict[str, FirstImage] = {}
+    try:
+        for recorded in islice(recording, _FRAMES):
+            for item in recorded.measurements:
+                if isinstance(item, DepthImage | ColorImage) and item.sensor not in found:
+                    found[item.sensor] = _of(item)
+    except VoodooError as error:
+        return list(found.values()), str(error)
+    return list(found.values()), ""
+
+
+def _of(item: DepthImage | ColorImage) -> FirstImage:
+    image, camera = item.image, item.camera
+    rays = camera.rays().reshape(camera.height, camera.width, 2)
+    across, down = rays[camera.height // 2, :, 0], rays[:, camera.width // 2, 1]
+    angles = (float(np.rad2deg(np.ptp(np.arctan(line[np.isfinite(line)])))) for line in (across, down))
+    kind = {"u": "unsigned", "f": "float"}.get(image.dtype.kind, image.dtype.name)
+    return FirstImage(
+        sensor=item.sensor,
+        size=(image.shape[1], image.shape[0]),
+        calibrated=(camera.width, camera.height),
+        bits=f"{8 * image.dtype.itemsize}-bit {kind}",
+        meters_per_unit=item.meters_per_unit if isinstance(item, DepthImage) else None,
+        field_of_view=(next(angles), next(angles)),
+    )
+
+
+def doubts(about: RecordingInfo, left_out: LeftOut) -> list[str]:
+    """What is not right with a recording, after its first images were read."""
+    found = [f"left out {count} {reason}: {left_out.first[reason]}" for reason, count in left_out.counts.items()]
+    if about.duration < 0.0:
+        found.append(f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first")
+    lasers = [sensor.name for sensor in about.sensors if sensor.kind in ("scan", "points")]
+    if lasers and about.root_frame not in FIXED_FRAMES and not about.camera_root:
+        found.append(
+            f"{lasers[0]} is in {about.root_frame}, and no transform leads to {', '.join(FIXED_FRAMES)}: a robot that drives "
+            "needs odometry, or what stands still seems to move"
+        )
+    return found

@@ -1,0 +1,26 @@
+"""What voodoo track says at its end."""
+
+from collections import Counter
+
+from commands import run
+from voodoo.cli.closing import closing_doubts
+from voodoo.recordings import sample_path
+
+
+def test_the_end_tells_stature_speed_root_frame_and_shares(tmp_path):
+    done = run("track", sample_path(), "--out", tmp_path / "o.csv")
+    first, second, third = done.stdout.splitlines()
+    assert "90 frames" in first and done.stderr == ""
+    assert second.startswith("stature 1.7") and "frames a second; root frame base_link" in second
+    assert third == "100 % tracking (docs/how-to/read-the-status.md says what that means)"
+    told = run("track", sample_path(), "--height", "1.3", "--out", tmp_path / "o.csv")
+    assert "1.30 m was told" in told.stderr
+
+
+def test_unlikely_results_are_doubted():
+    good = Counter(tracking=9, lost=1)
+    assert closing_doubts(good, stature=1.7, told=1.76) == closing_doubts(good, stature=None, told=None) == []
+    assert len(closing_doubts(good, stature=0.7, told=None)) == len(closing_doubts(good, stature=2.3, told=None)) == 1
+    assert closing_doubts(good, stature=0.7, told=0.7) == [], "a small child was announced"
+    assert "50 % of the frames" in closing_doubts(Counter(tracking=5, lost=5), stature=1.7, told=None)[0]
+    assert closing_doubts(Counter(tracking=6, lost=4), stature=1.7, told=None) == []
