@@ -47,6 +47,7 @@ class Settings:
         use: kinds of inputs; None: the best ones for each recording.
         init: "auto": search for a person even if there is a start beside a recording; None: use that start.
         model, loader: see start_tracker and open_recording.
+        options: of the recordings' loaders.
         people: 1: one person; a larger number: at most that many; None: any number.
         strict: a damaged recording fails; else unusable measurements are left out.
         config: parameters that differ from the defaults.
@@ -57,6 +58,7 @@ class Settings:
     init: str | None = None
     model: str | None = None
     loader: str | None = None
+    options: Mapping[str, Any] | None = None
     people: int | None = 1
     strict: bool = False
     config: Mapping[str, Any] | None = None
@@ -65,7 +67,7 @@ class Settings:
     def as_dict(self) -> dict[str, Any]:
         """The settings as JSON values."""
         found = {**vars(self), "use": None if self.use is None else list(self.use)}
-        return {**found, "config": dict(self.config or {})}
+        return {**found, "config": dict(self.config or {}), "options": dict(self.options or {})}
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def row_of(job: Job) -> Row | None:
 def _track(job: Job, path: Path) -> tuple[Row, Columns]:
     chosen = job.settings
     left_out = None if chosen.strict else LeftOut()
-    options = {"loader": chosen.loader} | pictures_alone(path, chosen.loader, chosen.use)
+    options = {"loader": chosen.loader} | pictures_alone(path, chosen.loader, chosen.use) | dict(chosen.options or {})
     recording = open_recording(path, left_out=left_out, bare=False, **options)
     settings = FrontEndSettings.of(recording, use=chosen.use)
     config = Config(**dict(chosen.config or {}))

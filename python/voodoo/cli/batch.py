@@ -11,8 +11,18 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, print_interrupted, print_message, progressing
-from voodoo.cli.options import ConfigOption, LoaderOption, ModelOption, PeopleOption, StrictOption, UseOption
+from voodoo.cli.common import clear_errors, numbers_of, print_interrupted, print_message, progressing, topics_of
+from voodoo.cli.options import (
+    ConfigOption,
+    FrameOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    PeopleOption,
+    StrictOption,
+    TopicOption,
+    UseOption,
+)
 
 
 def batch_command(
@@ -37,7 +47,10 @@ def batch_command(
     model: ModelOption = None,
     use: UseOption = None,
     people: PeopleOption = "1",
+    topic: TopicOption = None,
+    frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
     strict: StrictOption = False,
 ) -> None:
     """Track many recordings, on this machine or on a cluster, one task each.
@@ -80,6 +93,7 @@ def batch_command(
             init=init,
             model=model,
             loader=loader,
+            options=topics_of(topic) | numbers_of(option) | ({} if frame is None else {"root_frame": frame}),
             people=limit,
             strict=strict,
             config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},

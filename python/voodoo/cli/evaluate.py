@@ -4,12 +4,27 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import clear_errors, print_interrupted, progressing, until_interrupted
-from voodoo.cli.options import ConfigOption, FrameOption, LoaderOption, ModelOption, UseOption
+from voodoo.cli.common import (
+    clear_errors,
+    numbers_of,
+    print_interrupted,
+    progressing,
+    topics_of,
+    until_interrupted,
+)
+from voodoo.cli.options import (
+    ConfigOption,
+    FrameOption,
+    LoaderNumberOption,
+    LoaderOption,
+    ModelOption,
+    TopicOption,
+    UseOption,
+)
 
 
 def eval_command(
@@ -37,8 +52,10 @@ def eval_command(
             metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
         ),
     ] = None,
+    topic: TopicOption = None,
     frame: FrameOption = None,
     loader: LoaderOption = None,
+    option: LoaderNumberOption = None,
 ) -> None:
     """Track recordings with ground truth or a reference skeleton, and evaluate the result.
 
@@ -77,18 +94,20 @@ def eval_command(
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         automatic = None if init is None else AUTO
         config_of(config)  # an invalid file is one error here instead of one per recording
+        options = topics_of(topic) | numbers_of(option) | ({} if frame is None else {"root_frame": frame})
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
             check_outputs([out], paths)
         if result is not None:
-            show_people([judged(paths, result, loader, frame)], out)
+            show_people([judged(paths, result, loader, options)], out)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
+        how: Any = {"config_file": config, "loader": loader, "model": model, "use": kinds, "options": options}
         several = [path for path in paths if has_people(path)]
         judgments = list(
             progressing(
-                evaluate_all_people(several, config_file=config, loader=loader, model=model, use=kinds),
+                evaluate_all_people(several, **how),
                 "following everybody",
                 len(several),
             )
@@ -101,7 +120,7 @@ def eval_command(
             return
         if out is not None:
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        done = evaluate_all(paths, config_file=config, loader=loader, model=model, use=kinds, init=automatic, jobs=jobs)
+        done = evaluate_all(paths, init=automatic, jobs=jobs, **how)
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]

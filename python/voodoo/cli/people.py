@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -143,13 +143,13 @@ def _run(
     return _Followed(PeopleTrack.of(estimates, bodies=bodies), bodies, interrupted, failure)
 
 
-def judged(paths: Sequence[Path], result: Path, loader: str | None, frame: str | None) -> PeopleScore:
+def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Mapping[str, Any]) -> PeopleScore:
     """Evaluate a result file of one recording."""
     from voodoo.evaluation.people_evaluate import evaluate_result
 
     if len(paths) != 1:
         raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-    return evaluate_result(paths[0], result, loader=loader, root_frame=frame)
+    return evaluate_result(paths[0], result, loader=loader, options=options)
 
 
 def show_people(scores: Sequence[PeopleScore], out: Path | None) -> None:

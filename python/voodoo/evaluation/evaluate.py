@@ -6,13 +6,13 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -58,6 +58,7 @@ def evaluate(
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> tuple[Score, FrameTable]:
     """Track a recording from its own start and evaluate the result.
 
@@ -69,10 +70,12 @@ def evaluate(
         use: kinds of inputs; None: all.
         init: "auto" ignores the start of the recording and searches for a person, as for recordings without a start.
 
+        options: of the recording's loader.
+
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, **{"loader": loader} | pictures_alone(path, loader, use))
+    recording = open_recording(path, **{"loader": loader} | pictures_alone(path, loader, use) | dict(options or {}))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []
@@ -143,6 +146,7 @@ def evaluate_all(
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
     jobs: int = 1,
+    options: Mapping[str, Any] | None = None,
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
 
@@ -156,6 +160,7 @@ def evaluate_all(
             model,
             None if use is None else tuple(use),
             init,
+            dict(options or {}),
         )
         for path in paths
     ]
@@ -212,10 +217,12 @@ def _task(
     model: HumanModel | None,
     use: Sequence[str] | None,
     init: Automatic | None,
+    options: Mapping[str, Any],
 ) -> tuple[Score, FrameTable | None]:
     try:
         config = None if config_file is None else Config.load(config_file)
-        return evaluate(Path(path), config=config, loader=loader, model=model, use=use, init=init)
+        how: Any = {"model": model, "use": use, "init": init, "options": options}
+        return evaluate(Path(path), config=config, loader=loader, **how)
     except (VoodooError, OSError) as error:
         return Score(Path(path).name, Path(path), failure=str(error)), None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ def has_people(path: Path) -> bool:
 
 
 def evaluate_result(
-    path: Path, result: Path, *, loader: str | None = None, root_frame: str | None = None
+    path: Path, result: Path, *, loader: str | None = None, options: Mapping[str, Any] | None = None
 ) -> PeopleScore:
     """Evaluate a result file of several persons, see voodoo.export.people_rows.
 
@@ -38,13 +38,12 @@ def evaluate_result(
         path: of the recording, with truth_people.csv beside it.
         result: .csv in the recording's root frame.
         loader: see open_recording.
-        root_frame: of the result; None: the recording's own.
+        options: of the recording's loader; `root_frame` is the frame of the result.
 
     Raises:
         VoodooError: one of them cannot be read, or their stamps do not match.
     """
-    options: dict[str, Any] = {} if root_frame is None else {"root_frame": root_frame}
-    recording = open_recording(path, loader=loader, **options)
+    recording = open_recording(path, loader=loader, **dict(options or {}))
     truth = truth_of(recording)
     rows = read_rows(result)
     about = recording.info()
@@ -65,6 +64,7 @@ def evaluate_people(
     loader: str | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> PeopleScore:
     """Track all persons in a recording, without a start, and evaluate the result.
 
@@ -74,11 +74,12 @@ def evaluate_people(
         loader: see open_recording.
         model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
+        options: of the recording's loader.
 
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, loader=loader)
+    recording = open_recording(path, loader=loader, **dict(options or {}))
     people = People(None if model is None else Body.human(model=model), config=config)
     return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
 
@@ -105,12 +106,13 @@ def evaluate_all_people(
     loader: str | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> Iterator[PeopleScore]:
     """Evaluate recordings one after the other; one that fails yields a score with `failure` set."""
     for path in paths:
         try:
             config = None if config_file is None else Config.load(config_file)
-            yield evaluate_people(path, config=config, loader=loader, model=model, use=use)
+            yield evaluate_people(path, config=config, loader=loader, model=model, use=use, options=options)
         except (VoodooError, OSError) as error:
             yield PeopleScore(path.name, path, failure=str(error))
 

@@ -30,14 +30,22 @@ def source_of(
         rate: for a recording: playback speed relative to real time.
         loop: for a recording: start again at its end.
         root_frame: for a recording or ROS 2: root frame to use instead of its own.
-        options: options of the recording's loader.
+        options: of the recording's loader, or of Ros2Source.
         calibration: a calibration.toml. For a camera or a topic, only the pose in it (`root_frame` and `root_from_sensor`) is
             used; for a folder, all of it.
 
     Raises:
-        VoodooError: no such recording, or an option out of range.
+        VoodooError: no such recording, an option out of range, or one that this source does not have.
     """
     kind, colon, rest = str(word).partition(":")
+    options = dict(options or {})
+    if kind in (REALSENSE, GROW) or (kind == ROS2 and colon):
+        known = ("meters_per_unit", "tf_max_age") if kind == ROS2 else ()
+        given = {**options, **({} if root_frame is None or kind == ROS2 else {"frame": root_frame})}
+        if unknown := sorted(set(given) - set(known)):
+            raise VoodooError(
+                f"{word}: expected no {', '.join(unknown)}; options of this source: {', '.join(known) or 'none'}"
+            )
     if kind == REALSENSE:
         from voodoo.live.sources.realsense import RealSenseSource
 
@@ -45,7 +53,8 @@ def source_of(
     if kind == ROS2 and colon:
         from voodoo.live.sources.ros2 import Ros2Source
 
-        return Ros2Source([topic for topic in rest.split(",") if topic], root_frame=root_frame, calibration=calibration)
+        topics = [topic for topic in rest.split(",") if topic]
+        return Ros2Source(topics, root_frame=root_frame, calibration=calibration, **options)
     if kind == GROW and colon:
         from voodoo.live.sources.growing import GrowingSource
 
@@ -56,9 +65,8 @@ def source_of(
         raise VoodooError(f"{word}: expected no calibration, a recording brings its own, found {calibration}")
     if not 0.0 < rate < 1e6:
         raise VoodooError(f"rate: expected a number above 0, found {rate}")
-    chosen = dict(options or {})
     if root_frame is not None:
-        chosen["root_frame"] = root_frame
+        options["root_frame"] = root_frame
     left_out = LeftOut()
-    recording = open_recording(word, bare=True, left_out=left_out, **chosen)
+    recording = open_recording(word, bare=True, left_out=left_out, **options)
     return PlayedSource(recording, rate=rate, loop=loop, left_out=left_out)
