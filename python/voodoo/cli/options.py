@@ -139,6 +139,13 @@ DepthRangeOption = Annotated[
 ViewOption = Annotated[
     bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
 ]
+UprightOption = Annotated[
+    bool,
+    typer.Option(
+        "--upright",
+        help="Put every result on the floor that is seen, else under the feet: z up, x forward, z = 0 on it.",
+    ),
+]
 _RESULTS = "Result: .csv, .npz, .bvh, .trc, .mcap, or a folder (ROS 2 bag); repeatable"
 OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{_RESULTS}.")]
 OutOrNameOption = Annotated[

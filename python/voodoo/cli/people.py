@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -75,20 +75,29 @@ class Outputs:
     overlay: Path | None
     save: Path | None
     viewer: Viewer | None
+    upright: bool = False
 
 
 def follow_people(
     source: Recording, people: People, settings: FrontEndSettings, outputs: Outputs, left_out: LeftOut | None
 ) -> None:
     """Track all persons in a recording, and write the requested outputs."""
+    from voodoo.cli.running import turn_of
     from voodoo.export.files import upright_words, written
     from voodoo.export.people_files import save_people
+    from voodoo.export.upright import SUFFIX, UNTURNED, lying_words, turned
 
     result, bodies, interrupted, failure = _run(source, people, settings, outputs, left_out)
-    how: Any = {"root_frame": source.root_frame, "optical": source.info().camera_root}
+    turn = turn_of(source, list(result.tracks.values()), outputs.targets, upright=outputs.upright)
+    doubts = [words for track in result.tracks.values() if (words := lying_words(track, source.root_frame, turn))]
+    how: Any = {"root_frame": source.root_frame, "turn": turn}
+    if outputs.upright and turn.words:
+        result = replace(result, tracks={one: turned(track, turn) for one, track in result.tracks.items()})
+        how = {"root_frame": f"{source.root_frame}{SUFFIX}", "turn": UNTURNED}
     done, failed = written(outputs.targets, lambda path: save_people(result, path, bodies=bodies, **how))
-    if turned := upright_words(done, **how):
-        print_message(turned)
+    for words in [upright_words(done, turn, every=outputs.upright), *doubts[:1]]:
+        if words:
+            print_message(words)
     done += [path for path in (None if failure else outputs.overlay, outputs.save) if path is not None]
     rows = sum(len(track) for track in result.tracks.values())
     count = len(result.tracks)

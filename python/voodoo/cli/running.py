@@ -13,7 +13,10 @@ from voodoo.cli.common import progressing
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
 from voodoo.errors import VoodooError
+from voodoo.export.files import is_turned
 from voodoo.export.track import Track
+from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
+from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import Beginning
 from voodoo.pipeline.starts.chosen import Starts
@@ -21,7 +24,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.settings import Box, FrontEndSettings
+from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
 from voodoo.tracker import Tracker
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.ink import Picture
@@ -109,6 +112,25 @@ def detector_of(path: Path | None) -> AnyDetector:
         ConfigError: the file is not such a network.
     """
     return "shipped" if path is None else OnnxDetector(path)
+
+
+def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path], *, upright: bool = False) -> Turn:
+    """How files are turned upright whose root frame is a camera's: by the floor that is seen, else by its axes.
+
+    Args:
+        source: the recording.
+        tracks: its results.
+        targets: the files.
+        upright: turn any root frame to z up and put the feet on z = 0; one that is known to be so stays.
+    """
+    root, optical = source.root_frame, source.info().camera_root
+    stands = root in LEVEL_FRAMES and not optical and not any(lying_words(track, root) for track in tracks)
+    if stands or not (upright or (optical and any(map(is_turned, targets)))):
+        return by_axes(root, optical=optical)
+    floor = seen_floor(source)
+    if floor is not None:
+        return by_floor(floor, optical=optical)
+    return by_feet(tracks, root, optical=optical) if upright else by_axes(root, optical=optical)
 
 
 def run(

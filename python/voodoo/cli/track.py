@@ -37,6 +37,7 @@ from voodoo.cli.options import (
     RecordingArgument,
     StrictOption,
     TopicOption,
+    UprightOption,
     UseOption,
     ViewOption,
 )
@@ -59,6 +60,7 @@ def track_command(
     detector: DetectorOption = None,
     people: PeopleOption = "1",
     out: OutOrNameOption = None,
+    upright: UprightOption = False,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a video.")
     ] = None,
@@ -147,11 +149,12 @@ def track_command(
         kinds_of,
         opened,
         run,
+        turn_of,
         viewer_of,
     )
     from voodoo.export.files import check_target, upright_words, written
     from voodoo.export.files import save as export
-    from voodoo.export.upright import lying_words
+    from voodoo.export.upright import SUFFIX, UNTURNED, lying_words, turned
     from voodoo.model.body import Body
     from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
@@ -203,7 +206,7 @@ def track_command(
             everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
             settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
-                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer), left_out)
+                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer, upright), left_out)
             _print_left_out(source, left_out)
             return
         tracker = start_tracker(
@@ -226,14 +229,17 @@ def track_command(
             )
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
             result, _, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
-        optical = source.info().camera_root
+        turn = turn_of(source, [result], targets, upright=upright)
+        standing, root, files = result, source.root_frame, turn
+        if upright and turn.words:
+            standing, root, files = turned(result, turn), f"{root}{SUFFIX}", UNTURNED
 
         def write(path: Path) -> list[Path]:
-            export(result, path, body=tracker.body, root_frame=source.root_frame, optical=optical)
+            export(standing, path, body=tracker.body, root_frame=root, turn=files)
             return [path]
 
         done, failed = written(targets, write)
-        turned = upright_words(done, source.root_frame, optical=optical)
+        words = upright_words(done, turn, every=upright)
         done += [path for path in (None if failure else overlay, save) if path is not None]
         message = f"{len(result)} frames, {states(result)}{wrote(done)}"
         refuse_missing([*failed, failure], message)
@@ -241,9 +247,9 @@ def track_command(
             print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
             raise typer.Exit(INTERRUPTED)
         typer.echo(message)
-        if turned:
-            print_message(turned)
-        if doubt := lying_words(result, source.root_frame, optical=optical):
+        if words:
+            print_message(words)
+        if doubt := lying_words(result, source.root_frame, turn):
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, result, left_out)
 

@@ -14,9 +14,8 @@ from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import write_bag
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
-from voodoo.export.upright import upright
+from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
-from voodoo.model.standing import is_optical
 from voodoo.whole import appearing_whole
 
 FORMATS = (".csv", ".npz", ".bvh", ".trc", ".mcap")
@@ -56,12 +55,17 @@ def is_bag(path: Path) -> bool:
     return path.suffix == ".mcap" or is_folder(path)
 
 
-def upright_words(paths: Sequence[Path], root_frame: str, *, optical: bool | None = None) -> str:
-    """Which of the files `save` turns upright, in one line; "" if none."""
-    turned = [str(path) for path in paths if path.suffix in (".bvh", ".trc") or is_bag(path)]
-    if not turned or not (is_optical(root_frame) if optical is None else optical):
-        return ""
-    return f"{', '.join(turned)}: turned upright, since the root frame {root_frame} is a camera's (y down, not level)"
+def is_turned(path: Path) -> bool:
+    """Whether a file is turned upright where the root frame is a camera's: .bvh, .trc and bags."""
+    return path.suffix in (".bvh", ".trc") or is_bag(path)
+
+
+def upright_words(paths: Sequence[Path], turn: Turn, *, every: bool = False) -> str:
+    """Which of the files, or `every` one, is turned upright, in one line; "" if none."""
+    if every and not turn.words:
+        return "--upright turned nothing: z = 0 of the root frame is the floor already"
+    turned = [str(path) for path in paths if every or is_turned(path)]
+    return f"{', '.join(turned)}: turned upright {turn.words}" if turned and turn.words else ""
 
 
 @contextmanager
@@ -93,7 +97,7 @@ def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple
     return done, failed
 
 
-def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool | None = None) -> None:
+def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | None = None) -> None:
     """Write a track: .csv, .npz, .bvh, .trc, .mcap, or a ROS 2 bag folder.
 
     Args:
@@ -101,7 +105,7 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         path: see FORMATS.
         body: in the sizes it was tracked with.
         root_frame: frame of the track.
-        optical: whether that is a camera's optical frame; then .bvh, .trc and bags are turned upright. None: by its name.
+        turn: how .bvh, .trc and bags are turned upright; None: a camera's optical frame, by its name, by its axes.
 
     Raises:
         VoodooError: another suffix, or data that the format requires are missing.
@@ -113,9 +117,9 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         return
     with appearing_whole(path) as place:
         if path.suffix == ".bvh":
-            write_bvh(place, upright(track, root_frame, optical=optical)[0], body)
+            write_bvh(place, upright(track, root_frame, turn)[0], body)
         elif path.suffix == ".trc":
-            write_trc(place, upright(track, root_frame, optical=optical)[0])
+            write_trc(place, upright(track, root_frame, turn)[0])
         else:
             with bag_folder(place) as folder:
-                write_bag(folder, track, body, root_frame=root_frame, optical=optical)
+                write_bag(folder, track, body, root_frame=root_frame, turn=turn)
