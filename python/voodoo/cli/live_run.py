@@ -35,6 +35,7 @@ from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.names import HumanModel
 from voodoo.people import People
+from voodoo.pipeline.people import check_inputs
 from voodoo.pipeline.start import Beginning, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import Box, FrontEndSettings
@@ -166,6 +167,7 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     if wishes.several:
         body = body_of(wishes.body, height=wishes.height, model=wishes.model)
         config, detector = wishes.config, wishes.detector
+        check_inputs(first, People(body, config=config, detector=detector), settings)
         return Follower(
             people=lambda: People(body, config=config, detector=detector, limit=wishes.limit), settings=settings
         )

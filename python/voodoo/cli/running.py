@@ -24,6 +24,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
 from voodoo.tracker import Tracker
 from voodoo.visualization.image_writer import PictureWriter
@@ -79,6 +80,29 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
 def bare_for(init: Beginning | None) -> dict[str, Any]:
     """The option of `open_recording` that ignores files beside the recording if another start is given or searched for."""
     return {} if init is None else {"bare": True}
+
+
+def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> None:
+    """Reject options for inputs that are not used.
+
+    Args:
+        has: kinds of inputs that are used.
+        **options: name, with _ for -, -> its value, None or empty if it is not given, and the kinds of inputs it is for.
+
+    Raises:
+        VoodooError: names option and inputs.
+    """
+    for name, (given, kinds) in options.items():
+        if given and not has & set(kinds):
+            raise VoodooError(
+                f"{name.replace('_', '-')}: expected an input it is for ({', '.join(kinds)}), found "
+                f"{', '.join(sorted(has)) or 'none'}"
+            )
+
+
+def used_inputs(source: Recording, settings: FrontEndSettings) -> set[str]:
+    """Kinds of inputs that a recording has and that are used."""
+    return {kind for sensor in source.info().sensors for kind in inputs_of(sensor.kind)} & set(settings.use)
 
 
 def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:

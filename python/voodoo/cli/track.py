@@ -139,7 +139,7 @@ def track_command(
     """
     from dataclasses import replace
 
-    from voodoo.cli.people import Outputs, body_of, follow_people, limit_of, no_starts
+    from voodoo.cli.people import Outputs, body_of, follow_people, limit_of, no_starts, refuse_several
     from voodoo.cli.running import (
         bare_for,
         boxes_of,
@@ -148,8 +148,10 @@ def track_command(
         detector_of,
         kinds_of,
         opened,
+        refuse_unused,
         run,
         turn_of,
+        used_inputs,
         viewer_of,
     )
     from voodoo.export.files import check_target, upright_words, written
@@ -196,6 +198,20 @@ def track_command(
         )
         for words in source.assumed:
             print_message(words)
+        if several:
+            refuse_several(draw_regions=draw_regions, background=background, marker_map=marker_map)
+        used = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
+        places = ("depth", "points", "scan")
+        refuse_unused(
+            used_inputs(source, used),
+            depth_range=(depth_range, ("depth",)),
+            detector=(detector, ("depth",)),
+            exclude=(exclude, places),
+            layout=(layout, ("keypoints",)),
+            marker_map=(marker_map, ("markers",)),
+            draw_regions=(draw_regions, ("color",)),
+            background=(background, ("color",)),
+        )
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target)
@@ -204,9 +220,8 @@ def track_command(
         if several:
             followed = body_of(body, height=height, model=model)
             everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
-            settings = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
             with viewer_of(view, save, source.name) as viewer:
-                follow_people(source, everybody, settings, Outputs(targets, overlay, save, viewer, upright), left_out)
+                follow_people(source, everybody, used, Outputs(targets, overlay, save, viewer, upright), left_out)
             _print_left_out(source, left_out)
             return
         tracker = start_tracker(
@@ -221,12 +236,7 @@ def track_command(
             detector=detector_of(detector),
         )
         with viewer_of(view, save, source.name) as viewer:
-            settings = replace(
-                FrontEndSettings.of(source, use=kinds),
-                depth_filter=depth_filter,
-                exclude=boxes,
-                draw_regions=draw_regions,
-            )
+            settings = replace(used, draw_regions=draw_regions)
             how: dict[str, Any] = {"settings": settings, "starts": starts_of(beginning, source), "viewer": viewer}
             result, _, _, interrupted, failure = run(source, tracker, overlay, left_out=left_out, **how)
         turn = turn_of(source, [result], targets, upright=upright)
