@@ -108,7 +108,8 @@ LoaderNumberOption = Annotated[
     typer.Option(
         "--option",
         metavar="NAME=NUMBER",
-        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit (depth of bags), "
+        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit "
+        "(depth of bags; calibrations of Pose2Sim and videos), "
         "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
     ),
 ]

@@ -86,17 +86,17 @@ def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> N
     """Reject options for inputs that are not used.
 
     Args:
-        has: kinds of inputs that are used.
+        has: kinds of inputs that are used; empty: not known.
         **options: name, with _ for -, -> its value, None or empty if it is not given, and the kinds of inputs it is for.
 
     Raises:
         VoodooError: names option and inputs.
     """
     for name, (given, kinds) in options.items():
-        if given and not has & set(kinds):
+        if given and has and not has & set(kinds):
             raise VoodooError(
                 f"{name.replace('_', '-')}: expected an input it is for ({', '.join(kinds)}), found "
-                f"{', '.join(sorted(has)) or 'none'}"
+                f"{', '.join(sorted(has))}"
             )
 
 
@@ -203,6 +203,7 @@ def run(
     if not estimates:
         raise VoodooError(
             f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
+            + (f" (the first: {next(iter(left_out.first.values()))})" if left_out else "")
         )
     left = {} if left_out is None else left_out.counts
     failure = None if writer is None else writer.failure
