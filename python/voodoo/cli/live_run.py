@@ -27,7 +27,7 @@ from voodoo.live.first_frame import FirstFrame
 from voodoo.live.follow import ONE, Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
-from voodoo.live.sources.words import source_of
+from voodoo.live.sources.words import refuse_unused, source_of
 from voodoo.live.spool import Files
 from voodoo.live.stream import Live
 from voodoo.measurements import DepthImage
@@ -105,6 +105,8 @@ def entered(
     """
     if len(calibrations) > len(words):
         raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
+    given = {"frame": root_frame, "rate": None if rate == 1.0 else rate, "loop": loop or None, **options}
+    refuse_unused(words, {name: value for name, value in given.items() if value is not None})
     places = [*calibrations, *[None] * (len(words) - len(calibrations))]
     sources = [
         source_of(word, rate=rate, loop=loop, root_frame=root_frame, options=options, calibration=place)

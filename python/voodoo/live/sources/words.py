@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 
 REALSENSE, ROS2, GROW = "realsense", "ros2", "grow"
+_OF_TOPICS = ("meters_per_unit", "tf_max_age")
 
 
 def source_of(
@@ -35,17 +36,10 @@ def source_of(
             used; for a folder, all of it.
 
     Raises:
-        VoodooError: no such recording, an option out of range, or one that this source does not have.
+        VoodooError: no such recording, or an option out of range.
     """
     kind, colon, rest = str(word).partition(":")
     options = dict(options or {})
-    if kind in (REALSENSE, GROW) or (kind == ROS2 and colon):
-        known = ("meters_per_unit", "tf_max_age") if kind == ROS2 else ()
-        given = {**options, **({} if root_frame is None or kind == ROS2 else {"frame": root_frame})}
-        if unknown := sorted(set(given) - set(known)):
-            raise VoodooError(
-                f"{word}: expected no {', '.join(unknown)}; options of this source: {', '.join(known) or 'none'}"
-            )
     if kind == REALSENSE:
         from voodoo.live.sources.realsense import RealSenseSource
 
@@ -54,7 +48,7 @@ def source_of(
         from voodoo.live.sources.ros2 import Ros2Source
 
         topics = [topic for topic in rest.split(",") if topic]
-        return Ros2Source(topics, root_frame=root_frame, calibration=calibration, **options)
+        return Ros2Source(topics, root_frame=root_frame, calibration=calibration, **_of_topics(options))
     if kind == GROW and colon:
         from voodoo.live.sources.growing import GrowingSource
 
@@ -70,3 +64,26 @@ def source_of(
     left_out = LeftOut()
     recording = open_recording(word, bare=True, left_out=left_out, **options)
     return PlayedSource(recording, rate=rate, loop=loop, left_out=left_out)
+
+
+def _of_topics(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if name in _OF_TOPICS}
+
+
+def refuse_unused(words: Sequence[str], options: Mapping[str, Any]) -> None:
+    """Reject options that none of the sources uses; those of recordings are checked by their loaders.
+
+    Args:
+        words: see source_of.
+        options: those that are given; `frame`, `rate`, `loop` and the ones of loaders.
+
+    Raises:
+        VoodooError: names them.
+    """
+    kinds = {word.partition(":")[0] for word in words}
+    known = ("frame", *_OF_TOPICS) if ROS2 in kinds else ()
+    unknown = sorted(set(options) - set(known))
+    if unknown and kinds <= {REALSENSE, ROS2, GROW}:
+        raise VoodooError(
+            f"{', '.join(words)}: expected no {', '.join(unknown)}, found some; options: {', '.join(known) or 'none'}"
+        )
