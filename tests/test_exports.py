@@ -6,11 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.convert import convert
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 import voodoo
+from color_scene import write_videos
+from commands import run
+from measurement_data import data_folder
 from voodoo.errors import BodyError, VoodooError
 from voodoo.export import write_bag, write_bvh, write_trc
 from voodoo.export.files import check_target, save
@@ -18,7 +22,7 @@ from voodoo.export.human_frames import frame_poses
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
-from voodoo.export.upright import lying_words
+from voodoo.export.upright import by_axes, by_feet, by_floor, lying_words, turned
 from voodoo.pipeline.run import start_tracker
 from voodoo.pipeline.run import track as run_track
 from voodoo.recordings import sample_path
@@ -228,7 +232,7 @@ def test_what_a_camera_sees_stands_in_every_format(tmp_path, tracked, frame, opt
         (tmp_path / "camera", seen_by_a_camera(track), frame, optical),
     ):
         for name in ("x.bvh", "x.trc", "bag"):
-            save(one, place / name, body=body, root_frame=root, optical=how)
+            save(one, place / name, body=body, root_frame=root, turn=by_axes(root, optical=how))
     for name in ("x.bvh", "x.trc"):
         level, camera = (
             [float(word) for line in (tmp_path / room / name).read_text().splitlines()[-2:] for word in line.split()]
@@ -268,6 +272,86 @@ def test_a_body_that_lies_or_floats_is_doubted(tracked):
     high = replace(track, joints=track.joints + (0.0, 0.0, 4.0))
     assert "above the floor, z = 0 of odom" in lying_words(high, "odom")
     assert lying_words(high, "world") == ""  # nobody says that its z = 0 is the floor
+
+
+def test_a_floor_or_feet_level_a_leaning_frame(tracked):
+    track, _ = tracked
+    lean = np.eye(4)
+    lean[:3, :3], lean[:3, 3] = Rotation.from_euler("xyz", (0.3, -0.2, 0.0)).as_matrix(), (0.1, -0.2, 1.3)
+    camera = seen_by_a_camera(turned(track, by_axes("odom")._replace(pose=lean)))
+    optical = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    normal = optical @ lean[:3, :3] @ (0.0, 0.0, 1.0)
+    level = turned(camera, by_floor((normal, float(normal @ optical @ lean[:3, 3])), optical=True))
+    np.testing.assert_allclose(level.joints[..., 2], track.joints[..., 2], atol=1e-9)
+    facing = level.joints[0, track.joint_names.index("l_wrist")] - level.joints[0, track.joint_names.index("r_wrist")]
+    assert facing[1] > 0.2, "who looks away from the camera has the left hand on the left"
+    lying = replace(track, joints=track.joints[..., [0, 2, 1]] * (1.0, -1.0, 1.0) + (0.0, 3.0, 0.0))  # along -Y
+    turn = by_feet([lying], "world")
+    assert "-Y of world" in turn.words
+    np.testing.assert_allclose(turned(lying, turn).joints[..., 2], track.joints[..., 2], atol=0.03)
+
+
+def converted(bag, folder):
+    """The same bag of ROS 1."""
+    nothing = {f"{which}_{what}": () for which in ("exclude", "include") for what in ("topics", "msgtypes")}
+    how = {
+        "compress": None,
+        "compress_mode": "file",
+        "default_typestore": None,
+        "typestore": get_typestore(Stores.ROS1_NOETIC),
+    }
+    to = {"dst_storage": "", "dst_version": 9}
+    convert([bag], folder / "one.bag", **to, **how, **nothing)
+    return folder / "one.bag"
+
+
+LOADED = {
+    "ros2": ("reports", "export-from-camera-frame", "bag"),
+    "ros1": ("reports", "export-from-camera-frame", "bag"),
+    "folder": ("reports", "text-variants", "folder_bom"),
+    "utd-mhad": ("utd-mhad", "Depth", "a23_s1_t1_depth.mat"),
+    "pose2sim": ("reports", "keypoint-files-unpadded", "walk"),
+    "c3d": ("reports", "c3d-z-up", "walk.c3d"),
+    "trc": ("reports", "text-variants", "bom.trc"),
+    "videos": (),
+}
+
+
+@pytest.mark.parametrize("loader", LOADED)
+def test_every_loader_stands_in_every_format(loader, tmp_path, voodoo_data, monkeypatch):
+    """Head minus feet points up."""
+    monkeypatch.chdir(tmp_path)
+    path = write_videos(tmp_path / "films", 2)
+    if LOADED[loader]:
+        path = data_folder(voodoo_data, *LOADED[loader][:2]) / LOADED[loader][2]
+    if loader == "ros1":
+        path = converted(path, tmp_path)
+    options = ["--option", "rate=15"] if loader == "pose2sim" else []
+    names = ["x.bvh", "x.trc", "x.mcap", "bag", "x.npz"]
+    done = run("track", path, *options, *(f"--out={name}" for name in names))
+    assert done.exit_code == 0, done.stderr
+    track = Track.load(Path("x.npz"))
+    ends = [track.joint_names.index(name) for name in ("head_center", "l_ankle")]
+    seen = standing("", ends)
+    if loader in ("ros2", "folder", "trc"):
+        assert run("track", path, "--upright", *(f"--out=up{name}" for name in (*names, "x.csv"))).exit_code == 0
+        seen |= standing("up", ends) | {one: Track.load(Path(one)).joints[-1][ends] for one in ("upx.npz", "upx.csv")}
+    for name, (head, foot) in seen.items():
+        assert head[2] - foot[2] > 0.8, name
+        assert "up" not in name or abs(foot[2]) < 0.2, f"{name}: on the floor"
+
+
+def standing(start, ends):
+    """Head and foot (2, 3) by the last frame of each of the files whose names begin so."""
+    bones, trc = read_bvh(Path(f"{start}x.bvh"))[0], read_trc(Path(f"{start}x.trc"))
+    seen = {f"{start}x.bvh": np.array([bones[name][-1][[2, 0, 1]] / 100.0 for name in ("head", "l_foot")])}
+    points = [trc.positions[-1, trc.names.index(name)] for name in ("head_center", "l_ankle")]
+    seen[f"{start}x.trc"] = np.array(points) @ Z_UP_FROM_Y_UP.T
+    for bag in (f"{start}x.mcap", f"{start}bag"):
+        shapes = [message for topic, message in messages_of(Path(bag)) if topic.endswith("/markers")][-1].markers
+        dots = next(marker for marker in shapes if marker.ns == "joints").points
+        seen[bag] = np.array([[dots[index].x, dots[index].y, dots[index].z] for index in ends])
+    return seen
 
 
 BY_FRAME = ("residual", "joints", "world_from_limb", "angles", "covariance", "root_covariance")

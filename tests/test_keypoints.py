@@ -189,3 +189,23 @@ def test_the_person_nearest_to_the_prediction_is_chosen():
     chosen = nearest_person([other, mine], layout="body25", camera=CAMERA, world_from_sensor=POSE, predicted=joints)
     assert chosen is mine
     assert nearest_person([], layout="body25", camera=CAMERA, world_from_sensor=POSE, predicted=joints) is None
+
+
+def test_other_programs_of_the_same_keypoints(tmp_path):
+    rows = np.column_stack([np.arange(17) + 1.0, np.arange(17) + 2.0, np.full(17, 0.5)])
+    flat, pairs = rows.ravel().tolist(), rows[:, :2].tolist()
+    alphapose = [{"image_id": "0.jpg", "keypoints": flat}]
+    mmpose = {"meta_info": {}, "instance_info": [{"keypoints": pairs, "keypoint_scores": [0.5] * 17}]}
+    nested = {"people": [{"pose_keypoints_2d": rows.tolist()}]}
+    first = {"version": 1.1, "people": [{"pose_keypoints": flat}]}
+    path = tmp_path / "0.json"
+    for content in (alphapose, mmpose, nested, first):
+        path.write_text(json.dumps(content))
+        (person,) = read_openpose_json(path, layout="coco17")
+        np.testing.assert_array_equal(person, rows)
+    path.write_text(json.dumps([*alphapose, {"image_id": "1.jpg", "keypoints": flat}]))
+    with pytest.raises(RecordingError, match="a file for each image, found 2 image_id"):
+        read_openpose_json(path, layout="coco17")
+    path.write_text(json.dumps({"instance_info": [{"keypoints": pairs, "keypoint_scores": [0.5]}]}))
+    with pytest.raises(RecordingError, match="a score for each"):
+        read_openpose_json(path, layout="coco17")

@@ -167,6 +167,11 @@ def test_signals_finish_files(tmp_path, number):
     [
         (["nowhere"], "found no such file"),
         (["ros2:,"], "ros2:TOPIC"),
+        (
+            ["ros2:/depth", "--topic", "depth=/depth"],
+            "ros2:/depth: expected no depth_topic, found some; options: frame, meters_per",
+        ),
+        (["grow:.", "--loop", "--frame", "odom"], "grow:.: expected no frame, loop, found some; options: none"),
         ([sample_path(), "--rate", "0"], "rate: expected a number above 0"),
         ([sample_path(), "--out", "pose.xyz"], "expected a name that ends in"),
         ([sample_path(), "--calibration", "a.toml"], "a recording brings its own"),

@@ -147,6 +147,9 @@ def test_a_trc_whose_body_lies_is_doubted(tmp_path):
     told = open_recording(tmp_path / "lies.trc", markers=MarkerMap(y_up=False))
     assert told.assumed == ()
     assert upright(told) > 0.4
+    names, rows = walking([1, 2, 0])
+    (said,) = open_recording(write_rows(tmp_path / "high.trc", names, rows + (0.0, 4.0, 0.0))).assumed
+    assert "no marker is lower than 4." in said
 
 
 def upright(recording):

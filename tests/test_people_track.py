@@ -1,6 +1,7 @@
 """voodoo track --people: rows, files of every kind, pictures; and recordings of made-up people."""
 
 import csv
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -18,8 +19,11 @@ from voodoo.evaluation.people_evaluate import judge
 from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
 from voodoo.export.track import Track
+from voodoo.measurements import MarkerSet, RecordedFrame
 from voodoo.names import SEARCHING
 from voodoo.pipeline.people import track_people
+from voodoo.recordings import SensorInfo
+from voodoo.sensors.adapters import Adapter, register, unregister
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.people import COLOR, MadeUpRecording
 from voodoo.visualization.ink import person_color
@@ -238,3 +242,114 @@ def test_skin_is_searched_for_on_everybody_where_it_is_asked_for():
         used[use] = [person[COLOR][1] for person in last]
     assert len(used[None]) == 2 and max(used[None]) == 0
     assert min(used["depth", "skin"]) >= 1, used
+
+
+class Tag:
+    """A measurement that a registered adapter knows."""
+
+    sensor, stamp = "tag", 0.0
+
+
+class TagAdapter(Adapter):
+    kind = "tag"
+    measurement = Tag
+    seen = 0
+
+    def add(self, frame, item, context):
+        TagAdapter.seen += 1
+
+
+@pytest.fixture
+def with_sensor(monkeypatch):
+    """The made-up recording with another sensor, which measures the same in every frame."""
+
+    def added(kind, item):
+        plain, about = MadeUpRecording.__iter__, two_people().info()
+        sensor = SensorInfo(item.sensor, kind, about.root_frame, 3, 30.0, "")
+        monkeypatch.setattr(MadeUpRecording, "info", lambda _: replace(about, sensors=(*about.sensors, sensor)))
+
+        def several(recording):
+            for frame in islice(plain(recording), 30, 33):
+                yield RecordedFrame(frame.stamp, (item, *frame.measurements))
+
+        monkeypatch.setattr(MadeUpRecording, "__iter__", several)
+
+    return added
+
+
+LAMP = """name = "lamp"
+[[limbs]]
+name = "foot"
+shape = { length = 0.2, a0 = 0.10, b0 = 0.10, a1 = 0.08, b1 = 0.08 }
+"""
+
+
+REFUSED = {
+    "markers": ("found markers, which are of one person; --use depth,skin leaves", ()),
+    "any other registered adapter": ("found tag, which are of one person", ()),
+    "`--init FILE`": ("init: expected none", ("--init", "start.json")),
+    "`--draw-regions`, `--background`, `--marker-map`": ("draw-regions: expected none with", ("--draw-regions",)),
+    "a body that the detector does not know": (
+        "that the detector of persons knows, found 'lamp'",
+        ("--body", "lamp.toml"),
+    ),
+}
+USED = {
+    "depth images": (),
+    "`--use depth,skin`": ("--use", "depth,skin"),
+    "color images": ("--use", "depth,color"),
+    "an adapter with `while_searching`": (),
+    "`--exclude`, `--depth-range`, `--height`, `--upright`": (
+        *("--exclude", "8,8,8,9,9,9", "--depth-range", "0.5,7", "--height", "1.7", "--upright"),
+    ),
+}
+ELSEWHERE = {"keypoints of several cameras", "point clouds, laser scans"}
+"""Rows with tests of their own: test_people.py, test_what_does_not_go_together_is_refused."""
+
+
+def test_the_table_of_what_works_with_several_people_is_tested():
+    text = (Path(__file__).parents[1] / "docs/how-to/people.md").read_text()
+    rows = text.split("## What works")[1].split("|---|---|\n")[1].split("\n\n")[0].splitlines()
+    assert {row.split(" | ")[0].removeprefix("| ") for row in rows} == {*REFUSED, *USED, *ELSEWHERE}
+    assert {row.split(" | ")[0].removeprefix("| ") for row in rows if "an error" in row and "alone, an" not in row} == {
+        *REFUSED
+    }
+
+
+@pytest.mark.parametrize("what", [*REFUSED, *USED])
+def test_what_works_with_several_people(run, with_sensor, what, tmp_path):
+    words, options = REFUSED.get(what, ("", USED.get(what)))
+    if "adapter" in what:
+        adapter = TagAdapter()
+        adapter.while_searching = "while_searching" in what
+        register(adapter)
+    try:
+        if what == "markers":
+            with_sensor("markers", MarkerSet("m", 1.0, {"l_wrist": (0.0, 0.0, 1.0)}))
+        elif "adapter" in what:
+            with_sensor("tag", Tag())
+        if "body" in what:
+            Path("lamp.toml").write_text(LAMP)
+        done = run("--people", "2", *options, "--out", "x.csv")
+        assert (done.exit_code, words in done.stderr) == (1 if words else 0, True), done.output
+        if "while_searching" in what:
+            assert TagAdapter.seen > 0
+    finally:
+        if "adapter" in what:
+            unregister("tag")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--layout", "body25"), "layout: expected an input it is for (keypoints), found depth, skin"),
+        (("--marker-map", "map.toml"), "marker-map: expected an input it is for (markers)"),
+        (("--draw-regions",), "draw-regions: expected an input it is for (color)"),
+        (("--use", "skin", "--depth-range", "1,3"), "depth-range: expected an input it is for (depth), found skin"),
+        (("--use", "skin", "--exclude", "0,0,0,1,1,1"), "exclude: expected an input it is for (depth, points, scan)"),
+    ],
+)
+def test_an_option_for_an_input_that_is_not_there_is_refused(run, options, words):
+    Path("map.toml").write_text("")
+    done = run(*options, "--out", "x.csv")
+    assert done.exit_code == 1 and words in done.stderr, done.output

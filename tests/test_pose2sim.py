@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from commands import refused, run
 from measurement_data import data_folder
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
 from voodoo.recordings.camera_files import read_camera_toml
+from voodoo.recordings.pose2sim import calibrations
 from voodoo.sensors.rays import SiteRay, agreed
 
 CALIBRATION = """
@@ -33,6 +35,73 @@ def test_camera_toml(tmp_path):
     path.write_text(CALIBRATION.replace("rotation", "turn"))
     with pytest.raises(RecordingError, match=r"cam_01.*no rotation"):
         read_camera_toml(path)
+
+
+@pytest.mark.parametrize("program", ["anipose", "caliscope", "kalibr", "opencv"])
+def test_calibrations_of_other_programs(tmp_path, program):
+    turn = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    texts = {
+        "anipose": ("freemocap_camera_calibration.toml", CALIBRATION.replace("1.0, 3.0]", "1000.0, 3000.0]")),
+        "caliscope": ("config.toml", CALIBRATION.replace("[1.5707963267948966, 0.0, 0.0]", str(turn))),
+        "kalibr": ("camchain.yaml", KALIBR),
+        "opencv": ("cameras.yml", OPENCV),
+    }
+    name, text = texts[program]
+    (tmp_path / name).write_text(text)
+    (found,) = calibrations(tmp_path)
+    placed = read_camera_toml(found, meters_per_unit=0.001 if program == "anipose" else 1.0)[-1]
+    assert (placed.camera.width, placed.camera.height, placed.camera.fx) == (1088, 1920, 1680.0)
+    np.testing.assert_allclose(placed.world_from_sensor[:3, 3], [0.0, -3.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(placed.world_from_sensor[:3, 2], [0.0, 1.0, 0.0], atol=1e-6)
+    (tmp_path / name).write_text(text.replace("1680", "nothing"))
+    with pytest.raises(RecordingError, match=name):
+        read_camera_toml(found)
+
+
+KALIBR = """cam0:
+  camera_model: pinhole
+  intrinsics: [1600.0, 1600.0, 533.0, 948.0]
+  distortion_model: radtan
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
+  resolution: [1088, 1920]
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, 0.0]
+  - [0.0, 0.0, -1.0, 1.0]
+  - [0.0, 1.0, 0.0, 3.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  intrinsics: [1680.0, 1681.0, 533.0, 948.0]
+  distortion_model: equidistant
+  distortion_coeffs: [0.01, 0.0, 0.0, 0.0]
+  resolution: [1088, 1920]
+"""
+OPENCV = """%YAML:1.0
+---
+left:
+   image_width: 1088
+   image_height: 1920
+   K: !!opencv-matrix
+      rows: 3
+      cols: 3
+      dt: d
+      data: [ 1680., 0., 533., 0., 1681., 948., 0., 0., 1. ]
+   D: !!opencv-matrix
+      rows: 4
+      cols: 1
+      dt: d
+      data: [ 0., 0., 0., 0. ]
+   R: !!opencv-matrix
+      rows: 3
+      cols: 3
+      dt: d
+      data: [ 1., 0., 0., 0., 0., -1., 0., 1., 0. ]
+   T: !!opencv-matrix
+      rows: 3
+      cols: 1
+      dt: d
+      data: [ 0., 1., 3. ]
+"""
 
 
 def test_rays_that_disagree_lose_their_trust():
@@ -67,3 +136,12 @@ def test_recording(folder):
         open_recording(folder, cameras=("cam_09",))
     with pytest.raises(RecordingError, match="17 keypoints"):
         next(iter(open_recording(folder, layout="coco17")))
+
+
+def test_keypoint_files_of_which_none_can_be_read_are_an_error(tmp_path):
+    (tmp_path / "Calib.toml").write_text(CALIBRATION)
+    folder = tmp_path / "keypoints" / "left_json"
+    folder.mkdir(parents=True)
+    (folder / "0.json").write_text('{"poses": []}')
+    done = run("info", tmp_path)
+    refused(done, "found some unreadable, the first:", "0.json")

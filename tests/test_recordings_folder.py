@@ -216,3 +216,84 @@ def test_truth_and_start_beside_the_images_are_read_unless_nothing_beside_is(fol
     open_recording(folder, bare=True)
     with pytest.raises(RecordingError, match=r"truth\.csv"):
         open_recording(folder)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["depth_0009", "depth_0010", "depth_0011"],
+        ["frame-000003.depth", "frame-000004.depth", "frame-000005.depth"],
+        ["cam2_image10", "cam2_image11", "cam2_image12"],
+        ["depth_2.0", "depth_10.0", "depth_11.5"],
+    ],
+)
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("suffix", [".png", ".pgm"])
+def test_names_with_numbers_formats_and_folders_of_other_programs(folder, names, flat, suffix):
+    before = [frame.measurements[0].image for frame in open_recording(folder)]
+    for name, file, image in zip(names, sorted((folder / "depth").iterdir()), before, strict=True):
+        file.unlink()
+        cv2.imwrite(str((folder if flat else folder / "depth") / f"{name}{suffix}"), image)
+        if flat:
+            cv2.imwrite(str(folder / f"{name.replace('depth', 'color')}_color.png"), np.zeros((3, 4, 3), np.uint8))
+    if flat:
+        (folder / "depth").rmdir()
+    frames = list(open_recording(folder, rate=10.0))
+    gaps = [2.0 - 0.2, 8.0, 1.5] if "2.0" in names[0] else [0.1, 0.1, 0.1]
+    np.testing.assert_allclose(np.diff([frame.stamp for frame in frames]), gaps[1:], atol=1e-9)
+    for frame, image in zip(frames, before, strict=True):
+        np.testing.assert_array_equal(frame.measurements[0].image, image)
+
+
+def test_a_pgm_that_is_cut_off_and_pictures_of_eight_bits_are_named(folder):
+    (folder / "depth" / f"{STAMPS[0]}.png").unlink()
+    (folder / "depth" / f"{STAMPS[0]}.pgm").write_bytes(b"P5\n# comment\n4 3\n65535\n" + bytes(23))
+    with pytest.raises(RecordingError, match="complete PGM"):
+        list(open_recording(folder))
+    (folder / "depth" / f"{STAMPS[0]}.pgm").write_bytes(b"P5\n# comment\n4 3\n255\n" + bytes(range(12)))
+    with pytest.raises(RecordingError, match="found 8 bits and 1 channel with values from 0 to 11"):
+        list(open_recording(folder))
+
+
+def test_mirrored_images_are_flipped_back(folder):
+    before = [frame.measurements[0].image for frame in open_recording(folder)]
+    (folder / "calibration.toml").write_text("mirrored = true\n" + CALIBRATION)
+    for frame, image in zip(open_recording(folder), before, strict=True):
+        np.testing.assert_array_equal(frame.measurements[0].image, image[:, ::-1])
+    (folder / "calibration.toml").write_text("mirrored = 1\n" + CALIBRATION)
+    with pytest.raises(RecordingError, match="mirrored: expected true or false, found 1"):
+        open_recording(folder)
+
+
+ROS_YAML = """image_width: 4
+image_height: 3
+camera_name: depth
+camera_matrix: {rows: 3, cols: 3, data: [5.0, 0.0, 1.5, 0.0, 5.5, 1.0, 0.0, 0.0, 1.0]}
+distortion_model: plumb_bob
+distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0.0, 0.0, 0.0, 0.0]}
+"""
+OPENCV_YAML = """%YAML:1.0
+---
+image_width: 4
+image_height: 3
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 5., 0., 1.5, 0., 5.5, 1., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ 1.0e-01, 0., 0., 0., 0. ]
+"""
+
+
+@pytest.mark.parametrize("text", [ROS_YAML, OPENCV_YAML])
+def test_a_calibration_in_yaml(folder, text):
+    (folder / "calibration.toml").unlink()
+    (folder / "camera.yaml").write_text(text)
+    item = next(iter(open_recording(folder))).measurements[0]
+    camera = item.camera
+    assert (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy) == (4, 3, 5.0, 5.5, 1.5, 1.0)
+    assert camera.distortion[0] == 0.1 and item.meters_per_unit == 0.001

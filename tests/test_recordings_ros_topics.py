@@ -1,5 +1,6 @@
 """Which topics, frames and calibrations of a ROS bag are used, and what is wrong with some."""
 
+import cv2
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -94,3 +95,64 @@ def test_the_calibration_may_come_from_elsewhere(tmp_path):
         open_recording(path)
     (image,) = only(open_recording(path, camera_info_topic="/factory/info"))
     assert image.camera.fx == 7.0
+
+
+def png_of(image, suffix=".png"):
+    return cv2.imencode(suffix, image)[1].tobytes()
+
+
+@pytest.mark.parametrize("topic", ["/oak/stereo/image_raw", "/distance/image", "/mirror/image_raw"])
+@pytest.mark.parametrize(
+    "encoding", ["16UC1", "mono16", "32FC1", "16UC1; png compressed ", "mono16; png compressed", "png"]
+)
+def test_depth_is_what_its_encoding_says_whatever_the_topic(tmp_path, topic, encoding):
+    data = DEPTH.astype(np.float32) if encoding == "32FC1" else DEPTH
+    entry = depth_entry(10.2, data, encoding, topic)
+    if "png" in encoding:
+        entry = (f"{topic}/compressed", 10.2, M.compressed(10.2, png_of(DEPTH), encoding))
+    info = (topic.rsplit("/", 1)[0] + "/camera_info", 10.0, M.camera_info(10.0))
+    (image,) = only(open_recording(bag(tmp_path, TF, info, entry)))
+    np.testing.assert_array_equal(image.image, data)
+
+
+@pytest.mark.parametrize("name", ["infra1/image", "ir/image", "stereo/disparity", "stereo/confidence", "left_ir/image"])
+def test_images_named_as_something_else_are_no_depth_unless_the_user_says_so(tmp_path, name):
+    info = (f"/{name.rsplit('/', 1)[0]}/camera_info", 10.0, M.camera_info(10.0))
+    path = bag(tmp_path, TF, info, INFO, depth_entry(10.1), depth_entry(10.2, encoding="mono16", topic=f"/{name}"))
+    assert [one.sensor for one in only(open_recording(path))] == ["/d/depth/image"]
+    assert [one.sensor for one in only(open_recording(path, depth_topic=f"/{name}"))] == [f"/{name}"]
+
+
+def test_of_depth_as_jpeg_it_is_said_that_the_distances_are_gone(tmp_path):
+    jpeg = png_of((DEPTH // 20).astype(np.uint8), ".jpg")
+    lossy = ("/d/depth/image/compressed", 10.2, M.compressed(10.2, jpeg, "16UC1; jpeg compressed "))
+    with pytest.raises(RecordingError, match=r"JPEG, in which the distances are lost; record .*compressedDepth"):
+        open_recording(bag(tmp_path, TF, INFO, lossy))
+    with pytest.raises(RecordingError, match="distances are lost"):
+        list(open_recording(write_bag(tmp_path / "chosen", [TF, INFO, lossy]), depth_topic=lossy[0]))
+    scan = ("/scan", 10.2, M.scan(10.2, [1.0]))
+    recording = open_recording(write_bag(tmp_path / "other", [TF, INFO, lossy, scan]))
+    assert [sensor.name for sensor in recording.info().sensors] == ["/scan"]
+    assert any("distances are lost" in why for _, why in recording.info().unused)
+
+
+def test_a_topic_chosen_for_a_kind_is_guessed_for_no_other(tmp_path):
+    entry = ("/d/depth/image/compressed", 10.2, M.compressed(10.2, png_of(DEPTH), "png"))
+    (image,) = only(open_recording(bag(tmp_path, TF, INFO, entry), depth_topic=entry[0]))
+    np.testing.assert_array_equal(image.image, DEPTH)
+    gray = depth_entry(10.2, (DEPTH // 20).astype(np.uint8), "mono8", "/d/left/image")
+    other = ("/d/left/camera_info", 10.0, M.camera_info(10.0))
+    path = write_bag(tmp_path / "c", [TF, INFO, other, depth_entry(10.2), gray])
+    with pytest.raises(RecordingError, match="depth encoding"):
+        list(open_recording(path, depth_topic="/d/left/image"))  # and not the depth that would be guessed
+
+
+@pytest.mark.parametrize("command", ["track", "info", "init", "ik", "live", "eval", "batch"])
+def test_every_command_that_reads_a_recording_has_its_options(tmp_path, command):
+    if command == "batch":
+        pytest.importorskip("fsspec")
+    path = bag(tmp_path, TF, INFO, depth_entry(10.2))
+    how = {"track": ["--out", "x.csv"], "batch": ["--out", str(tmp_path / "o"), "--workers", "1"]}.get(command, [])
+    options = ["--topic", "depth=/nowhere", "--option", "meters_per_unit=0.001", "--frame", "cam"]
+    found = CliRunner().invoke(app, [command, str(path), *options, *how], env={"COLUMNS": "200"})
+    assert found.exit_code == 1 and "depth_topic '/nowhere': expected one of /d/depth/image" in found.output

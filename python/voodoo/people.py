@@ -102,6 +102,7 @@ class People:
         if not (isinstance(forget_after, int | float) and math.isfinite(forget_after) and forget_after >= 0.0):
             raise ConfigError(f"forget_after: expected a finite number of seconds, found {forget_after!r}")
         self.config = Config() if config is None else config
+        self.detector = detector
         self._prototype = Body.human() if body is None else body
         self._core = _core.People(
             self._prototype.core,

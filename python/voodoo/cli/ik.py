@@ -12,6 +12,7 @@ from voodoo.cli.common import (
     clear_errors,
     loader_words,
     print_interrupted,
+    print_message,
     print_result,
     progressing,
     refuse_both,
@@ -93,8 +94,8 @@ def ik_command(
     """
     import numpy as np
 
-    from voodoo.cli.running import opened
-    from voodoo.export.files import check_target, written
+    from voodoo.cli.running import opened, turn_of
+    from voodoo.export.files import check_target, upright_words, written
     from voodoo.export.files import save as export
     from voodoo.export.track import Track
     from voodoo.model.body import Body
@@ -127,9 +128,10 @@ def ik_command(
         how["wrap"] = partial(progressing, words=source.name, total=len(source))
         result, errors = follow(source, tracker, positions, **how)
 
+        turn = turn_of(source, [result], files)
+
         def write(path: Path) -> list[Path]:
-            optical = source.info().camera_root
-            export(result, path, body=tracker.body, root_frame=source.root_frame, optical=optical)
+            export(result, path, body=tracker.body, root_frame=source.root_frame, turn=turn)
             return [path]
 
         with deferred():
@@ -141,3 +143,5 @@ def ik_command(
         refuse_missing(failed, message)
         print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
         print_result(message, files)
+        if words := upright_words(done, turn):
+            print_message(words)

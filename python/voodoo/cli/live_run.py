@@ -28,13 +28,14 @@ from voodoo.live.follow import ONE, Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.registry import sink_of
-from voodoo.live.sources.words import source_of
+from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
 from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.names import HumanModel
 from voodoo.people import People
+from voodoo.pipeline.people import check_inputs
 from voodoo.pipeline.start import Beginning, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import Box, FrontEndSettings
@@ -108,9 +109,13 @@ def entered(
     """
     if len(calibrations) > len(words):
         raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
+    given = {"frame": root_frame, "rate": None if rate == 1.0 else rate, "loop": loop or None, **options}
+    refuse_unused(words, {name: value for name, value in given.items() if value is not None})
     places = [*calibrations, *[None] * (len(words) - len(calibrations))]
     sources = [
-        source_of(word, rate=rate, loop=loop, root_frame=root_frame, options=options, calibration=place)
+        source_of(
+            word, rate=rate, loop=loop, root_frame=root_frame, options=options_for(word, options), calibration=place
+        )
         for word, place in zip(words, places, strict=True)
     ]
     return Live(sources, on_message=print_message, eager=not several)
@@ -170,6 +175,7 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     if wishes.several:
         body = body_of(wishes.body, height=wishes.height, model=wishes.model)
         config, detector = wishes.config, wishes.detector
+        check_inputs(first, People(body, config=config, detector=detector), settings)
         return Follower(
             people=lambda: People(body, config=config, detector=detector, limit=wishes.limit), settings=settings
         )

@@ -109,7 +109,8 @@ LoaderNumberOption = Annotated[
     typer.Option(
         "--option",
         metavar="NAME=NUMBER",
-        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit (depth of bags), "
+        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit "
+        "(depth of bags; calibrations of Pose2Sim and videos), "
         "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
     ),
 ]
@@ -140,6 +141,13 @@ DepthRangeOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout, and nothing else there.")]
 ViewOption = Annotated[
     bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
+]
+UprightOption = Annotated[
+    bool,
+    typer.Option(
+        "--upright",
+        help="Put every result on the floor that is seen, else under the feet: z up, x forward, z = 0 on it.",
+    ),
 ]
 RESULTS = (
     "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, a folder (ROS 2 bag), or - for CSV on stdout; "

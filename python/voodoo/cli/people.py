@@ -53,6 +53,17 @@ def no_starts(init: str | None) -> Automatic:
     return AUTO
 
 
+def refuse_several(**options: object) -> None:
+    """Options of one person; names with _ for -.
+
+    Raises:
+        VoodooError: one is given.
+    """
+    for name, value in options.items():
+        if value:
+            raise VoodooError(f"{name.replace('_', '-')}: expected none with --people any or N, it is for one person")
+
+
 def body_of(body: Path | None, *, height: float | None, model: HumanModel | None) -> Body | None:
     """The body that is copied for new persons: from a file, a human of a stature, or None for the default."""
     from voodoo.model.body import Body

@@ -15,13 +15,18 @@ from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
 from voodoo.errors import NoPoseError, VoodooError
+from voodoo.export.files import is_table
+from voodoo.export.track import Track
+from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
+from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import Beginning
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.settings import Box, FrontEndSettings
+from voodoo.sensors.kinds import inputs_of
+from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
 from voodoo.tracker import Tracker
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.ink import Picture
@@ -78,6 +83,29 @@ def bare_for(init: Beginning | None) -> dict[str, Any]:
     return {} if init is None else {"bare": True}
 
 
+def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> None:
+    """Reject options for inputs that are not used.
+
+    Args:
+        has: kinds of inputs that are used; empty: not known.
+        **options: name, with _ for -, -> its value, None or empty if it is not given, and the kinds of inputs it is for.
+
+    Raises:
+        VoodooError: names option and inputs.
+    """
+    for name, (given, kinds) in options.items():
+        if given and has and not has & set(kinds):
+            raise VoodooError(
+                f"{name.replace('_', '-')}: expected an input it is for ({', '.join(kinds)}), found "
+                f"{', '.join(sorted(has))}"
+            )
+
+
+def used_inputs(source: Recording, settings: FrontEndSettings) -> set[str]:
+    """Kinds of inputs that a recording has and that are used."""
+    return {kind for sensor in source.info().sensors for kind in inputs_of(sensor.kind)} & set(settings.use)
+
+
 def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
     """Parse boxes of the form "X0,Y0,Z0,X1,Y1,Z1", lower corner first.
 
@@ -109,6 +137,25 @@ def detector_of(path: Path | None) -> AnyDetector:
         ConfigError: the file is not such a network.
     """
     return "shipped" if path is None else OnnxDetector(path)
+
+
+def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path], *, upright: bool = False) -> Turn:
+    """How files are turned upright whose root frame is a camera's: by the floor that is seen, else by its axes.
+
+    Args:
+        source: the recording.
+        tracks: its results.
+        targets: the files.
+        upright: turn any root frame to z up and put the feet on z = 0; one that is known to be so stays.
+    """
+    root, optical = source.root_frame, source.info().camera_root
+    stands = root in LEVEL_FRAMES and not optical and not any(lying_words(track, root) for track in tracks)
+    if stands or not (upright or (optical and not all(map(is_table, targets)))):
+        return by_axes(root, optical=optical)
+    floor = seen_floor(source)
+    if floor is not None:
+        return by_floor(floor, optical=optical)
+    return by_feet(tracks, root, optical=optical) if upright else by_axes(root, optical=optical)
 
 
 def run(
@@ -180,6 +227,7 @@ def run(
     if not seconds:
         raise NoPoseError(
             f"{source.name}: expected at least one frame that can be used, found none: {left_out or 'it is empty'}"
+            + (f" (the first: {next(iter(left_out.first.values()))})" if left_out else "")
         )
     outputs = [(path, output.failure) for path, output in ((overlay, writer), (save, viewer)) if output is not None]
     failures += [failure for _, failure in outputs if failure is not None]

@@ -37,6 +37,7 @@ from voodoo.cli.options import (
     RecordingArgument,
     StrictOption,
     TopicOption,
+    UprightOption,
     UseOption,
     ViewOption,
 )
@@ -64,6 +65,7 @@ def track_command(
     detector: DetectorOption = None,
     people: PeopleOption = "1",
     out: OutOrNameOption = None,
+    upright: UprightOption = False,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a video.")
     ] = None,
@@ -143,7 +145,7 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.closing import closing_doubts, closing_lines
-    from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people
+    from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people, refuse_several
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import (
         bare_for,
@@ -154,7 +156,10 @@ def track_command(
         kinds_of,
         opened,
         pictured,
+        refuse_unused,
         run,
+        turn_of,
+        used_inputs,
         viewer_of,
     )
     from voodoo.export.files import check_target, upright_words
@@ -188,8 +193,6 @@ def track_command(
             options["background"] = background
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
-        if layout is not None and not keypoints and not any("layout" in each for each in (options, *taken)):
-            raise typer.BadParameter("--layout is for keypoints, of --keypoints or a Pose2Sim folder")
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         source = join(
             opened(
@@ -206,24 +209,37 @@ def track_command(
         )
         for words in source.assumed:
             print_message(words)
+        if several:
+            refuse_several(draw_regions=draw_regions, background=background, marker_map=marker_map)
+        used = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
+        places = ("depth", "points", "scan")
+        refuse_unused(
+            used_inputs(source, used),
+            depth_range=(depth_range, ("depth",)),
+            detector=(detector, ("depth",)),
+            exclude=(exclude, places),
+            layout=(layout, ("keypoints",)),
+            marker_map=(marker_map, ("markers",)),
+            draw_regions=(draw_regions, ("color",)),
+            background=(background, ("color",)),
+        )
         targets = out or [Path(f"{source.name}.csv")]
         for target in targets:
             check_target(target)
         if not out:
             check_paths(context, targets)
         recover_before(targets)
-        optical = source.info().camera_root
         keeping = Spool(
-            targets, root_frame=lambda: source.root_frame, optical=optical, several=several, together=TOGETHER
+            targets,
+            root_frame=lambda: source.root_frame,
+            optical=source.info().camera_root,
+            upright=upright,
+            several=several,
+            together=TOGETHER,
         )
         with keeping as spool, viewer_of(view, save, source.name) as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
-            settings = replace(
-                FrontEndSettings.of(source, use=kinds),
-                depth_filter=depth_filter,
-                exclude=boxes,
-                draw_regions=draw_regions and not several,
-            )
+            settings = replace(used, draw_regions=draw_regions)
             if several:
                 followed = body_of(body, height=height, model=model)
                 everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
@@ -246,9 +262,10 @@ def track_command(
                 how |= {"take": lambda step: spool.add(step.estimate, {ONE: tracker.body}), **pictured(tracker)}
             with deferred():
                 done = run(source, **how)
-                sample = None if several else spool.sample()
-                files, failed = spool.write(left_out=None if left_out is None else left_out.counts)
-        turned = upright_words(files, source.root_frame, optical=optical)
+                sample = spool.sample()
+                turn = turn_of(source, sample, targets, upright=upright)
+                files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
+        turned = upright_words(files, turn, every=upright)
         if several:
             count, rows = len(spool.persons), spool.states.total()
             found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
@@ -265,7 +282,7 @@ def track_command(
         if not several:
             message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
         print_result(message, targets)
-        if sample is not None and (doubt := lying_words(sample, source.root_frame, optical=optical)):
+        for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
             print_message(f"{source.name}: {doubt}")
         told = height or getattr(beginning, "height_m", None)
         if told is None and beginning is None and source.start is not None:

@@ -19,9 +19,8 @@ from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import write_bag
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
-from voodoo.export.upright import upright
+from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
-from voodoo.model.standing import is_optical
 from voodoo.whole import appearing_whole
 
 ONE_PERSON: Mapping[str, Callable[[Path, Track, Body], None]] = {
@@ -78,12 +77,12 @@ def is_table(path: Path) -> bool:
     return path == STDOUT or path.suffix in SUFFIXES
 
 
-def upright_words(paths: Sequence[Path], root_frame: str, *, optical: bool | None = None) -> str:
-    """Which of the files `save` turns upright, in one line; "" if none."""
-    turned = [str(path) for path in paths if not is_table(path)]
-    if not turned or not (is_optical(root_frame) if optical is None else optical):
-        return ""
-    return f"{', '.join(turned)}: turned upright, since the root frame {root_frame} is a camera's (y down, not level)"
+def upright_words(paths: Sequence[Path], turn: Turn, *, every: bool = False) -> str:
+    """Which of the files, or `every` one, is turned upright, in one line; "" if none."""
+    if every and not turn.words:
+        return "--upright turned nothing: z = 0 of the root frame is the floor already"
+    turned = [str(path) for path in paths if every or not is_table(path)]
+    return f"{', '.join(turned)}: turned upright {turn.words}" if turned and turn.words else ""
 
 
 @contextmanager
@@ -130,7 +129,7 @@ def on_stdout(path: Path) -> Iterator[Path]:
             shutil.copyfileobj(text, sys.stdout)
 
 
-def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool | None = None) -> None:
+def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | None = None) -> None:
     """Write a track in the format of the suffix, or a ROS 2 bag folder.
 
     Args:
@@ -138,7 +137,7 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         path: see FORMATS.
         body: in the sizes it was tracked with.
         root_frame: frame of the track.
-        optical: whether that is a camera's optical frame; then all but .csv and .npz are turned upright. None: by its name.
+        turn: how all but .csv and .npz are turned upright; None: a camera's optical frame, by its name, by its axes.
 
     Raises:
         VoodooError: another suffix, or data that the format requires are missing.
@@ -151,9 +150,9 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, optical: bool
         return
     with appearing_whole(path) as place:
         if path.suffix in ONE_PERSON:
-            ONE_PERSON[path.suffix](place, upright(track, root_frame, optical=optical)[0], body)
+            ONE_PERSON[path.suffix](place, upright(track, root_frame, turn)[0], body)
         elif path.suffix == ".glb":
-            write_glb(place, {path.stem: (upright(track, root_frame, optical=optical)[0], body)})
+            write_glb(place, {path.stem: (upright(track, root_frame, turn)[0], body)})
         else:
             with bag_folder(place) as folder:
-                write_bag(folder, track, body, root_frame=root_frame, optical=optical)
+                write_bag(folder, track, body, root_frame=root_frame, turn=turn)

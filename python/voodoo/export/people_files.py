@@ -9,13 +9,13 @@ from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag, on
 from voodoo.export.glb import write_glb
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import person_id, write_people_bag
-from voodoo.export.upright import upright
+from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
 from voodoo.whole import appearing_whole
 
 
 def save_people(
-    result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], root_frame: str, optical: bool | None = None
+    result: PeopleTrack, path: Path, *, bodies: Mapping[int, Body], root_frame: str, turn: Turn | None = None
 ) -> list[Path]:
     """Write a result of several persons; returns the written files.
 
@@ -27,7 +27,7 @@ def save_people(
         path: see `voodoo.export.files.FORMATS`.
         bodies: of all persons, in the sizes they were tracked with.
         root_frame: frame of the tracks.
-        optical: see `voodoo.export.files.save`.
+        turn: see `voodoo.export.files.save`.
 
     Raises:
         VoodooError: another suffix, or what the format needs is missing.
@@ -38,7 +38,7 @@ def save_people(
         written = []
         for one in result.tracks:
             own = path.with_name(f"{path.stem}_{one}{path.suffix}")
-            track, _ = upright(result.unbroken(one), root_frame, optical=optical)
+            track, _ = upright(result.unbroken(one), root_frame, turn)
             with appearing_whole(own) as place:
                 ONE_PERSON[path.suffix](place, track, bodies[one])
             written.append(own)
@@ -46,11 +46,9 @@ def save_people(
     if is_bag(path):
         people = {person_id(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
         with appearing_whole(path) as place, bag_folder(place) as folder:
-            write_people_bag(folder, people, root_frame=root_frame, optical=optical)
+            write_people_bag(folder, people, root_frame=root_frame, turn=turn)
     elif path.suffix == ".glb":
-        shown = {
-            one: upright(result.unbroken(one, to_the_end=True), root_frame, optical=optical)[0] for one in result.tracks
-        }
+        shown = {one: upright(result.unbroken(one, to_the_end=True), root_frame, turn)[0] for one in result.tracks}
         with appearing_whole(path) as place:
             write_glb(place, {f"{path.stem}_{one}": (track, bodies[one]) for one, track in shown.items()})
     else:

@@ -22,7 +22,7 @@ from voodoo.export.human_frames import frame_poses
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
-from voodoo.export.upright import UPRIGHT_FROM_OPTICAL, upright
+from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
@@ -62,7 +62,7 @@ def write_bag(
     root_frame: str,
     person: str = "p1",
     markers: bool = True,
-    optical: bool | None = None,
+    turn: Turn | None = None,
 ) -> None:
     """Write a new bag folder.
 
@@ -72,7 +72,7 @@ def write_bag(
     where these are known ellipsoids of one standard deviation about them). If the covariance is known,
     `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
     Searching frames have no transforms, no joint states and no pose; their markers delete those of the frame before.
-    If the root is a camera's optical frame, all of it is in the frame `<root_frame>_upright` with x forward and z up, which /tf
+    Where the root is turned, all of it is in the frame `<root_frame>_upright` with x forward and z up, which /tf
     has as a child of the root frame.
 
     Args:
@@ -82,14 +82,14 @@ def write_bag(
         root_frame: frame of the track, e.g. "base_link".
         person: REP-155 id.
         markers: also write the markers.
-        optical: whether the root frame is a camera's optical frame; None: by its name.
+        turn: how the root frame is turned upright; None: a camera's optical frame, by its name, by its axes.
 
     Raises:
         VoodooError: the folder exists, an empty name, stamps before zero (a bag has none), or a track without limb poses or
             of another body.
         OSError: the bag cannot be written.
     """
-    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, markers=markers, optical=optical)
+    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, markers=markers, turn=turn)
 
 
 def write_people_bag(
@@ -98,7 +98,7 @@ def write_people_bag(
     *,
     root_frame: str,
     markers: bool = True,
-    optical: bool | None = None,
+    turn: Turn | None = None,
 ) -> None:
     """Write a new bag folder of several people.
 
@@ -109,7 +109,7 @@ def write_people_bag(
         people: REP-155 id, which begins with a letter -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
         markers: also write the markers.
-        optical: see `write_bag`.
+        turn: see `write_bag`.
 
     Raises:
         VoodooError: as `write_bag`.
@@ -118,18 +118,20 @@ def write_people_bag(
     for name in people:
         if not name.isidentifier():
             raise VoodooError(f"person: expected a name, found {name!r}")
-    humans = [_Human(track, body, name, root_frame, optical=optical) for name, (track, body) in people.items()]
+    humans = [_Human(track, body, name, root_frame, turn) for name, (track, body) in people.items()]
     _write(path, humans, markers=markers)
 
 
 class _Human:
     """The messages of one person."""
 
-    def __init__(self, track: Track, body: Body, person: str, root_frame: str, *, optical: bool | None = None) -> None:
+    def __init__(self, track: Track, body: Body, person: str, root_frame: str, turn: Turn | None = None) -> None:
         if not root_frame:
             raise VoodooError("root_frame: expected a name, found none")
         self._given_root = root_frame
-        track, self.root = upright(track, root_frame, optical=optical)
+        track, self.root = upright(track, root_frame, turn)
+        pose = (by_axes(root_frame) if turn is None else turn).pose
+        self._above = (quaternions(pose[:3, :3].T).tolist(), (-pose[:3, :3].T @ pose[:3, 3]).tolist())
         self.track, self.body, self.person, self.topic = track, body, person, f"{BODIES}/{person}"
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
@@ -155,9 +157,7 @@ class _Human:
             transforms = _transforms(self.track, self._posed, index, self.root, self.person, nanoseconds)
             if self.root != self._given_root:
                 above = _header(nanoseconds, self._given_root)
-                transforms.insert(
-                    0, _transform(above, self.root, quaternions(UPRIGHT_FROM_OPTICAL.T).tolist(), (0.0, 0.0, 0.0))
-                )
+                transforms.insert(0, _transform(above, self.root, *self._above))
             messages["/tf"] = _new(_TF, transforms=transforms)
             messages[f"{self.topic}/joint_states"] = _new(
                 "sensor_msgs/msg/JointState",

@@ -9,6 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
 from types import TracebackType
@@ -25,6 +26,8 @@ from voodoo.export.people import PeopleTrack
 from voodoo.export.people_files import save_people
 from voodoo.export.people_rows import write_rows
 from voodoo.export.track import BODIES, BODY_OF, Arrays, Track, arrays_of, track_of, tracks_of, write_arrays, write_csv
+from voodoo.export.upright import SUFFIX as ROOT_SUFFIX
+from voodoo.export.upright import UNTURNED, Turn, by_axes, by_feet, turned
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
@@ -49,6 +52,7 @@ class Spool:
         paths: outputs, see `voodoo.export.files.FORMATS`.
         root_frame: returns the frame of the poses, when there are some.
         optical: whether that is a camera's optical frame; None: by its name.
+        upright: turn every output upright.
         several: whether several persons are tracked.
         together: number of frames that are kept in memory.
 
@@ -67,13 +71,16 @@ class Spool:
         *,
         root_frame: Callable[[], str],
         optical: bool | None = None,
+        upright: bool = False,
         several: bool = False,
         together: int,
     ) -> None:
         """Check the paths, and make the folder."""
         for path in paths:
             check_target(path)
-        self._paths, self._root, self._optical, self._several = list(paths), root_frame, optical, several
+        self._paths, self._root, self._several = list(paths), root_frame, several
+        self._optical, self._upright = optical, upright
+        self._turn: Turn | None = None
         self._kept_for = [path for path in paths if path != STDOUT]
         self._hidden = Hidden(self._kept_for[0] if self._kept_for else Path(tempfile.gettempdir()) / "stdout.csv")
         self._together = together
@@ -125,7 +132,9 @@ class Spool:
 
     def _keep(self, paths: Iterable[Path]) -> None:
         names = [path.name for path in paths]
-        self._hidden.keep(paths=names, root_frame=self._root(), optical=self._optical, several=self._several)
+        turn = None if self._turn is None else {"pose": self._turn.pose.tolist(), "words": self._turn.words}
+        how: Any = {"optical": self._optical, "upright": self._upright, "turn": turn, "several": self._several}
+        self._hidden.keep(paths=names, root_frame=self._root(), **how)
 
     def _last(self) -> dict[str, npt.NDArray[Any]]:
         """What is in memory."""
@@ -140,21 +149,23 @@ class Spool:
         last = [self._last()] if self._waiting else []
         return lambda: chain(_stored(self._parts), last)
 
-    def sample(self) -> Track:
-        """Some of the frames of one person: all of them if there are few.
+    def sample(self) -> list[Track]:
+        """Some of the frames of every person: all of them if there are few.
 
         Raises:
             VoodooError: no frames.
         """
-        every = -(-(len(self._parts) + 1) // _SAMPLED)
-        return Track.joined([track_of(part) for number, part in enumerate(self._contents()()) if number % every == 0])
+        return _sample(self._contents()(), len(self._parts) + 1, several=self._several)
 
-    def write(self, *, left_out: Mapping[str, int] | None = None) -> tuple[list[Path], list[Exception]]:
+    def write(
+        self, *, turn: Turn | None = None, left_out: Mapping[str, int] | None = None
+    ) -> tuple[list[Path], list[Exception]]:
         """Write the outputs, whatever becomes of each; returns the files, and what failed.
 
         The folder is removed when all of them are complete; it is kept for those that a disk has no place for.
 
         Args:
+            turn: how outputs are turned upright; None: by the axes of the root frame if that is an optical frame.
             left_out: unusable measurements: reason -> number.
 
         Raises:
@@ -165,7 +176,9 @@ class Spool:
             raise VoodooError("expected at least one frame to write, found none")
         failing: list[Path] = []
         contents = self._contents()
-        how: Any = {"bodies": self._bodies, "root_frame": self._root(), "optical": self._optical}
+        self._turn = turn
+        turn = by_axes(self._root(), optical=self._optical) if turn is None else turn
+        how: Any = {"bodies": self._bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
 
         def write(path: Path) -> list[Path]:
             try:
@@ -233,11 +246,15 @@ def _write(
     several: bool,
     bodies: Mapping[int, Body],
     root_frame: str,
-    optical: bool | None,
+    turn: Turn,
+    upright: bool,
     left_out: Mapping[str, int],
 ) -> list[Path]:
     """Write one output. A part is in memory at a time, in formats other than .csv and .npz all."""
     check_target(path)
+    if upright and turn.words:
+        contents = partial(_turned, contents, turn, several=several)
+        root_frame, turn = f"{root_frame}{ROOT_SUFFIX}", UNTURNED
     if is_table(path) and not (several and _jumps(contents())):
         with on_stdout(path) as file, appearing_whole(file) as place:
             if path.suffix == ".npz":
@@ -248,11 +265,31 @@ def _write(
                 sure = any(part["covariance"].size for part in contents())
                 write_csv(place, map(track_of, contents()), sure=sure)
         return [path]
-    how: Any = {"root_frame": root_frame, "optical": optical}
+    how: Any = {"root_frame": root_frame, "turn": turn}
     if several:
         return save_people(PeopleTrack.joined(list(map(_people, contents()))), path, bodies=bodies, **how)
     save(Track.joined(list(map(track_of, contents()))), path, body=bodies[ONE], **how)
     return [path]
+
+
+def _turned(contents: Callable[[], Iterator[Arrays]], turn: Turn, *, several: bool) -> Iterator[Arrays]:
+    """The parts in the upright frame."""
+    for part in contents():
+        if several:
+            people = _people(part)
+            tracks = {one: turned(track, turn) for one, track in people.tracks.items()}
+            yield PeopleTrack(people.stamps, tracks).arrays()
+        else:
+            yield arrays_of(turned(track_of(part), turn))
+
+
+def _sample(contents: Iterator[Arrays], count: int, *, several: bool) -> list[Track]:
+    """Tracks of some of the parts, of `count`."""
+    every = -(-count // _SAMPLED)
+    parts = [part for number, part in enumerate(contents) if number % every == 0]
+    if not several:
+        return [Track.joined(list(map(track_of, parts)))]
+    return list(PeopleTrack.joined(list(map(_people, parts))).tracks.values())
 
 
 def _fixed(parts: Iterator[Arrays], several: bool, left_out: Mapping[str, int]) -> Arrays:
@@ -331,7 +368,14 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
             parts.append(path)
         except VoodooError as error:
             failed.append(error)  # the others can be used
-    how: Any = {"several": bool(note["several"]), "root_frame": str(note["root_frame"]), "optical": note["optical"]}
+    root, several, upright = str(note["root_frame"]), bool(note["several"]), bool(note["upright"])
+    if note["turn"] is not None:
+        turn = Turn(np.array(note["turn"]["pose"]), str(note["turn"]["words"]))
+    elif upright and parts:  # the floor is not known here
+        turn = by_feet(_sample(_stored(parts), len(parts), several=several), root, optical=note["optical"])
+    else:
+        turn = by_axes(root, optical=note["optical"])
+    how: Any = {"several": several, "root_frame": root, "turn": turn, "upright": upright}
     some, errors = written(
         free.values(), lambda path: _write(path, lambda: _stored(parts), bodies=bodies, left_out={}, **how)
     )

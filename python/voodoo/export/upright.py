@@ -2,57 +2,127 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from voodoo.export.track import FloatArray, Track
 from voodoo.model.standing import is_optical, standing_along
+from voodoo.recordings.marker_trajectories import Z_UP_FROM
 from voodoo.sensors.settings import LEVEL_FRAMES
 
 UPRIGHT_FROM_OPTICAL: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Rotation from the axes of an optical frame (x right, y down, z forward) to those of REP-103 (x forward, y left, z up)."""
 _HIGH_M = 1.5
 """Feet that are never below this height above z = 0 are not on a floor there; stairs and platforms are lower."""
+_ANKLE_M = 0.08
+"""Height of the ankle of a standing foot."""
 SUFFIX = "_upright"
-"""Ends the name of the frame with the origin of an optical frame and upright axes."""
+"""Ends the name of the frame with z up."""
 
 
-def lying_words(track: Track, root_frame: str, *, optical: bool | None = None) -> str:
-    """What speaks against a z axis that points up from the floor: a body along another axis, or far above it; "" if nothing."""
-    turned, frame = upright(track, root_frame, optical=optical)
-    along = standing_along(turned.joint_names, turned.joints)
-    if along not in ("", "+Z"):
-        frames = "are images stamped with an optical frame, and its transform right?"
-        return f"the body stands along {along} of {frame}, whose z axis should point up; {frames}"
-    feet = [index for index, name in enumerate(turned.joint_names) if name in ("l_ankle", "r_ankle")]
-    heights = turned.joints[turned.found][:, feet, 2]
-    if frame in LEVEL_FRAMES and heights.size and float(np.nanmin(heights)) > _HIGH_M:
-        return f"the feet are {np.nanmin(heights):.1f} m and more above the floor, z = 0 of {frame}; are the transforms right?"
-    return ""
-
-
-def upright(track: Track, root_frame: str, *, optical: bool | None = None) -> tuple[Track, str]:
-    """A track with z up, and the name of its root frame: with the axes turned if the root is an optical frame, else as it is.
-
-    The camera is taken to be level: the track leans as the camera does.
+class Turn(NamedTuple):
+    """How a root frame is turned upright.
 
     Args:
-        track: in the root frame.
+        pose: upright_from_root, rigid (4, 4).
+        words: what it goes by; "" if nothing is turned.
+    """
+
+    pose: FloatArray
+    words: str
+
+
+UNTURNED = Turn(np.eye(4), "")
+
+
+def by_axes(root_frame: str, *, optical: bool | None = None) -> Turn:
+    """A level camera's optical axes turned to those of REP-103; another root frame stays.
+
+    Args:
         root_frame: its name.
         optical: whether it is an optical frame; None: by its name.
     """
     if not (is_optical(root_frame) if optical is None else optical):
-        return track, root_frame
-    turn = UPRIGHT_FROM_OPTICAL
-    limbs = track.world_from_limb.copy()
-    limbs[..., :3, :] = turn @ limbs[..., :3, :]
-    both = np.kron(np.eye(2), turn)
-    turned = replace(
+        return UNTURNED
+    pose = np.eye(4)
+    pose[:3, :3] = UPRIGHT_FROM_OPTICAL
+    return Turn(pose, f"by the axes of {root_frame}, a camera's; it leans as the camera does")
+
+
+def by_floor(floor: tuple[FloatArray, float], *, optical: bool) -> Turn:
+    """The floor becomes z = 0, below the origin of the root frame; x is forward in an optical frame, else x of the root frame.
+
+    Args:
+        floor: unit normal (3,) upwards and height along it [m], in the root frame.
+        optical: whether the root frame is an optical frame.
+    """
+    up = np.asarray(floor[0], dtype=np.float64)
+    left = np.cross(up, (0.0, 0.0, 1.0) if optical else (1.0, 0.0, 0.0))
+    left /= np.linalg.norm(left)
+    pose = np.eye(4)
+    pose[:3, :3] = np.cross(left, up), left, up
+    pose[2, 3] = -floor[1]
+    return Turn(pose, "by the floor that is seen, now z = 0")
+
+
+def by_feet(tracks: Sequence[Track], root_frame: str, *, optical: bool | None = None) -> Turn:
+    """Without a floor that is seen: by the optical axes, else the axis along which bodies stand, with the feet on z = 0."""
+    turn = by_axes(root_frame, optical=optical)
+    if not turn.words:
+        axes = [standing_along(track.joint_names, track.joints) for track in tracks]
+        axis = next((axis for axis in axes if axis), "+Z")
+        turn = Turn(turn.pose.copy(), f"by {axis} of {root_frame}, along which the body stands")
+        turn.pose[:3, :3] = Z_UP_FROM[axis]
+    heights = [low for track in tracks for low in _ankles(turned(track, turn))]
+    if heights:
+        turn.pose[2, 3] = _ANKLE_M - float(np.median(heights))
+    return Turn(turn.pose, f"{turn.words}; the feet are on z = 0")
+
+
+def lying_words(track: Track, root_frame: str, turn: Turn | None = None) -> str:
+    """What speaks against a z axis that points up from the floor: a body along another axis, or far above it; "" if nothing."""
+    standing, frame = upright(track, root_frame, turn)
+    along = standing_along(standing.joint_names, standing.joints)
+    if along not in ("", "+Z"):
+        frames = "are images stamped with an optical frame, and its transform right?"
+        return f"the body stands along {along} of {frame}, whose z axis should point up; {frames}"
+    low = _ankles(standing)
+    if frame in LEVEL_FRAMES and low.size and float(np.min(low)) > _HIGH_M:
+        return f"the feet are {np.min(low):.1f} m and more above the floor, z = 0 of {frame}; are the transforms right?"
+    return ""
+
+
+def upright(track: Track, root_frame: str, turn: Turn | None = None) -> tuple[Track, str]:
+    """A track with z up, and the name of its root frame: turned if the root is an optical frame, else as it is.
+
+    Args:
+        track: in the root frame.
+        root_frame: its name.
+        turn: how it is turned; None: `by_axes`.
+    """
+    turn = by_axes(root_frame) if turn is None else turn
+    return (turned(track, turn), f"{root_frame}{SUFFIX}") if turn.words else (track, root_frame)
+
+
+def turned(track: Track, turn: Turn) -> Track:
+    """The track in the upright frame."""
+    rotation, shift = turn.pose[:3, :3], turn.pose[:3, 3]
+    both = np.kron(np.eye(2), rotation)
+    return replace(
         track,
-        joints=track.joints @ turn.T,
-        world_from_limb=limbs,
-        covariance=turn @ track.covariance @ turn.T,
+        joints=track.joints @ rotation.T + shift,
+        world_from_limb=turn.pose @ track.world_from_limb,
+        covariance=rotation @ track.covariance @ rotation.T,
         root_covariance=both @ track.root_covariance @ both.T,
     )
-    return turned, f"{root_frame}{SUFFIX}"
+
+
+def _ankles(track: Track) -> FloatArray:
+    """Height of the lower ankle in the frames that have one [m]."""
+    feet = [index for index, name in enumerate(track.joint_names) if name in ("l_ankle", "r_ankle")]
+    heights = track.joints[:, feet, 2]
+    rows: FloatArray = heights[np.isfinite(heights).any(axis=1)]
+    return np.nanmin(rows, axis=1) if rows.size else np.empty(0)

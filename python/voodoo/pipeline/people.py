@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import dataclass
 
 from voodoo._core import Frame
-from voodoo.errors import MeasurementError
+from voodoo.errors import BodyError, MeasurementError
 from voodoo.measurements import ColorImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate
@@ -16,11 +16,14 @@ from voodoo.pipeline.people_own import PeopleOwn
 from voodoo.pipeline.run import stepped
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
-from voodoo.sensors.adapters import Context, Memory, adapters_of
+from voodoo.sensors.adapters import Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
+
+_SERVED = frozenset({"keypoints", "skin", "color"})
+"""Inputs that are assigned to persons, beside those whose adapters need no person."""
 
 
 class PeopleFrontEnd:
@@ -109,6 +112,34 @@ class TrackedPeople:
     seconds: float
 
 
+def check_inputs(recording: Recording, people: People, settings: FrontEndSettings) -> None:
+    """Raise an error if an input cannot be used for several persons, or nobody can be found.
+
+    Raises:
+        MeasurementError: neither depth images nor keypoints, or an input whose adapter needs to know the person.
+        BodyError: a body that the detector does not know, with depth images alone.
+    """
+    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)} & set(settings.use)
+    finding = {"depth", "keypoints"} & has
+    if not finding:
+        raise MeasurementError(
+            f"{recording.name}: several people are found in depth images or keypoints, expected some, found "
+            f"{', '.join(sorted(has)) or 'none'}"
+        )
+    served = {adapter.kind for adapter in all_adapters() if adapter.while_searching} | _SERVED
+    if unserved := sorted(has - served):
+        raise MeasurementError(
+            f"{recording.name}: expected inputs that serve several people, found {', '.join(unserved)}, which are of one "
+            f"person; --use {','.join(sorted(has & served))} leaves them out"
+        )
+    searching = people.detector is not None and not len(people.estimate)
+    if finding == {"depth"} and searching and not Tracker(people.prototype, detector=people.detector).can_search:
+        raise BodyError(
+            f"{recording.name}: expected a body with joints that the detector of persons knows, found "
+            f"{people.prototype.name!r}; one such body is tracked from --init FILE"
+        )
+
+
 def track_people(
     recording: Recording,
     people: People,
@@ -125,15 +156,11 @@ def track_people(
         left_out: counts undecodable images and rejected frames, which are then left out; None: they are errors.
 
     Raises:
-        VoodooError: a recording without depth images, a damaged one, or a rejected frame; names the frame.
+        VoodooError: inputs or a body that do not serve several persons, see `check_inputs`; a damaged recording, or a rejected
+            frame; names the frame.
     """
     chosen = settings or FrontEndSettings.of(recording)
-    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
-    if not {"depth", "keypoints"} & has & set(chosen.use):
-        raise MeasurementError(
-            f"{recording.name}: several people are found in depth images or keypoints, expected some, found "
-            f"{', '.join(sorted(has & set(chosen.use))) or 'none'}"
-        )
+    check_inputs(recording, people, chosen)
     front_end = PeopleFrontEnd(people, settings=chosen)
     for index, recorded, estimate, seconds in stepped(recording, front_end.step, left_out):
         yield TrackedPeople(index, recorded, estimate, seconds)

@@ -13,22 +13,24 @@ from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
 from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.recordings.camera_yaml import camera_tables
 from voodoo.recordings.pictures import picture_size
 from voodoo.stored import read_stored
 
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
-_OPTIONAL_KEYS = ("distortion", "model", "sensor_frame", "root_from_sensor")
+_OPTIONAL_KEYS = ("distortion", "model", "mirrored", "sensor_frame", "root_from_sensor")
 _ROUNDING, _TYPED = 1e-9, 2e-3
 """Tolerances for the deviation of a matrix from a rotation: by rounding of doubles, and with three typed digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A camera: model, frame name and pose (4, 4) in the root frame."""
+    """A camera: model, frame name and pose (4, 4) in the root frame; whether its images are mirrored left to right."""
 
     camera: Camera
     sensor_frame: str
     root_from_sensor: FloatArray
+    mirrored: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +74,12 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
     Raises:
         RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
     """
-    if not path.is_file():
+    content = _from_yaml(path.parent) if not path.is_file() and path.parent.is_dir() else None
+    if not path.is_file() and content is None:
         hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
         raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
-    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
+    if content is None:
+        content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
     tables = {"depth", "color"}
     _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))
     depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
@@ -94,6 +98,19 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
     if not isinstance(root_frame, str):
         raise RecordingError(f"{path}: root_frame: expected a name, found {short(root_frame)}")
     return FolderCalibration(root_frame, float(factor), depth, color)
+
+
+def _from_yaml(folder: Path) -> dict[str, Any] | None:
+    """The keys by the only camera in the YAML files of a folder, with depth in millimeters; None: there is no such one."""
+    files = sorted((*folder.glob("*.yaml"), *folder.glob("*.yml")))
+    tables = [table for file in files for table in camera_tables(file).values()]
+    if len(tables) != 1 or "size" not in tables[0]:
+        return None
+    (fx, _, cx), (_, fy, cy), _ = tables[0]["matrix"]
+    lens = tables[0]["distortions"]
+    model = "equidistant" if tables[0]["fisheye"] else "plumb_bob" if len(lens) < 8 else "rational_polynomial"
+    known = dict(zip(_CAMERA_KEYS, (*tables[0]["size"], fx, fy, cx, cy), strict=True))
+    return {**known, "distortion": lens, "model": model, "depth_factor": 1000.0}
 
 
 def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
@@ -121,7 +138,10 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     frame = table.get("sensor_frame", f"camera_{kind}_optical_frame")
     if not isinstance(frame, str):
         raise RecordingError(f"{where}: sensor_frame: expected a name, found {short(frame)}")
-    return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where))
+    mirrored = table.get("mirrored", False)
+    if not isinstance(mirrored, bool):
+        raise RecordingError(f"{where}: mirrored: expected true or false, found {short(mirrored)}")
+    return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where), mirrored)
 
 
 def _pose(rows: object, where: str) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Calibrated cameras from the TOML files of Pose2Sim (OpenCV conventions)."""
+"""Calibrated cameras from the TOML files of Pose2Sim, anipose, FreeMoCap and Caliscope, or YAML (OpenCV conventions)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
 from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.recordings.camera_yaml import camera_tables
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 
@@ -27,27 +28,43 @@ class PlacedCamera:
     world_from_sensor: FloatArray
 
 
-def read_camera_toml(path: str | Path) -> tuple[PlacedCamera, ...]:
-    """Cameras of a Pose2Sim calibration file, in the order of the file.
+def read_camera_toml(path: str | Path, *, meters_per_unit: float = 1.0) -> tuple[PlacedCamera, ...]:
+    """Cameras of a calibration file, in the order of the file: of Pose2Sim, anipose, FreeMoCap, Caliscope; or YAML of OpenCV,
+    ROS (`camera_info`) or Kalibr, whose world is the optical frame of the first camera.
 
-    Each table holds `size` [px], `matrix` (3x3), `distortions` (OpenCV's order), `rotation` (Rodrigues vector [rad])
-    and `translation` [m] of camera_from_world, and optionally `name` and `fisheye`. Tables without a `matrix`
+    Each table holds `size` [px], `matrix` (3x3), `distortions` (OpenCV's order), `rotation` (Rodrigues vector [rad],
+    or 3x3) and `translation` [m] of camera_from_world, and optionally `name` and `fisheye`. Tables without a `matrix`
     (metadata) are ignored.
 
+    Args:
+        path: the file.
+        meters_per_unit: of the translations.
+
     Raises:
-        RecordingError: not TOML, no camera, or a missing or invalid key; names the camera.
+        RecordingError: not TOML or YAML, no camera, or a missing or invalid key; names the camera.
     """
     path = Path(path)
     if not path.is_file():
         raise RecordingError(f"{path}: expected a calibration file, found none")
-    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
-    tables = {key: value for key, value in content.items() if isinstance(value, dict) and "matrix" in value}
+    tables = tables_of(path)
     if not tables:
-        raise RecordingError(f"{path}: expected a table with a matrix for each camera, found {', '.join(content)}")
-    return tuple(_camera(f"{path}, [{key}]", key, table) for key, table in tables.items())
+        raise RecordingError(f"{path}: expected a table with a matrix for each camera, found none")
+    return tuple(_camera(f"{path}, [{key}]", key, table, meters_per_unit) for key, table in tables.items())
 
 
-def _camera(where: str, key: str, table: dict[str, Any]) -> PlacedCamera:
+def tables_of(path: Path) -> dict[str, dict[str, Any]]:
+    """The tables of the cameras in a calibration file; {} if there is none.
+
+    Raises:
+        RecordingError: neither TOML nor YAML.
+    """
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return camera_tables(path)
+    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
+    return {key: value for key, value in content.items() if isinstance(value, dict) and "matrix" in value}
+
+
+def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float) -> PlacedCamera:
     missing = [name for name in _KEYS if name not in table]
     if missing:
         raise RecordingError(f"{where}: expected the keys {', '.join(_KEYS)}, found no {', '.join(missing)}")
@@ -69,10 +86,14 @@ def _camera(where: str, key: str, table: dict[str, Any]) -> PlacedCamera:
         )
     except CameraError as error:
         raise RecordingError(f"{where}: {error}") from error
-    turn, _ = cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))
+    turn = _numbers(where, table, "rotation", None)
+    if turn.shape != (3, 3):
+        turn = np.asarray(cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))[0], dtype=np.float64)
+    elif not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) or np.linalg.det(turn) < 0.0:
+        raise RecordingError(f"{where}, rotation: expected a rotation, found {short(table['rotation'])}")
     pose = np.eye(4)
     pose[:3, :3] = turn.T
-    pose[:3, 3] = -turn.T @ _numbers(where, table, "translation", (3,))
+    pose[:3, 3] = -turn.T @ _numbers(where, table, "translation", (3,)) * meters_per_unit
     name = table.get("name", key)
     return PlacedCamera(str(name), camera, pose)
 

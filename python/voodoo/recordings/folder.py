@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path, PurePath
@@ -13,6 +14,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, read_calibration
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import (
     Recording,
@@ -31,13 +33,15 @@ _MOST_NUMBERED = 1_000_000
 """Larger integers are times in seconds, not image numbers: the limit is nine hours of images."""
 _CLOCKS = {13: 1e-3, 16: 1e-6, 19: 1e-9}
 """Number of digits of a time since 1970 -> its unit in seconds."""
+DEPTH_SUFFIXES = (".png", ".pgm")
 _PICTURES = (".png", ".jpg", ".jpeg")
 
 
 class FolderRecording(Recording):
     """A folder of images::
 
-        depth/1305031102.160407.png   16-bit PNGs named by their stamp in seconds, or numbered (00000.png)
+        depth/1305031102.160407.png   16-bit PNGs or PGMs named by their stamp in seconds, or numbered (00000.png,
+                                      depth_0003.png, frame-000003.depth.png); or in the folder itself
         depth.txt                     optional: lines "stamp depth/name.png", # starts a comment; then names are free
         rgb/, rgb.txt                 optional: the same for color (PNG or JPEG)
         calibration.toml              the camera
@@ -56,6 +60,7 @@ class FolderRecording(Recording):
         # all that follows is optional
         distortion = []                # OpenCV order
         model = "plumb_bob"            # or rational_polynomial, equidistant
+        mirrored = false               # true: images are mirrored left to right, and are flipped back
         depth_factor = 5000.0          # units per meter
         sensor_frame = "camera_depth_optical_frame"
         root_frame = "base_link"       # default: sensor_frame, or "root" with a root_from_sensor
@@ -95,7 +100,7 @@ class FolderRecording(Recording):
         clock = FrameClock(
             None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
         )
-        self._depth = _listing(path, "depth", (".png",), clock, left_out)
+        self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out)
         if not self._depth:
             raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
         file = path / "calibration.toml" if calibration is None else Path(calibration)
@@ -150,6 +155,7 @@ class FolderRecording(Recording):
         place = self._calibration.depth
         image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
         scale = 1.0 / self._calibration.depth_factor
+        image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
         item = DepthImage("depth", stamp, image, scale, place.camera, place.root_from_sensor)
         if self._left_out is not None:
             refuse_blank(item, file)
@@ -187,8 +193,14 @@ class FrameClock:
         Raises:
             RecordingError: a name that is not a number.
         """
-        numbers = [_stamp(file.stem, str(file)) for file in files]
         stems = [file.stem for file in files]
+        told = [re.findall(r"\d+(?:\.\d+)?", stem) for stem in stems]
+        if not all(stem.replace(".", "", 1).isdigit() for stem in stems):
+            if {len(words) for words in told} == {1}:  # depth_0003
+                stems = [words[0] for words in told]
+            elif (last := numbers_of(files)) is not None:
+                stems = [f"{number:09d}" for number in last]
+        numbers = [_stamp(stem, str(file)) for stem, file in zip(stems, files, strict=True)]
         digits = {len(stem) for stem in stems} if all(stem.isdigit() for stem in stems) else set()
         scale = next((scale for count, scale in _CLOCKS.items() if digits == {count}), None)
         if scale is not None:
@@ -199,6 +211,13 @@ class FrameClock:
         message = f"{files[0].parent.name}/ is numbered, and taken for {rate:g} images/s"
         self.notes += [message if self._rate else f"{message}; --option rate=N says another rate"]
         return [number / rate for number in numbers]
+
+
+def depth_files(path: Path) -> list[Path]:
+    """Images that may be depth in a folder without depth/: those named so, else all but those named as color."""
+    files = [file for file in path.iterdir() if file.suffix.lower() in DEPTH_SUFFIXES]
+    named = [file for file in files if "depth" in file.stem.lower()]
+    return named or [file for file in files if not re.search("colou?r|rgb", file.stem.lower())]
 
 
 def _listing(
@@ -217,8 +236,9 @@ def _listing(
                 raise RecordingError(f"{table}, line {number}: expected 'stamp file', found {line!r}")
             where = f"{table}, line {number}"
             entries.append((_stamp(words[0], where), path / _inside(words[1], where)))
-    elif (path / name).is_dir():
-        files = [file for file in (path / name).iterdir() if file.suffix.lower() in suffixes]
+    elif (path / name).is_dir() or name == "depth":
+        files = depth_files(path) if not (path / name).is_dir() else list((path / name).iterdir())
+        files = [file for file in files if file.suffix.lower() in suffixes]
         entries = sorted(zip(clock.of(files), files, strict=True))
     rising = entries[:1]
     for number, (stamp, file) in enumerate(entries):
@@ -262,7 +282,8 @@ def _read(file: Path) -> bytes:
 
 def _color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
     size = (color.camera.width, color.camera.height)
-    load = partial(lambda f, s: decode_color(_read(f), f, s), file, size)
+    step = -1 if color.mirrored else 1
+    load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
     return ColorImage("rgb", stamp, load, color.camera, color.root_from_sensor)
 
 

@@ -231,7 +231,8 @@ def _unit(found: Agreement) -> str:
     for units, name in _UNITS.items():
         scaled = Agreement(found.distance / units, found.spread / units)
         if _human(scaled) and scaled.distance < RIGHT_M:
-            return f"the calibration is in {name}: in meters they meet within {_long(scaled.distance)}"
+            near = f"in meters they meet within {_long(scaled.distance)}"
+            return f"the calibration is in {name}: {near}; --option meters_per_unit={1.0 / units:g}"
     return ""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def read_people(file: Path, *, layout: str | None, left_out: LeftOut | None) -> 
 
 
 def read_openpose_json(path: str | Path, *, layout: str | None) -> list[FloatArray]:
-    """People in an OpenPose JSON file (one image): one (K, 3) array of (u, v, confidence) each; empty without any.
+    """People in a JSON file of OpenPose, AlphaPose or MMPose (one image): one (K, 3) array of (u, v, confidence) each.
 
     Args:
         path: the file.
@@ -50,12 +51,16 @@ def read_openpose_json(path: str | Path, *, layout: str | None) -> list[FloatArr
     path = Path(path)
     with reading(path, "an OpenPose JSON file"):
         content = json.loads(read_stored_text(path, "an OpenPose JSON file", most=_MOST))
-    people = content.get("people") if isinstance(content, dict) else None
+    people = content.get("people", content.get("instance_info")) if isinstance(content, dict) else content
     if not isinstance(people, list):
         raise RecordingError(f"{path}: expected an object with a list of people, found {short(content)}")
+    images = {str(person.get("image_id")) for person in people if isinstance(person, dict)}
+    if len(images) > 1:
+        raise RecordingError(f"{path}: expected a file for each image, found {len(images)} image_id in one")
     found = []
     for index, person in enumerate(people):
-        flat = person.get("pose_keypoints_2d") if isinstance(person, dict) else None
+        with reading(f"{path}, person {index}", "a score for each keypoint"):
+            flat = _flat(person) if isinstance(person, dict) else None
         if person == {} or flat == []:  # Pose2Sim and OpenPose write these if no body was detected
             continue
         if not isinstance(flat, list) or not all(isinstance(value, (int, float)) for value in flat):
@@ -70,3 +75,14 @@ def read_openpose_json(path: str | Path, *, layout: str | None) -> list[FloatArr
         rows[~np.isfinite(rows).all(axis=1) | (rows[:, :2] == 0.0).all(axis=1)] = 0.0
         found.append(rows)
     return found
+
+
+def _flat(person: dict[str, Any]) -> Any:  # noqa: ANN401 - the caller checks it
+    """u, v, confidence, u, ... of a person: pose_keypoints_2d of OpenPose, keypoints of AlphaPose, or nested with scores."""
+    names = ("pose_keypoints_2d", "pose_keypoints", "keypoints")
+    points = next((person[name] for name in names if name in person), None)
+    if not (isinstance(points, list) and points and all(isinstance(row, list) for row in points)):
+        return points
+    scores = person.get("keypoint_scores")
+    rows = points if scores is None else [[*row[:2], score] for row, score in zip(points, scores, strict=True)]
+    return [value for row in rows for value in row]

@@ -80,7 +80,9 @@ LOADERS: dict[str, Loader] = {
     "ros2": Loader(_ros, "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"),
     "ros1": Loader(_ros, "a ROS 1 .bag, or a .zip of it"),
     "utd-mhad": Loader(_utd_mhad, "a *_depth.mat of UTD-MHAD"),
-    "folder": Loader(_folder, "a folder with depth/*.png in the TUM RGB-D layout and calibration.toml"),
+    "folder": Loader(
+        _folder, "a folder with depth images (depth/*.png in the TUM RGB-D layout, or *.png) and calibration.toml"
+    ),
     "pose2sim": Loader(_pose2sim, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
     "videos": Loader(_videos, "a folder with Calib*.toml and videos/* or images/*/ of several cameras"),
     "azure-kinect": Loader(_azure_kinect, "a .mkv of an Azure Kinect or Femto Bolt"),
@@ -180,6 +182,8 @@ def guess_loader(path: Path) -> str:
         cameras = _of_cameras(path)
         if cameras is not None:
             return cameras
+        if any(path.glob("*.png")) or any(path.glob("*.pgm")):
+            return "folder"
         try:
             return "ros1" if find_bag(path).suffix == ".bag" else "ros2"
         except RecordingError as error:

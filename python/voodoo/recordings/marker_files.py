@@ -20,6 +20,8 @@ from voodoo.recordings.pose2sim import SITES
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
 
 FRAME = "world"
+_HIGH_M = 1.5
+"""Markers of feet that are never lower are not those of who walks on the floor of the laboratory."""
 
 
 class OnLimb(BaseModel):
@@ -129,8 +131,12 @@ class MarkerRecording(Recording):
     def _doubts(self, positions: FloatArray) -> tuple[str, ...]:
         """What speaks against the axis that is taken for up."""
         likely = standing_along(self._sites, positions)
+        heights = self._positions[..., 2][np.isfinite(self._positions[..., 2])]
         if likely in ("", self._up):
-            return ()
+            if not {"l_ankle", "r_ankle"} & set(self._sites) or not heights.size or heights.min() < _HIGH_M:
+                return ()
+            words = f"{self._up} of the file is taken for up, and no marker is lower than {heights.min():.1f} m"
+            return (f"{self.path.name}: {words}; are axes and unit right?",)
         remedy = "y_up = false in a --marker-map keeps the axes" if likely == "+Z" else "exchange the axes of the file"
         words = f"{self._up} of the file is taken for up, but the body stands along its {likely}"
         return (f"{self.path.name}: {words}; if that is up, {remedy}",)

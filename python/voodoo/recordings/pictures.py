@@ -5,6 +5,7 @@ OpenCV silently fills unreadable parts with gray or black, so the container is c
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
 
@@ -16,6 +17,8 @@ from voodoo.errors import RecordingError
 
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _JPEG_MAGIC = b"\xff\xd8\xff"
+_PGM = re.compile(rb"P5\s(?:\s|#[^\n]*\n)*(\d{1,6})\s+(\d{1,6})\s+(\d{1,5})\s")
+"""Header of a binary PGM: width, height, largest value."""
 _JPEG_FRAMES = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 """JPEG markers of segments that contain the image size."""
 
@@ -44,11 +47,13 @@ def check_png(data: bytes, source: object) -> None:
 
 
 def picture_size(data: bytes, source: object) -> tuple[int, int]:
-    """(width, height) in the header of a PNG or JPEG; nothing is decoded.
+    """(width, height) in the header of a PNG, JPEG or PGM; nothing is decoded.
 
     Raises:
-        RecordingError: neither PNG nor JPEG, or without a size.
+        RecordingError: none of these, or without a size.
     """
+    if found := _PGM.match(data):
+        return int(found[1]), int(found[2])
     if data[:8] == _PNG_MAGIC:
         if len(data) >= 24 and data[12:16] == b"IHDR":
             width, height = struct.unpack_from(">II", data, 16)
@@ -85,7 +90,7 @@ def check_size(data: bytes, source: object, size: tuple[int, int]) -> None:
 
 
 def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArray[np.uint16]:
-    """Decode a 16-bit single-channel PNG to (H, W) uint16.
+    """Decode a 16-bit single-channel PNG or PGM to (H, W) uint16.
 
     Args:
         data: the file's bytes.
@@ -95,12 +100,19 @@ def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.
     Raises:
         RecordingError: damaged, not 16-bit gray, or of another size.
     """
-    check_png(data, source)
+    found = _PGM.match(data)
+    if found is None:
+        check_png(data, source)
+    elif len(data) < found.end() + size[0] * size[1] * (2 if int(found[3]) > 255 else 1):
+        raise RecordingError(f"{source}: expected a complete PGM, found it cut off after {len(data)} bytes")
     check_size(data, source, size)
     image = _decode(data, cv2.IMREAD_UNCHANGED, source)
     if image.ndim != 2 or image.dtype != np.uint16:
+        bits, channels = 8 * image.itemsize, 1 if image.ndim == 2 else image.shape[2]
         raise RecordingError(
-            f"{source}: expected a 16-bit single-channel PNG, found shape {image.shape} of {image.dtype}"
+            f"{source}: expected a 16-bit single-channel PNG, whose values are distances, found {bits} bits and {channels} "
+            f"{'channel' if channels == 1 else 'channels'} with values from {image.min()} to {image.max()}, as for display",
+            reason="that are no 16-bit depth",
         )
     return image.astype(np.uint16, copy=False)
 

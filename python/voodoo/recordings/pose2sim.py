@@ -10,7 +10,7 @@ import numpy as np
 
 from voodoo.errors import MeasurementError, RecordingError
 from voodoo.measurements import KeypointImage, RecordedFrame
-from voodoo.recordings.camera_files import read_camera_toml
+from voodoo.recordings.camera_files import read_camera_toml, tables_of
 from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
@@ -57,6 +57,7 @@ class Pose2SimRecording(Recording):
     Args:
         path: the folder.
         layout: of the keypoints, see voodoo.sensors.keypoints.LAYOUTS; None: told by their number and the shape of the persons.
+        meters_per_unit: of the calibration's translations.
         rate: images per second; not in the folder (`voodoo track --option rate=30`).
         cameras: names to use, as in the calibration file; None means all.
         bare: do not read the .trc.
@@ -73,6 +74,7 @@ class Pose2SimRecording(Recording):
         rate: float = 60.0,
         cameras: tuple[str, ...] | None = None,
         *,
+        meters_per_unit: float = 1.0,
         bare: bool = False,
         left_out: LeftOut | None = None,
     ) -> None:
@@ -86,7 +88,8 @@ class Pose2SimRecording(Recording):
         except MeasurementError as error:
             raise RecordingError(f"{path}: {error}") from error
         self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
-        placed = read_camera_toml(calibration_of(path))
+        scale = number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
+        placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)
         folders = keypoint_folders(path)
         pairs = matched([camera.name for camera in placed], [folder.name.removesuffix("_json") for folder in folders])
         if pairs is None:
@@ -137,6 +140,11 @@ class Pose2SimRecording(Recording):
             good=lambda images: any(image.people for image in images),
         )
         people = [rows for instant in instants for image in instant for rows in image.people]
+        if unread and not people:
+            first = next(iter(unread.first.values()))
+            raise RecordingError(
+                f"{self.path}: expected keypoint files with people, found some unreadable, the first: {first}"
+            )
         self.layout, notes = taken_layout(people, asked)
         count = layout_of(self.layout).count
         instants = [
@@ -215,9 +223,29 @@ def keypoint_folders(path: Path) -> list[Path]:
 
 
 def calibrations(path: Path) -> list[Path]:
-    """The calibration files of a Pose2Sim folder: in it, or in `calibration/` of it or of its parent folder."""
+    """The calibration files of a Pose2Sim folder: in it, or in `calibration/` of it or of its parent folder.
+
+    Where there is no Calib*.toml, files of other programs with cameras in them.
+    """
     places = (path, *(folder / name for folder in (path, path.parent) for name in ("calibration", "Calibration")))
-    return next((found for place in places if (found := sorted(place.glob("Calib*.toml")))), [])
+    own = next((found for place in places if (found := sorted(place.glob("Calib*.toml")))), [])
+    return own or next(
+        (found for place in places if (found := [one for one in _others(place) if _has_cameras(one)])), []
+    )
+
+
+def _others(place: Path) -> list[Path]:
+    names = ("*calib*.toml", "camera_array*.toml", "config.toml", "*.yaml", "*.yml")
+    return sorted(
+        {file for name in names for file in place.glob(name) if file.name != "metadata.yaml" and file.is_file()}
+    )
+
+
+def _has_cameras(file: Path) -> bool:
+    try:
+        return bool(tables_of(file))
+    except RecordingError:
+        return False
 
 
 _TEMPLATE = """\

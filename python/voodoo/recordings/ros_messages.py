@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -23,7 +24,15 @@ DEPTH_ENCODINGS: dict[str, np.dtype[Any]] = {
     "32FC1": np.dtype(np.float32),
 }
 """16-bit depth is in millimeters (REP-118), 32-bit float depth in meters."""
+_NO_DEPTH = re.compile(
+    r"infra|(^|[/_])n?ir(?![a-z])|disparity|confidence|amplitude|intensity|thermal|reflectiv|variance", re.I
+)
+"""Names of topics whose images have an encoding of depth but are something else."""
 COLOR_CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "8UC3": 3, "8UC4": 4, "mono8": 1, "8UC1": 1}
+
+NO_DISTANCES = (
+    "expected depth as PNG or RVL, found JPEG, in which the distances are lost; record raw depth or compressedDepth"
+)
 
 # sensor_msgs/PointField: INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64
 _POINT_FIELDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -52,6 +61,22 @@ def frame_of(message: Message) -> str:
 def base_topic(topic: str) -> str:
     """Name of an image topic without its image_transport suffix."""
     return topic.removesuffix("/compressedDepth").removesuffix("/compressed")
+
+
+def is_depth(topic: str, message: Message) -> bool:
+    """Whether an image or compressed image is depth, by its encoding or format; its topic only tells what is none."""
+    if _NO_DEPTH.search(topic):
+        return False
+    if hasattr(message, "encoding"):
+        return message.encoding in DEPTH_ENCODINGS
+    gray = message.data[:26].tobytes()  # a PNG's first chunk has the bits of a value, and 0 for gray
+    words = message.format.split(";")[0].strip()
+    return "compressedDepth" in topic + message.format or words in DEPTH_ENCODINGS or gray[24:] == b"\x10\x00"
+
+
+def has_distances(message: Message) -> bool:
+    """Whether a compressed depth image is not a JPEG, whose values of 8 bits are no distances."""
+    return message.data[:3].tobytes() != b"\xff\xd8\xff"
 
 
 def camera_of(info: Message, topic: str, source: str) -> Camera:
@@ -108,6 +133,8 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
         RecordingError: damaged, or of another size than the camera's.
     """
     data = message.data.tobytes()
+    if not has_distances(message):
+        raise RecordingError(f"{source}: {NO_DISTANCES}", reason="of JPEG, which has no distances")
     header = b"" if data.startswith(b"\x89PNG") else data[:12]
     decode = decode_rvl if "rvl" in message.format.lower() else decode_depth_png
     image: npt.NDArray[Any] = decode(data[len(header) :], source, (camera.width, camera.height))

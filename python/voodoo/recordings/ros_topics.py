@@ -15,9 +15,12 @@ from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
     COLOR_CHANNELS,
     DEPTH_ENCODINGS,
+    NO_DISTANCES,
     Message,
     base_topic,
     camera_of,
+    has_distances,
+    is_depth,
     stamp_of,
 )
 
@@ -113,8 +116,17 @@ class TopicFinder:
                 )
         return names
 
+    def _free(self, kind: TopicKind) -> list[str]:
+        """Topics of the types of a kind that the user chose for no kind."""
+        chosen = {
+            name
+            for choice in self._choices.values()
+            for name in ([choice] if isinstance(choice, str) else choice or ())
+        }
+        return [t.name for t in self.bag.topics if t.type in _TYPES[kind] and t.messages and t.name not in chosen]
+
     def _automatic(self, kind: TopicKind) -> list[str]:
-        names = [topic.name for topic in self.bag.topics if topic.type in _TYPES[kind] and topic.messages]
+        names = self._free(kind)
         if kind == "depth":
             names = self._depth_candidates(names)
         elif kind == "color":
@@ -129,28 +141,39 @@ class TopicFinder:
         return list(bases.values())
 
     def _depth_candidates(self, names: list[str]) -> list[str]:
-        named = [name for name in names if "depth" in name.lower()]
-        usable, refused = [], []
-        for name in named:
-            message = self._message(name)
-            if self._topics[name].type == COMPRESSED:
-                if "compressedDepth" in name or "compressedDepth" in message.format:
-                    usable.append(name)
-            elif message.encoding in DEPTH_ENCODINGS:
-                usable.append(name)
+        """Topics of depth by their encoding; if the names of some have "depth", these."""
+        usable: list[str] = []
+        refused: dict[str, str] = {}
+        for name in names:
+            named = "depth" in name.lower()
+            try:
+                message = self._message(name)
+            except RecordingError:
+                if named:
+                    raise
+                continue
+            compressed = self._topics[name].type == COMPRESSED
+            if not is_depth(name, message):
+                if named and not compressed and message.encoding not in DEPTH_ENCODINGS:
+                    refused[name] = f"encoding {message.encoding!r}"
+            elif compressed and not has_distances(message):
+                refused[name] = NO_DISTANCES
             else:
-                refused.append(f"{name} with encoding {message.encoding!r}")
-        if refused and not usable:
+                usable.append(name)
+        self.unused += [
+            (name, words if words == NO_DISTANCES else "not a depth encoding") for name, words in refused.items()
+        ]
+        rest = any(topic.type in (*_TYPES["points"], *_TYPES["scan"]) and topic.messages for topic in self.bag.topics)
+        if refused and not usable and not (rest and set(refused.values()) == {NO_DISTANCES}):
+            found = ", ".join(f"{name}: {words}" for name, words in refused.items())
             raise RecordingError(
-                f"{self.bag.path}: expected a depth topic encoded as {', '.join(DEPTH_ENCODINGS)}, "
-                f"found {', '.join(refused)}"
+                f"{self.bag.path}: expected a depth topic encoded as {', '.join(DEPTH_ENCODINGS)}, found {found}"
             )
-        self.unused += [(item.split(" ")[0], "not a depth encoding") for item in refused]
-        return usable
+        return [name for name in usable if "depth" in name.lower()] or usable
 
     def _cameras(self) -> list[TopicSource]:
         """Image topics of all cameras, one per camera."""
-        names = [topic.name for topic in self.bag.topics if topic.type in _TYPES["color"] and topic.messages]
+        names = self._free("color")
         names = self._pictures(names, channels=3) or self._pictures(names, channels=1)
         bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
         found: dict[str, TopicSource] = {}
@@ -172,7 +195,7 @@ class TopicFinder:
         for name in names:
             message = self._message(name)
             if self._topics[name].type == COMPRESSED:
-                if "compressedDepth" not in name and "compressedDepth" not in message.format:
+                if not is_depth(name, message):
                     usable.append(name)
             elif COLOR_CHANNELS.get(message.encoding, 0) >= channels:
                 usable.append(name)

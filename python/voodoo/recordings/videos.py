@@ -56,6 +56,7 @@ class VideosRecording(Recording):
     Args:
         path: the folder.
         rate: images per second; None: the rate of each video, 30 for numbered images.
+        meters_per_unit: of the calibration's translations.
         color_topic: names of the cameras to use (`voodoo track --topic color=NAME`); None: all with images.
         background: folder of images of the empty scene, instead of `background/` in the folder or its parent.
         bare: do not read init.json, truth.csv and *.trc.
@@ -72,6 +73,7 @@ class VideosRecording(Recording):
         path: Path,
         *,
         rate: float | None = None,
+        meters_per_unit: float = 1.0,
         color_topic: str | Sequence[str] | None = None,
         background: str | Path | None = None,
         bare: bool = False,
@@ -84,7 +86,10 @@ class VideosRecording(Recording):
         sources = picture_sources(path)
         if not sources:
             raise RecordingError(f"{path}: expected videos in videos/, or folders of pictures in images/, found none")
-        placed = read_camera_toml(calibration_of(path, [source.stem for source in sources]))
+        placed = read_camera_toml(
+            calibration_of(path, [source.stem for source in sources]),
+            meters_per_unit=number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3),
+        )
         clock = FrameClock(rate)
         self._cameras: list[Pictures] = []
         for camera, source in _chosen(path, _matched(path, placed, sources), color_topic):

@@ -27,6 +27,7 @@ from voodoo.recordings.ros_messages import (
     compressed_depth_image,
     depth_image,
     frame_of,
+    is_depth,
     scan_fields,
     stamp_of,
 )
@@ -62,7 +63,7 @@ class RosFeed:
         faults: counts unusable messages.
         clock: host clock.
         root_frame: None: the best of STANDING that transforms lead to, else the frame of the first topic.
-        meters_per_unit: scale of 16-bit depth.
+        meters_per_unit: scale of depth; None: 0.001 of 16-bit images, 1 of float ones.
         tf_max_age: largest age of a changing transform [s].
         sensor_pose: root_from_sensor (4, 4) of the first topic instead of transforms, and the name of that root frame.
 
@@ -78,14 +79,15 @@ class RosFeed:
         clock: Clock,
         *,
         root_frame: str | None = None,
-        meters_per_unit: float = 0.001,
+        meters_per_unit: float | None = None,
         tf_max_age: float = 0.5,
         sensor_pose: tuple[str, FloatArray] | None = None,
     ) -> None:
         """Start without messages."""
         self.unusable = 0
         self._topics, self._faults, self._clock = tuple(topics), faults, clock
-        self._scale, self._pose = meters_per_unit, sensor_pose
+        self._scale, self._float_scale = (0.001, 1.0) if meters_per_unit is None else (meters_per_unit, meters_per_unit)
+        self._pose = sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
         self._lock = threading.Lock()  # transforms arrive in one thread and are read in another
         self._newest = -math.inf
@@ -253,7 +255,9 @@ class RosFeed:
         else:
             with _whole(message):
                 image = depth_image(message, camera, where)
-        return DepthImage(topic, stamp, image, self._scale if image.dtype.kind == "u" else 1.0, camera, pose)
+        return DepthImage(
+            topic, stamp, image, self._scale if image.dtype.kind == "u" else self._float_scale, camera, pose
+        )
 
 
 def _measured_as(topic: str, kind: str, message: Message) -> str:
@@ -267,7 +271,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     if kind == SCAN:
         return "scan"
     if kind == COMPRESSED:
-        return "depth" if "compressedDepth" in topic or "compressedDepth" in message.format else "color"
+        return "depth" if is_depth(topic, message) else "color"
     if message.encoding in DEPTH_ENCODINGS:
         return "depth"
     if message.encoding in COLOR_CHANNELS:

@@ -29,7 +29,7 @@ class Ros2Source(Source):
         topics: topics of the measurements; the first one defines the frames.
         root_frame: see RosFeed.
         calibration: a calibration.toml with the pose of the first topic's camera, instead of transforms.
-        meters_per_unit: scale of 16-bit depth.
+        meters_per_unit: see RosFeed.
         tf_max_age: largest age of a changing transform [s].
 
     Raises:
@@ -42,7 +42,7 @@ class Ros2Source(Source):
         *,
         root_frame: str | None = None,
         calibration: Path | None = None,
-        meters_per_unit: float = 0.001,
+        meters_per_unit: float | None = None,
         tf_max_age: float = 0.5,
     ) -> None:
         """Nothing is subscribed yet."""

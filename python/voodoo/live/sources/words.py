@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 
 REALSENSE, ROS2, GROW = "realsense", "ros2", "grow"
+_OF_TOPICS = ("meters_per_unit", "tf_max_age")
 
 
 def source_of(
@@ -30,7 +31,7 @@ def source_of(
         rate: for a recording: playback speed relative to real time.
         loop: for a recording: start again at its end.
         root_frame: for a recording or ROS 2: root frame to use instead of its own.
-        options: options of the recording's loader; ROS 2 topics take meters_per_unit and tf_max_age.
+        options: of the recording's loader; ROS 2 topics take meters_per_unit and tf_max_age.
         calibration: a calibration.toml. For a camera or a topic, only the pose in it (`root_frame` and `root_from_sensor`) is
             used; for a folder, all of it.
 
@@ -38,13 +39,8 @@ def source_of(
         VoodooError: no such recording, or an option out of range.
     """
     kind, colon, rest = str(word).partition(":")
-    chosen = dict(options or {})
-    if kind in (REALSENSE, ROS2, GROW) and (colon or kind == REALSENSE):
-        known = ("meters_per_unit", "tf_max_age") if kind == ROS2 else ()
-        if unknown := sorted(set(chosen) - set(known)):
-            raise VoodooError(
-                f"{word}: expected options of {', '.join(known) or 'no loader'}, found {', '.join(unknown)}"
-            )
+    options = dict(options or {})
+    refuse_unused([str(word)], options)
     if kind == REALSENSE:
         from voodoo.live.sources.realsense import RealSenseSource
 
@@ -53,7 +49,7 @@ def source_of(
         from voodoo.live.sources.ros2 import Ros2Source
 
         topics = [topic for topic in rest.split(",") if topic]
-        return Ros2Source(topics, root_frame=root_frame, calibration=calibration, **chosen)
+        return Ros2Source(topics, root_frame=root_frame, calibration=calibration, **options)
     if kind == GROW and colon:
         from voodoo.live.sources.growing import GrowingSource
 
@@ -65,7 +61,33 @@ def source_of(
     if not 0.0 < rate < 1e6:
         raise VoodooError(f"rate: expected a number above 0, found {rate}")
     if root_frame is not None:
-        chosen["root_frame"] = root_frame
+        options["root_frame"] = root_frame
     left_out = LeftOut()
-    recording = open_recording(word, bare=True, left_out=left_out, **chosen)
+    recording = open_recording(word, bare=True, left_out=left_out, **options)
     return PlayedSource(recording, rate=rate, loop=loop, left_out=left_out)
+
+
+def options_for(word: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of several sources' options that one of them uses."""
+    kind = word.partition(":")[0]
+    known = _OF_TOPICS if kind == ROS2 else () if kind in (REALSENSE, GROW) else options
+    return {name: value for name, value in options.items() if name in known}
+
+
+def refuse_unused(words: Sequence[str], options: Mapping[str, Any]) -> None:
+    """Reject options that none of the sources uses; those of recordings are checked by their loaders.
+
+    Args:
+        words: see source_of.
+        options: those that are given; `frame`, `rate`, `loop` and the ones of loaders.
+
+    Raises:
+        VoodooError: names them.
+    """
+    kinds = {word.partition(":")[0] for word in words}
+    known = ("frame", *_OF_TOPICS) if ROS2 in kinds else ()
+    unknown = sorted(set(options) - set(known))
+    if unknown and kinds <= {REALSENSE, ROS2, GROW}:
+        raise VoodooError(
+            f"{', '.join(words)}: expected no {', '.join(unknown)}, found some; options: {', '.join(known) or 'none'}"
+        )
