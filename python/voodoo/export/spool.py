@@ -286,10 +286,10 @@ def _turned(contents: Callable[[], Iterator[Arrays]], turn: Turn, *, several: bo
 def _sample(contents: Iterator[Arrays], count: int, *, several: bool) -> list[Track]:
     """Tracks of some of the parts, of `count`."""
     every = -(-count // _SAMPLED)
-    parts = [part for number, part in enumerate(contents) if number % every == 0]
+    parts = (part for number, part in enumerate(contents) if number % every == 0)  # converted while its file is open
     if not several:
-        return [Track.joined(list(map(track_of, parts)))]
-    return list(PeopleTrack.joined(list(map(_people, parts))).tracks.values())
+        return [Track.joined([track_of(part) for part in parts])]
+    return list(PeopleTrack.joined([_people(part) for part in parts]).tracks.values())
 
 
 def _fixed(parts: Iterator[Arrays], several: bool, left_out: Mapping[str, int]) -> Arrays:
