@@ -6,8 +6,6 @@ mod human;
 mod joint;
 pub(crate) mod kinematics;
 mod model;
-mod pose_prior;
-mod pose_statistics;
 mod roles;
 pub(crate) mod shoulders;
 pub(crate) mod two_bone;
@@ -16,7 +14,6 @@ pub(crate) use edit::Pair;
 pub use human::HumanModel;
 pub use joint::{Joint, JointKind};
 pub(crate) use model::Model;
-pub(crate) use pose_prior::squared_mahalanobis;
 pub(crate) use roles::JointRole;
 pub use roles::{LimbRole, Roles, Side};
 

@@ -256,11 +256,6 @@ impl Roles {
         Ok(())
     }
 
-    /// Whether the body has the roles of a human, so that statistics of human poses apply to it.
-    pub(crate) fn is_human(&self) -> bool {
-        self.human
-    }
-
     /// The role of a limb.
     pub fn limb(&self, limb: usize) -> Option<LimbRole> {
         self.limbs.get(limb).copied().flatten()
@@ -373,7 +368,6 @@ mod tests {
         for (model, carrier) in [(HumanModel::Full, "l_clavicle"), (HumanModel::Papers, "torso")] {
             let body = human(model);
             let roles = body.roles();
-            assert!(roles.is_human());
             for (limb, description) in body.limbs().iter().enumerate() {
                 assert!(roles.limb(limb).is_some(), "{}", description.name);
                 let Some((_, joint)) = &description.parent else { continue };
@@ -421,7 +415,7 @@ mod tests {
     fn a_lamp_has_no_roles_but_its_joints_have_sites() {
         let lamp = chain(&[["foot", ""], ["lower_arm", "ankle"], ["upper_arm", "elbow"], ["shade", "ball"]]).unwrap();
         let roles = lamp.roles();
-        assert!(!roles.is_human() && roles.clavicles().is_empty());
+        assert!(roles.clavicles().is_empty());
         assert!((0..4).all(|limb| roles.limb(limb).is_none() && roles.joint(limb).is_none()));
         assert_eq!([0, 1, 2, 3].map(|limb| roles.joint_site(limb)), [None, Some(0), Some(1), Some(2)]);
         assert_eq!(roles.groups(), [0, 1, 2, 3]);

@@ -5,7 +5,7 @@ mod edges;
 mod motion;
 
 pub(crate) use context::{Context, Matched, Setting};
-pub(crate) use motion::{Motion, REFERENCE_RATE, UNKNOWN_MOTION};
+pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 
 use rayon::prelude::*;
 

@@ -12,7 +12,7 @@ const LONGEST_PREDICTION: f64 = 2.0;
 /// since the motion is not known yet.
 pub(crate) const UNKNOWN_MOTION: f64 = 4.0;
 /// Frame rate for which the standard deviations of motion priors are given, 1/s.
-pub(crate) const REFERENCE_RATE: f64 = 30.0;
+const REFERENCE_RATE: f64 = 30.0;
 /// Shortest and longest interval to which the priors are scaled, in frames of that rate.
 const TIME_SCALES: [f64; 2] = [0.1, 10.0];
 

@@ -156,7 +156,9 @@ mod tests {
             branch.motion.restart(other.to_vec());
             fit.match_last(context, first);
             let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
-            let steps = branch.compare(context, &mut Refined::default(), &mut fit, &mut poses, &mut predicted);
+            let mut refined = Refined::default();
+            refined.patch_cost = 1.0;
+            let steps = branch.compare(context, &mut refined, &mut fit, &mut poses, &mut predicted);
             let arm = &model.extremities[first_arm(&model)];
             assert_eq!(poses == first, predicted == first, "poses and prediction change together");
             ([&poses, &branch.motion.poses].map(|poses| arm.end(poses).distance(arm.end(&truth))), steps)

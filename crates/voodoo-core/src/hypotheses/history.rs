@@ -1,31 +1,65 @@
 //! History of each arm and leg over frames.
 
-use super::persistence::Persistence;
-use crate::math::{Pose, Vec3};
+use super::score::GAIN;
+use crate::math::Vec3;
 
-/// Evidence that a proposal is based on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Basis {
-    /// The rough cost of the arm or leg alone, from unexplained points or colors.
-    #[default]
-    Points,
-    /// A position of the end that an earlier frame confirmed or a detector reports.
-    End,
-    /// A lean of the trunk. It may be accepted although the arm or leg remains suspect.
-    Lean,
-    /// Detections of the whole body. It may be accepted although the arm or leg remains suspect.
-    Body,
-}
+/// Time in which the unexplained patches of a refused test lose half of their weight, seconds.
+const HALF_LIFE: f64 = 0.3;
 
 /// History of one arm or leg.
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
-    /// How long frames have contradicted it.
-    pub(super) persistence: Persistence,
+    /// Cost of the unexplained patches near it in this frame; 0 where it does not suffice for a test.
+    unexplained: f64,
+    /// Cost of the patches that the proposals of earlier frames left unexplained, halved every `HALF_LIFE`. They belong to
+    /// something else.
+    refused: f64,
     /// Position of its end in the last frame that confirmed it, world frame.
     pub(super) last_good_end: Option<Vec3>,
-    /// Poses of all limbs that the last frame requested, world frame; empty if it requested no change.
-    pub(super) last_proposal: Vec<Pose>,
-    /// Basis of `last_proposal`.
-    pub(super) last_basis: Basis,
+}
+
+impl History {
+    /// Updates with the cost of the unexplained patches near the arm or leg, `elapsed` seconds after the last frame.
+    /// Returns whether to test alternatives: enough is unexplained, and twice what was refused. To be called in every frame.
+    pub(super) fn observe(&mut self, unexplained: f64, elapsed: f64) -> bool {
+        self.refused *= (-elapsed / HALF_LIFE).exp2();
+        self.unexplained = if unexplained < GAIN { 0.0 } else { unexplained };
+        self.unexplained > 2.0 * self.refused
+    }
+
+    /// Records that no alternative explains what is unexplained in this frame.
+    pub(super) fn refuse(&mut self) {
+        self.refused = self.unexplained;
+    }
+
+    /// Forgets what was refused, because there is new evidence.
+    pub(super) fn reconsider(&mut self) {
+        self.refused = 0.0;
+    }
+
+    /// Whether nearly all points near it are explained in this frame.
+    pub(super) fn is_clear(&self) -> bool {
+        self.unexplained == 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_refused_is_tested_again_when_twice_as_much_is_unexplained_or_after_its_half_life() {
+        let mut history = History::default();
+        assert!(!history.observe(GAIN - 1.0, 0.03) && history.is_clear());
+        assert!(history.observe(GAIN, 0.03) && !history.is_clear());
+        history.refuse();
+        assert!(!history.observe(GAIN, 0.03), "nothing has changed");
+        assert!(history.observe(2.0 * GAIN, 0.03), "more is unexplained");
+        history.refuse();
+        let tested = (0..10).position(|_| history.observe(2.0 * GAIN, 0.25 * HALF_LIFE + 1e-6));
+        assert_eq!(tested, Some(3), "a half-life has passed");
+        history.refuse();
+        history.reconsider();
+        assert!(history.observe(GAIN, 0.0));
+    }
 }

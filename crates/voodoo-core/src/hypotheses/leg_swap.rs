@@ -4,14 +4,17 @@
 //! The sizes may have adapted to the wrong legs before they are corrected. Legs that have a similar cost when swapped are
 //! therefore tracked in parallel for some frames.
 
-use super::persistence::RETRY_PERIOD;
 use super::refined::{REFINE, Refined};
 use super::score::{Cost, SURE_GAIN};
-use super::unexplained::CLUTTER;
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3, shifted};
+
+/// Fraction of what the images explain that a swap worth refining may lose.
+const HOPELESS: f64 = 0.15;
+/// Number of frames between two tests, and for which a swap of about the same cost is tracked.
+const RETRY_PERIOD: usize = 4;
 
 /// The swapped legs, and the evidence for them.
 #[derive(Debug, Default)]
@@ -37,12 +40,12 @@ impl LegSwap {
         }
     }
 
-    /// Tests the swap if one of the legs is suspect (`is_suspect`), while the swap is tracked, and otherwise once in every
+    /// Tests the swap if one of the legs is `contradicted`, while the swap is tracked, and otherwise once in every
     /// `RETRY_PERIOD` frames. Returns the number of ICP steps.
     pub(super) fn attempt(
         &mut self,
         context: Context,
-        is_suspect: impl Fn(usize) -> bool,
+        contradicted: impl Fn(usize) -> bool,
         refined: &mut Refined,
         fit: &mut Fit,
         poses: &mut Vec<Pose>,
@@ -51,13 +54,13 @@ impl LegSwap {
         let chains = &context.model.extremities;
         let mut legs = (0..chains.len()).filter(|index| chains[*index].leg);
         let (Some(one), Some(other), None) = (legs.next(), legs.next(), legs.next()) else { return 0 };
-        if !self.is_due(is_suspect(one) || is_suspect(other)) {
+        if !self.is_due(contradicted(one) || contradicted(other)) {
             return 0;
         }
         let (origin, now) = (context.observation.origin(), refined.cost(context, fit, poses));
         self.swap_legs(&context.model.body, [&chains[one], &chains[other]], poses, origin);
         // A swap of correct legs explains clearly less of the images, even before it is refined.
-        if !self.is_ongoing() && refined.cost(context, fit, &self.poses).evidence > (1.0 - CLUTTER) * now.evidence {
+        if !self.is_ongoing() && refined.cost(context, fit, &self.poses).evidence > (1.0 - HOPELESS) * now.evidence {
             return 0;
         }
         let cost = refined.refine(context, fit, &self.poses);
@@ -72,9 +75,9 @@ impl LegSwap {
     }
 
     /// Whether to test the swap in this frame. To be called in every frame.
-    fn is_due(&mut self, is_suspect: bool) -> bool {
+    fn is_due(&mut self, contradicted: bool) -> bool {
         self.frames = (self.frames + 1) % RETRY_PERIOD;
-        self.frames == 0 || is_suspect || self.is_ongoing()
+        self.frames == 0 || contradicted || self.is_ongoing()
     }
 
     /// Whether the swap was tracked in the last frame.
@@ -164,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_swap_is_tested_periodically_and_at_once_for_a_suspect_leg() {
+    fn the_swap_is_tested_periodically_and_at_once_for_a_contradicted_leg() {
         let mut leg_swap = LegSwap::default();
         let due: Vec<bool> = (0..8).map(|_| leg_swap.is_due(false)).collect();
         assert_eq!(due.iter().filter(|due| **due).count(), 8 / RETRY_PERIOD);

@@ -1,44 +1,20 @@
-//! Refinement of hypotheses by ICP, and comparison of their cost with that of the current poses.
+//! Refinement of hypotheses by ICP, and comparison of their cost with that of the current pose.
 
-use super::history::Basis;
-use super::proposals::Proposal;
-use super::score::{Cost, REFUTED_GAIN, SURE_GAIN, overall_cost};
-use super::suspicion::Suspicion;
+use super::score::{Cost, SURE_GAIN, overall_cost};
 use crate::association::correspondence::Correspondences;
-use crate::body::squared_mahalanobis;
-use crate::fit::{Context, Fit, Matched};
-use crate::math::Pose;
+use crate::fit::{Context, Fit};
+use crate::math::{Pose, Vec3};
 use crate::regions::{self, Backdrop, Posed};
 
 /// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
-/// Step at which a hypothesis is rejected if it costs clearly more than the current poses. Of 63 accepted hypotheses in the
-/// rendered recordings, none had a higher cost at this step. A test in an earlier step rejected correct ones that started far
-/// away.
+/// Step at which a hypothesis is rejected if it costs more than the current pose. Of 63 accepted hypotheses in the rendered
+/// recordings, none had a higher cost at this step. A test in an earlier step rejected correct ones that started far away.
 const GIVE_UP_AFTER: usize = 6;
 /// Number of first steps that use a subsample of the points. The final cost uses all points.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
-/// Decrease of the squared Mahalanobis distance from the usual posture that makes a suspect hypothesis acceptable. The prior
-/// probability of the pose is then twenty times as large.
-const MORE_USUAL: f64 = 6.0;
-
-/// Result of the test of a hypothesis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outcome {
-    /// It explains the frame better.
-    Better,
-    /// It does not explain the frame better, or the arm or leg is suspect in it as well.
-    Refused,
-    /// Its cost is so high that the next frames are unlikely to accept it.
-    Hopeless,
-}
-
-/// The current poses and their cost.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Present<'a> {
-    pub(super) cost: Cost,
-    pub(super) poses: &'a [Pose],
-}
+/// A hypothesis whose arms and legs all come within this distance of the current pose is the same pose, meters.
+const SAME_POSE: f64 = 0.05;
 
 /// A hypothesis after its ICP steps.
 #[derive(Debug, Default)]
@@ -49,39 +25,57 @@ pub(super) struct Refined {
     pub(super) matched: Correspondences,
     /// Label images of the whole body.
     pub(super) backdrop: Backdrop,
+    /// Cost of an unexplained patch in this frame.
+    pub(super) patch_cost: f64,
+    /// A hypothesis after its ICP steps, while the current pose has as many.
+    tried: Vec<Pose>,
 }
 
 impl Refined {
-    /// Refines a hypothesis of one arm or leg together with the whole body, and compares it with `present`. Returns the number of
-    /// ICP steps and the outcome. If the hypothesis is better, `fit` holds its correspondences; otherwise `fit` is unchanged.
-    pub(super) fn improves(
+    /// Reserves memory for a body of `limbs` limbs.
+    pub(super) fn prepare(&mut self, limbs: usize) {
+        for poses in [&mut self.poses, &mut self.tried] {
+            poses.clear();
+            poses.reserve(limbs);
+        }
+    }
+
+    /// Refines a hypothesis together with the whole body, and replaces the current pose `poses`, of cost `current`, and its
+    /// prediction where that is another pose that explains the frame better. Any pose explains more after more ICP steps: before
+    /// it is replaced, the current pose is refined as well, and the result is used if the hypothesis is no better. Returns the
+    /// number of ICP steps, and whether `poses` have changed; then, `fit` holds their correspondences. Otherwise, `fit` is
+    /// unchanged.
+    pub(super) fn replace(
         &mut self,
         context: Context,
-        present: Present,
-        index: usize,
         fit: &mut Fit,
-        hypothesis: &Proposal,
-        suspicion: &mut Suspicion,
-    ) -> (usize, Outcome) {
-        let chain = &context.model.extremities[index];
-        let (basis, pictures) = (hypothesis.basis, context.pictures_alone());
+        poses: &mut Vec<Pose>,
+        predicted: &mut Vec<Pose>,
+        current: Cost,
+        hypothesis: &[Pose],
+    ) -> (usize, bool) {
         // With color images alone, the cost of intermediate steps is not informative.
-        let most = if pictures { f64::INFINITY } else { present.cost.total + REFUTED_GAIN };
-        let (steps, cost) = self.refine_up_to(context, fit, &hypothesis.poses, most);
-        let hopeless = cost.total > most;
-        if steps == REFINE && !hopeless && cost.is_better_than(&present.cost) {
-            let matched = fit.matched(&self.poses);
-            // The arm or leg must no longer be suspect, unless the new posture is clearly more usual.
-            let mut is_unsuspicious =
-                |matched: Matched| pictures || !suspicion.assess(context, matched, chain, basis == Basis::Points)[0];
-            let [tried, now] =
-                [&self.poses, present.poses].map(|poses| squared_mahalanobis(&context.model.body, poses));
-            if matches!(basis, Basis::Lean | Basis::Body) || is_unsuspicious(matched) || tried < now - MORE_USUAL {
-                return (steps, Outcome::Better);
-            }
-        }
+        let most = if context.pictures_alone() { f64::INFINITY } else { current.total };
+        let (steps, cost) = self.refine_up_to(context, fit, hypothesis, most);
         fit.swap_matches(&mut self.matched);
-        (steps, if hopeless { Outcome::Hopeless } else { Outcome::Refused })
+        if steps < REFINE || !cost.is_better_than(&current) || !is_another(context, &self.poses, poses) {
+            return (steps, false);
+        }
+        std::mem::swap(&mut self.poses, &mut self.tried);
+        let settled = self.refine(context, fit, poses);
+        if cost.is_better_than(&settled) && is_another(context, &self.tried, &self.poses) {
+            predicted.clear();
+            predicted.extend_from_slice(hypothesis);
+            poses.clone_from(&self.tried);
+            fit.match_last(context, poses);
+        } else if settled.is_better_than(&current) && is_another(context, &self.poses, poses) {
+            predicted.clone_from(poses);
+            poses.clone_from(&self.poses);
+        } else {
+            fit.swap_matches(&mut self.matched);
+            return (steps + REFINE, false);
+        }
+        (steps + REFINE, true)
     }
 
     /// Refines a hypothesis together with the whole body and returns its cost. Afterwards, `fit` holds its correspondences and
@@ -158,7 +152,7 @@ impl Refined {
 
     /// Cost of matched poses. Where color images are the only observation, it includes how well the poses explain them.
     pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
-        let mut cost = overall_cost(context, fit.matched(poses));
+        let mut cost = overall_cost(context, fit.matched(poses), self.patch_cost);
         if context.pictures_alone() {
             let Context { model, observation, previous, .. } = context;
             let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
@@ -168,4 +162,12 @@ impl Refined {
         }
         cost
     }
+}
+
+/// Whether an arm or leg is at another place in one pose than in the other.
+fn is_another(context: Context, one: &[Pose], other: &[Pose]) -> bool {
+    let apart = |one: Vec3, other: Vec3| one.distance(other) > SAME_POSE;
+    context.model.extremities.iter().any(|chain| {
+        apart(one[chain.lower].translation, other[chain.lower].translation) || apart(chain.end(one), chain.end(other))
+    })
 }

@@ -2,8 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::score::{ROUGH_SAMPLE, explain, rough_cost, strain};
-use super::suspicion::distances_to_others;
+use super::score::{ROUGH_SAMPLE, bounds, explain, may_explain, rough_cost, strain};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Pose, Vec3, WeightedPoints};
@@ -88,15 +87,29 @@ impl RoughScore {
         gain
     }
 
-    /// Sets the sample: unexplained points nearby, and the points that the arm or leg explains (`own`).
-    pub(super) fn begin(&mut self, at: Extremity, own: &WeightedPoints) {
+    /// Sets the sample: unexplained points nearby, and the points that are matched to the arm or leg.
+    pub(super) fn begin(&mut self, at: Extremity) {
         self.draw_others(at);
         let Self { unexplained, sample, others, distances, .. } = self;
         sample.clear();
         sample.extend(unexplained);
-        sample.extend(own);
+        for limb in at.chain().limbs() {
+            let matches = &at.matched.correspondences.limbs[limb];
+            for (index, weight) in matches.weight.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                let point = matches.measured.get(index).to_array().map(|value| value as f32);
+                sample.push(point, f64::from(*weight));
+            }
+        }
         sample.subsample(ROUGH_SAMPLE);
-        distances_to_others(at.context, at.matched.poses, at.chain(), &sample.points, others, distances);
+        others.clear();
+        others.resize(sample.len(), f32::INFINITY);
+        let (body, poses, bounds) = (&at.context.model.body, at.matched.poses, bounds(&sample.points));
+        for limb in (0..poses.len()).filter(|limb| at.chain().limbs().all(|own| own != *limb)) {
+            // Most limbs are too far away to explain any point.
+            if may_explain(&body.limbs()[limb].shape, &poses[limb], bounds) {
+                explain(body, limb, poses, &sample.points, others, distances);
+            }
+        }
     }
 
     /// Rough cost of the arm or leg at `poses`, in unexplained patches. The evaluation stops when the cost reaches `least`,
@@ -203,7 +216,7 @@ mod tests {
                 let (mut unexplained, mut rough) = (Unexplained::default(), RoughSearch::default());
                 unexplained.collect(context, at.matched);
                 unexplained.near(root, arm.stretched_length(), &mut rough.score.unexplained);
-                rough.score.begin(at, &WeightedPoints::default());
+                rough.score.begin(at);
                 let mut best = Vec::new();
                 rough.end_at(at, place, 6, f64::INFINITY, &mut best);
                 let elbow = best[arm.lower].translation.distance(raised_pose[arm.lower].translation);
@@ -225,7 +238,7 @@ mod tests {
             unexplained.collect(context, at.matched);
             let mut rough = RoughSearch::default();
             unexplained.near(at.root(), at.chain().stretched_length(), &mut rough.score.unexplained);
-            rough.score.begin(at, &WeightedPoints::default());
+            rough.score.begin(at);
             let hanging = rough.score.cost(at, &poses, f64::INFINITY);
             let truth = rough.score.cost(at, &raised_pose, f64::INFINITY);
             let mut best = Vec::new();

@@ -16,15 +16,10 @@ use crate::visibility::{ALONG_LIMB, OVERLAP};
 /// Limits are soft; a joint may rotate by a third of a right angle between two frames.
 const LIMIT_STRAIN: f64 = 0.1;
 const MOTION_STRAIN: f64 = 0.6;
-/// Minimum decrease of the total cost by a hypothesis, patches: an area of six by six centimeters. An arm or leg is suspect only
-/// with as many unexplained patches nearby, and one that was proposed from unexplained points must have as many visible patches.
+/// Minimum decrease of the cost by a hypothesis, patches: an area of six by six centimeters. The evidence must decrease as much,
+/// because less occlusion or overlap alone does not justify a change. An arm or leg is tested only with as many unexplained
+/// patches nearby.
 pub(crate) const GAIN: f64 = 25.0;
-/// Minimum decrease of the evidence in the cost by a hypothesis, patches: less occlusion or overlap alone does not justify a
-/// change. Smaller differences fluctuate, so a hypothesis may cost this much more than the current pose while it is refined.
-pub(super) const REFUTED_GAIN: f64 = 10.0;
-/// Unexplained patches near an arm that make it suspect whatever other evidence supports it: an area of eight by eight
-/// centimeters.
-pub(super) const CLEAR_GAIN: f64 = 40.0;
 /// Minimum decrease of the cost for a change to the opposite direction, patches.
 pub(crate) const SURE_GAIN: f64 = 100.0;
 /// Maximum number of points for the rough cost; the time is proportional to it.
@@ -33,7 +28,7 @@ pub(crate) const ROUGH_SAMPLE: usize = 400;
 /// Cost of a pose in unexplained patches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cost {
-    /// Evidence against the pose: points that no limb explains, and surface that violates free space.
+    /// Evidence against the pose: points that no limb explains, and surface that violates free space, at one price.
     pub evidence: f64,
     /// Evidence, occluded surface, and the strain of all arms and legs.
     pub total: f64,
@@ -42,12 +37,12 @@ pub(crate) struct Cost {
 impl Cost {
     /// Whether a hypothesis of this cost may replace the current pose.
     pub(crate) fn is_better_than(&self, current: &Self) -> bool {
-        self.total < current.total - GAIN && self.evidence < current.evidence - REFUTED_GAIN
+        self.total < current.total - GAIN && self.evidence < current.evidence - GAIN
     }
 }
 
-/// Cost of matched poses.
-pub(crate) fn overall_cost(context: Context, matched: Matched) -> Cost {
+/// Cost of matched poses. An unexplained patch costs `patch_cost`.
+pub(crate) fn overall_cost(context: Context, matched: Matched, patch_cost: f64) -> Cost {
     let Context { model, observation, .. } = context;
     let mut visible = Visibility::default();
     for (limb, pose) in model.body.limbs().iter().zip(matched.poses) {
@@ -55,8 +50,8 @@ pub(crate) fn overall_cost(context: Context, matched: Matched) -> Cost {
     }
     let strain: f64 = model.extremities.iter().map(|chain| strain(context, matched, chain, matched.poses)).sum();
     let total: f64 = observation.candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-    let points = unexplained(matched.correspondences, total);
-    Cost { evidence: points + visible.image.free_space, total: points + visible.cost() + strain }
+    let (points, free_space) = (unexplained(matched.correspondences, total), visible.image.free_space);
+    Cost { evidence: patch_cost * (points + free_space), total: patch_cost * points + visible.cost() + strain }
 }
 
 /// Cost of one arm or leg at `poses` due to joint limits, overlap with other limbs, distances from measured sites, and motion
@@ -175,8 +170,8 @@ mod tests {
             let mut cost = |poses: &Vec<Pose>| {
                 fit.match_last(context, poses);
                 let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences()));
-                let cost = overall_cost(context, fit.matched(poses));
-                let again = overall_cost(context, fit.matched(poses));
+                let cost = overall_cost(context, fit.matched(poses), 1.0);
+                let again = overall_cost(context, fit.matched(poses), 1.0);
                 let bits = |cost: Cost| [cost.evidence, cost.total].map(f64::to_bits);
                 assert_eq!(bits(cost), bits(again), "the cost of the same input must not change");
                 assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences())));
@@ -214,7 +209,7 @@ mod tests {
                 let mut fit = Fit::new(&config).unwrap();
                 fit.match_last(context, &poses);
                 let all: f32 = context.observation.candidates.weight.iter().sum();
-                (overall_cost(context, fit.matched(&poses)), f64::from(all))
+                (overall_cost(context, fit.matched(&poses), 1.0), f64::from(all))
             })
         };
         let alone = before_wall(&model.body, &poses);
@@ -290,7 +285,7 @@ mod tests {
             assert_eq!(unknown, stayed);
             assert!(hung > unknown + 1.0, "{hung} after {unknown}");
             // The strain of all arms and legs is part of the total, but not of the evidence.
-            let overall = |previous| overall_cost(Context { previous, ..context }, fit.matched(&poses));
+            let overall = |previous| overall_cost(Context { previous, ..context }, fit.matched(&poses), 1.0);
             let (still, moved) = (overall(&poses), overall(&raised));
             assert!(moved.total > still.total + 1.0 && moved.evidence == still.evidence, "{moved:?} and {still:?}");
         });

@@ -4,16 +4,18 @@ use crate::fit::{Context, Matched};
 use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::evidence::EXPLAINED;
 
-/// When more than this fraction of the frame's weight is unexplained, the scene is cluttered, and unexplained points near an arm
-/// are no evidence against it.
-pub(crate) const CLUTTER: f64 = 0.15;
+/// Fraction of the points in a frame that a correct pose usually leaves unexplained, and the cost of a patch there, nats: the
+/// logarithm of its probability on the body over that of an unexplained one. It falls where more is unexplained: a frame of
+/// noise, or of another person in front of the body, is no evidence against a pose.
+const USUAL_CLUTTER: f64 = 0.05;
+const USUAL_COST: f64 = 2.0;
 
 /// Candidates that the current correspondences leave unexplained.
 #[derive(Debug, Default)]
 pub(super) struct Unexplained {
     points: WeightedPoints,
-    /// Whether the unexplained fraction exceeds `CLUTTER`.
-    pub(super) cluttered: bool,
+    /// Cost of an unexplained patch in this frame, in those of a usual frame.
+    pub(super) patch_cost: f64,
     /// Distance of every candidate to the nearest limb that it is matched to.
     nearest: Vec<f32>,
 }
@@ -22,7 +24,7 @@ impl Unexplained {
     /// Collects the unexplained candidates of a frame.
     pub(super) fn collect(&mut self, context: Context, matched: Matched) {
         let candidates = context.observation.candidates;
-        let Self { points, cluttered, nearest } = self;
+        let Self { points, patch_cost, nearest } = self;
         points.clear();
         // Reserved now, so that later steps do not allocate.
         points.reserve(candidates.len());
@@ -42,7 +44,8 @@ impl Unexplained {
             }
         }
         let all: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
-        *cluttered = points.total() > CLUTTER * all;
+        let excess = points.total() / (USUAL_CLUTTER * all).max(f64::MIN_POSITIVE);
+        *patch_cost = (1.0 - excess.max(1.0).ln() / USUAL_COST).max(0.0);
     }
 
     /// Writes the unexplained points within `reach` meters of a position to `near`.
@@ -82,7 +85,7 @@ mod tests {
     fn a_correct_pose_leaves_few_points_unexplained() {
         let (_, poses) = standing();
         collected(&poses, |unexplained| {
-            assert!(unexplained.points.total() < 5.0 && !unexplained.cluttered);
+            assert!(unexplained.points.total() < 5.0 && unexplained.patch_cost == 1.0);
         });
     }
 

@@ -1,8 +1,8 @@
 //! Counts for how long a body has been lost, and monitors it for a while after recovery.
 
+use super::PATIENCE;
 use super::detection_check::NEW_TRACK_AGE;
 use super::occlusion::Occlusion;
-use crate::hypotheses::PATIENCE;
 
 /// Outcome of a frame for the body.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -31,6 +31,9 @@ use tentative_detection::TentativeDetection;
 pub(crate) use tentative_detection::{DETECTION_COST, ENOUGH_ODDS, SAME_PERSON};
 use trials::Trials;
 
+/// Number of consecutive frames after which a visible body counts as visible and a lost one as lost.
+const PATIENCE: usize = 2;
+
 /// Finds bodies. Stores the evidence of past detections and for how long the body has been lost.
 #[derive(Debug, Default)]
 pub(crate) struct Relocalizer {

@@ -1,7 +1,7 @@
 //! Detects occlusion of a tracked body: what hides the body is another person, not the body at a new position.
 
+use super::PATIENCE;
 use super::detection_check::NEW_TRACK_AGE;
-use crate::hypotheses::PATIENCE;
 use crate::math::Vec3;
 use crate::observation::depth_view::{DepthViews, Pixel};
 use crate::observation::frame::Frame;

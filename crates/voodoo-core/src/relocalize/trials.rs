@@ -2,11 +2,12 @@
 
 use crate::body::Model;
 use crate::fit::{Context, Fit};
-use crate::hypotheses::{
-    CLUTTER, REFINE, ROUGH_SAMPLE, SURE_GAIN, body_landmark_cost, explain, limit_strain, overall_cost,
-};
+use crate::hypotheses::{REFINE, ROUGH_SAMPLE, SURE_GAIN, body_landmark_cost, explain, limit_strain, overall_cost};
 use crate::math::{Pose, Vec3, WeightedPoints};
 use crate::visibility::evidence::EXPLAINED;
+
+/// Maximum fraction of the points that a body found elsewhere may leave far from it.
+const STRAY: f64 = 0.15;
 
 /// Working memory of a trial.
 #[derive(Debug, Default)]
@@ -53,7 +54,7 @@ impl Trials {
         self.poses = poses;
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
         let allowed = present_score + if turned { turning } else { 0.0 };
-        pose_score(context, fit, &self.poses) < allowed && stray < CLUTTER
+        pose_score(context, fit, &self.poses) < allowed && stray < STRAY
     }
 
     /// Returns the fraction of a sample of the candidates that lies far from the body.
@@ -85,7 +86,7 @@ impl Trials {
 /// Returns the cost of poses: that of hypotheses, plus those of the sites and of the other joints.
 fn pose_score(context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
     let matched = fit.matched(poses);
-    overall_cost(context, matched).total + body_landmark_cost(matched) + other_joints_strain(context.model, poses)
+    overall_cost(context, matched, 1.0).total + body_landmark_cost(matched) + other_joints_strain(context.model, poses)
 }
 
 /// Returns the cost of violated limits at joints that are not inside an arm or leg, for example of a foot that points backwards.

@@ -66,7 +66,11 @@ fn with_lengths_of(
     }
     tried.body.close_joints(&mut set);
     fit.match_points(setting.with_model(&tried), &set, &START_GATE);
-    Changed { cost: overall_cost(setting.with_model(&tried), fit.matched(&set)).evidence, body: tried.body, poses: set }
+    Changed {
+        cost: overall_cost(setting.with_model(&tried), fit.matched(&set), 1.0).evidence,
+        body: tried.body,
+        poses: set,
+    }
 }
 
 /// Lengths of the two bones, meters.

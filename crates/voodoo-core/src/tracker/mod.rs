@@ -437,7 +437,7 @@ impl Tracker {
         let branch_distance = |limb: usize| hypotheses.branch_distance(body, limb, &shifted(&poses[limb], -origin));
         assessor.follow_edges(model, found, branch_distance);
         assessor.report_status(model, estimate);
-        assessor.report_spread(found, hypotheses.alternatives(), |limb| sizes.girth_sigma(body, limb), estimate);
+        assessor.report_spread(found, |limb| sizes.girth_sigma(body, limb), estimate);
     }
 }
 

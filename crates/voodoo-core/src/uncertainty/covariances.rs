@@ -72,12 +72,6 @@ impl Covariances {
         let covariance = block(0, 0) + mixed + mixed.transpose() + turned * block(3, 3) * turned.transpose();
         self.sites.push(symmetric(covariance));
     }
-
-    /// Merges the site's position with an alternative one: the covariance of both positions, each equally likely.
-    pub(crate) fn widen(&mut self, site: usize, aside: Vec3) {
-        let half = 0.5 * aside;
-        self.sites[site] += Mat3::from_cols(half * half.x, half * half.y, half * half.z);
-    }
 }
 
 fn symmetric(matrix: Mat3) -> Mat3 {
@@ -116,23 +110,5 @@ mod tests {
         }
         // Position first, as in a message.
         assert!((covariances.limbs[0][0][4] - limb[(3, 1)]).abs() < 1e-15);
-    }
-
-    #[test]
-    fn two_places_as_likely_as_each_other_have_the_covariance_of_both() {
-        let mut covariances =
-            Covariances { sites: vec![Mat3::from_diagonal(Vec3::splat(1e-4))], ..Covariances::default() };
-        let aside = Vec3::new(0.2, 0.0, -0.4);
-        covariances.widen(0, aside);
-        // For two points, the covariance is the mean of squares about their midpoint.
-        let points = [Vec3::ZERO, aside];
-        let middle = 0.5 * aside;
-        for i in 0..3 {
-            for j in 0..3 {
-                let spread: f64 = points.iter().map(|point| (point - middle)[i] * (point - middle)[j] / 2.0).sum();
-                let own = if i == j { 1e-4 } else { 0.0 };
-                assert!((covariances.sites[0].col(j)[i] - own - spread).abs() < 1e-15);
-            }
-        }
     }
 }

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{Pool, Propose, SWIVELS};
-use crate::hypotheses::history::{Basis, History};
+use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::hypotheses::score::limit_strain;
 use crate::math::{Pose, Vec3};
@@ -31,7 +31,7 @@ impl Propose for ColorDirections {
                 let least = rough.changed(at, change, pool.least, &mut pool.points.poses);
                 if least < pool.least {
                     pool.least = least;
-                    pool.points.set(Basis::Points);
+                    pool.points.found = true;
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Proposes the whole body as detected: when the trunk is displaced, no change of a single arm or leg is correct.
 
 use super::{Pool, Propose};
-use crate::hypotheses::history::{Basis, History};
+use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Pose, shifted};
 
@@ -18,7 +18,7 @@ impl Propose for DetectedBody<'_> {
         let origin = at.context.observation.origin();
         pool.body.poses.clear();
         pool.body.poses.extend(self.0.iter().map(|pose| shifted(pose, origin)));
-        pool.body.set(Basis::Body);
+        pool.body.found = true;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Pool, Propose, SWIVELS};
 use crate::detect::Detected;
-use crate::hypotheses::history::{Basis, History};
+use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Vec3;
 
@@ -32,8 +32,6 @@ impl Propose for DetectedEnd<'_> {
         let place = end - at.context.observation.origin();
         // The bend is searched for, because a detected elbow or knee is no more accurate than the wrist or ankle.
         let cost = rough.end_at(at, place, 2 * SWIVELS, f64::INFINITY, &mut pool.detected.poses);
-        if cost < f64::INFINITY {
-            pool.detected.set(Basis::End);
-        }
+        pool.detected.found = cost < f64::INFINITY;
     }
 }

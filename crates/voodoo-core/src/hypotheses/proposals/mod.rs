@@ -1,24 +1,19 @@
-//! Proposals of alternative configurations of an arm, a leg or the trunk, one file for each kind.
+//! Proposals of alternative configurations of an arm or leg, one file for each kind.
 
-mod carried_by_parent;
 mod color_directions;
 mod detected_body;
 mod detected_end;
 mod last_good_end;
-mod last_proposal;
-mod trunk_lean;
 mod unexplained_cluster;
 
-pub(super) use carried_by_parent::CarriedByParent;
 pub(super) use color_directions::ColorDirections;
 pub(super) use detected_body::DetectedBody;
 pub(super) use detected_end::DetectedEnd;
 pub(super) use last_good_end::LastGoodEnd;
-pub(super) use last_proposal::LastProposal;
-pub(super) use trunk_lean::TrunkLean;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 
-use super::history::{Basis, History};
+use super::GAIN;
+use super::history::History;
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
@@ -37,24 +32,19 @@ pub(super) trait Propose {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Proposal {
     pub(super) found: bool,
-    pub(super) basis: Basis,
     pub(super) poses: Vec<Pose>,
 }
 
 /// Proposals for one arm or leg: one slot for each kind, in the order in which they are refined.
 #[derive(Debug, Default)]
 pub(super) struct Pool {
-    /// The trunk leans and both feet stay. It is first because changes of single legs do not last while the trunk is wrong.
-    pub(super) lean: Proposal,
-    /// The change that the previous frame requested.
-    pub(super) repeated: Proposal,
     /// The end is at its last good position.
     pub(super) last_good: Proposal,
-    /// The configuration of lowest rough cost, and that cost; initially an upper bound.
+    /// The configuration of lowest rough cost, and that cost; initially the highest that is worth refining.
     pub(super) points: Proposal,
     pub(super) least: f64,
-    /// Both feet are at their last good positions.
-    pub(super) both_feet: Proposal,
+    /// Rough cost of the current configuration.
+    pub(super) current: f64,
     /// The end is at its detected position.
     pub(super) detected: Proposal,
     /// The whole body has the detected poses.
@@ -70,29 +60,22 @@ impl Pool {
         }
     }
 
-    /// Clears all slots. The proposal in `points` has to cost less than `least`.
-    pub(super) fn begin(&mut self, least: f64) {
+    /// Clears all slots. The current configuration costs `current`.
+    pub(super) fn begin(&mut self, current: f64) {
         for proposal in self.slots() {
             proposal.found = false;
         }
-        self.least = least;
+        (self.least, self.current) = (current - GAIN, current);
     }
 
     /// The proposals found, in the order in which they are refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { lean, repeated, last_good, points, both_feet, detected, body, .. } = self;
-        [lean, repeated, last_good, points, both_feet, detected, body].into_iter().filter(|slot| slot.found)
+        let Self { last_good, points, detected, body, .. } = self;
+        [last_good, points, detected, body].into_iter().filter(|slot| slot.found)
     }
 
-    fn slots(&mut self) -> [&mut Proposal; 7] {
-        let Self { lean, repeated, last_good, points, both_feet, detected, body, .. } = self;
-        [lean, repeated, last_good, points, both_feet, detected, body]
-    }
-}
-
-impl Proposal {
-    /// Marks the poses in the slot as found.
-    fn set(&mut self, basis: Basis) {
-        (self.found, self.basis) = (true, basis);
+    fn slots(&mut self) -> [&mut Proposal; 4] {
+        let Self { last_good, points, detected, body, .. } = self;
+        [last_good, points, detected, body]
     }
 }

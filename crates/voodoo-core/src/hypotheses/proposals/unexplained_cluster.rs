@@ -2,7 +2,7 @@
 
 use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::APART;
-use crate::hypotheses::history::{Basis, History};
+use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
 use crate::visibility::FEW;
@@ -28,7 +28,7 @@ impl Propose for UnexplainedCluster {
             let least = rough.end_at(at, end, SWIVELS, pool.least, &mut pool.points.poses);
             if least < pool.least {
                 pool.least = least;
-                pool.points.set(Basis::Points);
+                pool.points.found = true;
             }
         }
     }
