@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, names_of
-from voodoo.export.skeleton import FloatArray, held, placed_on_parents, skeleton
+from voodoo.export.skeleton import Bone, FloatArray, held, placed_on_parents, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.limb_mesh import limb_mesh
@@ -111,7 +111,7 @@ class _File:
             "skeleton": first,
             "inverseBindMatrices": self._floats(inverse.reshape(-1, 16), "MAT4"),
         }
-        shown = {"name": f"{name}_mesh", "mesh": self._mesh(body, track, color), "skin": self._add("skins", skin)}
+        shown = {"name": f"{name}_mesh", "mesh": self._mesh(body, parts, color), "skin": self._add("skins", skin)}
         person = self._add("nodes", {"name": name, "children": [first]})
         self._scene["scenes"][0].setdefault("nodes", []).extend([person, self._add("nodes", shown)])
         times = self._floats(track.stamps - start, "SCALAR")
@@ -129,11 +129,11 @@ class _File:
             sizes = np.r_[False, track.found] if track.stamps[0] > start else track.found
             self._animate(person, "scale", self._floats(shown_at, "SCALAR"), np.tile(sizes[:, None], 3), step=True)
 
-    def _mesh(self, body: Body, track: Track, color: tuple[float, ...]) -> int:
+    def _mesh(self, body: Body, bones: Sequence[Bone], color: tuple[float, ...]) -> int:
         """All limbs at rest as one mesh; each vertex follows its limb."""
         places, triangles, normals, owners = [], [], [], []
         count = 0
-        for index, (limb, bone) in enumerate(zip(body.limbs, skeleton(track, body).bones, strict=True)):
+        for index, (limb, bone) in enumerate(zip(body.limbs, bones, strict=True)):
             vertices, faces, outward = limb_mesh(limb.shape)
             places.append((vertices - bone.head_in_limb) @ bone.rest.T + bone.head)
             normals.append(outward @ bone.rest.T)

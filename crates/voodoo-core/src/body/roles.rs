@@ -181,7 +181,6 @@ impl JointRole {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Roles {
-    human: bool,
     /// For each limb: its role, the role of the joint to its parent, and the site named like that joint.
     limbs: Vec<Option<LimbRole>>,
     joints: Vec<Option<JointRole>>,
@@ -199,11 +198,10 @@ impl Roles {
     /// # Errors
     /// [`BodyError::Role`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
     /// follow the preceding one. Detections and statistics of human joints would otherwise be applied to the wrong limbs.
-    pub(super) fn resolve<'a>(body: &str, limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
+    pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
         let site = |name: &str| sites.iter().position(|site| site.name == name);
         let mut roles = Self {
-            human: body == "human",
             limbs: limbs.iter().map(|limb| LimbRole::from_name(&limb.name)).collect(),
             joints: limbs.iter().map(|limb| joint_name(limb).and_then(JointRole::from_name)).collect(),
             joint_sites: limbs.iter().map(|limb| joint_name(limb).and_then(site)).collect(),

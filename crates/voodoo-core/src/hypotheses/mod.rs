@@ -193,6 +193,9 @@ impl Hypotheses {
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
     ) -> (usize, bool) {
+        if self.pool.found().next().is_none() {
+            return (0, false);
+        }
         let (mut steps, current) = (0, self.refined.cost(context, fit, poses));
         for proposal in self.pool.found() {
             let (taken, better) = self.refined.replace(context, fit, poses, predicted, current, &proposal.poses);

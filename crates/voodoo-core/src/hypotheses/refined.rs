@@ -8,8 +8,8 @@ use crate::regions::{self, Backdrop, Posed};
 
 /// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
-/// Step at which a hypothesis is rejected if it costs more than the current pose. Of 63 accepted hypotheses in the rendered
-/// recordings, none had a higher cost at this step. A test in an earlier step rejected correct ones that started far away.
+/// Step at which a hypothesis is rejected if it costs more than the current pose. A test in an earlier step rejected correct ones
+/// that started far away.
 const GIVE_UP_AFTER: usize = 6;
 /// Number of first steps that use a subsample of the points. The final cost uses all points.
 const ROUGH_STEPS: usize = GIVE_UP_AFTER;
@@ -99,7 +99,7 @@ impl Refined {
             } else {
                 fit.match_again(here, &self.poses, at);
             }
-            // Halfway, only a much higher cost stops the refinement: this was so for one of 178 finally better hypotheses.
+            // Halfway, only a much higher cost stops the refinement.
             let worst = match step {
                 GIVE_UP_AFTER => most,
                 _ if 2 * step == REFINE => most + SURE_GAIN,
