@@ -1,6 +1,7 @@
 """`voodoo track` over damaged recordings: a pose for every good frame, and what was left out is counted."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,43 @@ def test_strictly_the_first_damage_ends_without_a_result(entries, start):
     bag = damage.write(start / "strictly", damage.DAMAGES["garbled"][0](entries))
     done = CliRunner().invoke(app, ["track", str(bag), "--strict", "--use", "depth", "--out", str(start / "no.npz")])
     assert done.exit_code == 1 and done.stderr.count("voodoo: ") == 1 and not (start / "no.npz").exists()
+
+
+@pytest.mark.parametrize("seconds", [1.5, 3600.0])
+def test_after_a_clock_was_set_back_it_is_tracked_on(entries, start, undamaged, seconds):
+    bag = damage.write(start / f"back-{seconds}", damage.set_back(entries, seconds))
+    result, reported = tracked(bag)
+    kept = np.setdiff1d(np.arange(90), [45])  # which might have been out of order
+    np.testing.assert_allclose(result.stamps, undamaged.stamps[kept], atol=1e-5)
+    assert result.found.all() and set(result.status) <= {"tracking", "degraded"}
+    off = np.linalg.norm(result.joints - undamaged.joints[kept], axis=2)[result.stamps > result.stamps[45] + SETTLED_S]
+    assert off.mean() < WITHIN_M, f"{1000 * off.mean():.1f} mm"
+    said = " ".join(reported.split())
+    assert said.count("was set back") == 1 and f"are moved on by {seconds:.6f} s" in said
+    with pytest.raises(RecordingError, match="expected rising stamps"):
+        list(open_recording(bag))
+
+
+def test_transforms_by_a_clock_that_was_set_back_hold_for_their_images(entries, start):
+    """A camera moves to the side; where its clock was set back, two transforms have each stamp."""
+    moving = [entry for entry in entries if entry[0] in (damage.DEPTH, damage.INFO)]
+    static = next(entry for entry in entries if entry[0] == "/tf_static")
+    for number, row in reversed(list(enumerate(damage.depth_rows(moving)))):
+        message = damage.ROS2.deserialize_cdr(moving[row][3], moving[row][1])
+        (one,) = damage.ROS2.deserialize_cdr(static[3], static[1]).transforms[:1]
+        aside = replace(one.transform.translation, y=0.01 * number)
+        one = replace(one, header=replace(one.header, stamp=message.header.stamp))
+        one = replace(one, transform=replace(one.transform, translation=aside))
+        moving.insert(row, damage.changed(("/tf", static[1], moving[row][2], static[3]), transforms=[one]))
+    others = damage.changed(static, transforms=damage.ROS2.deserialize_cdr(static[3], static[1]).transforms[1:])
+    left_out = LeftOut()
+    bag = damage.write(start / "moving", [others, *damage.set_back(moving, 1.0 + 1.0 / 3.0)])
+    frames = list(open_recording(bag, left_out=left_out, use=("depth",)))
+    aside = np.array([frame.measurements[0].root_from_sensor[1, 3] for frame in frames])
+    aside -= aside[0]
+    np.testing.assert_allclose(aside[:45], 0.01 * np.arange(45), atol=1e-9)
+    np.testing.assert_allclose(aside[45:], 0.01 * np.arange(46, 90), atol=1e-9)
+    assert len(left_out.notes) == 1
 
 
 def test_a_picture_that_does_not_decode_costs_no_frame(entries, start):

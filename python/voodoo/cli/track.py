@@ -304,6 +304,8 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         for reason, count in left_out.counts.items():
             first = left_out.first[reason]
             print_message(f"{source.name}: left out {count} {reason} (the first: {first}); --strict refuses them")
+        for note in left_out.notes:
+            print_message(f"{source.name}: {note}")
     if not {"tracking", "degraded"} & spool.states.keys():
         depth = depth_range(source)
         if depth is not None and depth.warning:

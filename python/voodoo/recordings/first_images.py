@@ -80,8 +80,12 @@ def _of(item: DepthImage | ColorImage) -> FirstImage:
 def doubts(about: RecordingInfo, left_out: LeftOut) -> list[str]:
     """What is not right with a recording, after its first images were read."""
     found = [f"left out {count} {reason}: {left_out.first[reason]}" for reason, count in left_out.counts.items()]
+    found += left_out.notes
     if about.duration < 0.0:
-        found.append(f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first")
+        found.append(
+            f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first; voodoo track "
+            "moves stamps on where a clock was set back"
+        )
     lasers = [sensor.name for sensor in about.sensors if sensor.kind in ("scan", "points")]
     if lasers and about.root_frame not in FIXED_FRAMES and not about.camera_root:
         found.append(

@@ -206,7 +206,9 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     stamps = (first + np.arange(len(table))) / rate
     found = _trajectories(path, stamps, names, positions, rate, world_from_file)
     if right and up and right[1] == up[1]:
-        return replace(found, remarks=(f"{path.name}: X_SCREEN {right} and Y_SCREEN {up} are the same axis, and not used",))
+        return replace(
+            found, remarks=(f"{path.name}: X_SCREEN {right} and Y_SCREEN {up} are the same axis, and not used",)
+        )
     return replace(found, up=up, right=right)
 
 

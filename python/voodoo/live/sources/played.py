@@ -90,7 +90,7 @@ class PlayedSource(Source):
         if self._next is None and self._loop:
             self._frames = iter(paired(self.recording))
             self._next = next(self._frames, None)
-            period = self._about.duration / max(self._about.frames - 1, 1)
+            period = (frame.stamp - self._first) / max(self._about.frames - 1, 1)
             self._shift += frame.stamp - self._first + period
 
     def _arrivals(self, frame: RecordedFrame, due: float) -> list[Arrival]:
