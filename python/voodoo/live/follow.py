@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
+from voodoo.export.upright import Turn
 from voodoo.live.assembly import LiveFrame
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate, Person
@@ -34,6 +35,7 @@ class Step:
         bodies: person number -> body, with current sizes.
         seconds: duration of tracking [s].
         front_end: for a single person: the front end that made the tracker's frame.
+        turn: how outputs turn the root frame upright; None: by its axes if it is an optical frame by its name.
     """
 
     frame: LiveFrame
@@ -41,6 +43,7 @@ class Step:
     bodies: Mapping[int, Body]
     seconds: float
     front_end: FrontEnd | None = None
+    turn: Turn | None = None
 
     @property
     def stamp(self) -> float:

@@ -7,6 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from voodoo.errors import VoodooError, reason
@@ -15,6 +16,7 @@ from voodoo.live.follow import Follower, Step, without_damaged
 from voodoo.live.latencies import Latencies
 from voodoo.live.mailbox import Mailbox
 from voodoo.live.stream import Live
+from voodoo.live.upright import Upright
 
 _TICK_S = 0.05
 _RATE_S = 2.0
@@ -104,7 +106,7 @@ class Session:
         self.live = live
         self.latency, self.tracking = Latencies(), Latencies()
         self.published = self.with_pose = self.refused = 0
-        self._make = follower
+        self._make, self._upright = follower, Upright(live)
         self._is_reset = threading.Event()
         for output in outputs:
             output.on_reset = self.reset
@@ -133,6 +135,7 @@ class Session:
                 step = self._step(follower, frame)
                 if step is not None:
                     self.tracking.add(step.seconds)
+                    step = replace(step, turn=self._upright.of(step))
                     for lane in self._lanes:
                         lane.box.put(step)
         except BaseException as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -59,11 +60,10 @@ class _ForBrowsers:
     """A video by PyAV, with its index in front, so that it plays while it is loaded."""
 
     def __init__(self, place: Path, shape: tuple[int, ...], rate: Fraction, codec: str) -> None:
-        import av
-
-        self._encoded: Any = av.VideoFrame.from_ndarray
-        self._file: Any = av.open(f"file:{place.absolute()}", "w", format="mp4", options={"movflags": "+faststart"})
-        self._stream: Any = self._file.add_stream(codec, rate=rate, options=_CODECS[codec])
+        av: Any = import_module("av")
+        self._encoded = av.VideoFrame.from_ndarray
+        self._file = av.open(f"file:{place.absolute()}", "w", format="mp4", options={"movflags": "+faststart"})
+        self._stream = self._file.add_stream(codec, rate=rate, options=_CODECS[codec])
         # Colors have half the resolution: sizes are even.
         self._stream.height, self._stream.width = (size // 2 * 2 for size in shape[:2])
         self._stream.pix_fmt = "yuv420p"

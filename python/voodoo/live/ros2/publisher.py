@@ -7,6 +7,7 @@ from typing import Any
 
 from voodoo._core import Estimate
 from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
+from voodoo.export.upright import Turn
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
@@ -55,20 +56,21 @@ class Ros2Output(Output):
             self.on_reset()
         observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
         for number in sorted(observed):
-            self._write_person(number, step.estimates[number], step.bodies[number])
+            self._write_person(number, step.estimates[number], step.bodies[number], step.turn)
         for number in sorted(self._displayed - observed):
             # Markers of persons who left are deleted once.
-            self._write_person(number, nobody(step.stamp), step.bodies.get(number, self._bodies[number]))
+            body = step.bodies.get(number, self._bodies[number])
+            self._write_person(number, nobody(step.stamp), body, step.turn)
         self._displayed = observed
         self._bodies = {number: step.bodies[number] for number in observed}
         self._write(tracked(step.stamp, [person_id(number) for number in sorted(observed)], root_frame=self._root()))
 
-    def _write_person(self, number: int, estimate: Estimate, body: Body) -> None:
+    def _write_person(self, number: int, estimate: Estimate, body: Body, turn: Turn | None) -> None:
         person, size = person_id(number), sum(limb.shape.length for limb in body.limbs)
         if estimate.joints and abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
             self._write(description(body, person))
             self._described[number] = size
-        self._write(instant(estimate, body, root_frame=self._root(), person=person))
+        self._write(instant(estimate, body, root_frame=self._root(), person=person, turn=turn))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
