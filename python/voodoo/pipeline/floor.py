@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import islice
 
 import numpy as np
 
-from voodoo._core import Detector, Frame
+from voodoo._core import Detection, Detector, Frame
 from voodoo.errors import VoodooError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording
@@ -17,6 +18,22 @@ _ON_FLOOR_M = 0.3
 """An ankle at most this high stands on the floor that is seen; a plane elsewhere is a table."""
 _ALIKE = 0.995
 """Least cosine between the normals of one floor (6 degrees); where they differ more, the root frame moves on the floor."""
+
+
+def detections(
+    detector: Detector, recorded: RecordedFrame, *, up: tuple[float, float, float] | None = None
+) -> Sequence[Detection]:
+    """The persons that the detector sees in the depth images of a frame.
+
+    Raises:
+        VoodooError: an image is damaged.
+    """
+    images = [item for item in recorded.measurements if isinstance(item, DepthImage)]
+    frame = Frame(stamp=recorded.stamp)
+    for item in images:
+        how = {"meters_per_unit": item.meters_per_unit, "world_from_sensor": item.root_from_sensor}
+        frame.add_depth(item.image, camera=item.camera, source=item.sensor, **how)  # type: ignore[arg-type]
+    return detector.detect(frame, up=up) if images else ()
 
 
 class FloorSight:
@@ -41,12 +58,7 @@ class FloorSight:
         Raises:
             VoodooError: an image is damaged.
         """
-        images = [item for item in recorded.measurements if isinstance(item, DepthImage)]
-        frame = Frame(stamp=recorded.stamp)
-        for item in images:
-            how = {"meters_per_unit": item.meters_per_unit, "world_from_sensor": item.root_from_sensor}
-            frame.add_depth(item.image, camera=item.camera, source=item.sensor, **how)  # type: ignore[arg-type]
-        for found in self._detector.detect(frame, up=self._up) if images else ():
+        for found in detections(self._detector, recorded, up=self._up):
             low = [found.joints[name] for name in ("l_ankle", "r_ankle") if name in found.joints]
             if found.floor is not None and low:
                 normal, height = np.asarray(found.floor[0]), found.floor[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
@@ -21,16 +21,6 @@ _CODECS = {
 }
 
 
-class Film(Protocol):
-    """A video that is written."""
-
-    def write(self, picture: Picture) -> Any:  # noqa: ANN401 - nothing, in either library
-        """Add a picture."""
-
-    def release(self) -> Any:  # noqa: ANN401
-        """Complete the file."""
-
-
 def codec_for_browsers() -> str | None:
     """The encoder of PyAV that is used; None: there is none."""
     try:
@@ -38,22 +28,6 @@ def codec_for_browsers() -> str | None:
     except ImportError:
         return None
     return next((name for name in _CODECS if name in av.codec.codecs_available), None)
-
-
-def film(place: Path, shape: tuple[int, ...], *, rate_hz: float) -> Film:
-    """Begin a video in .mp4 of pictures of a shape (height, width, 3).
-
-    Raises:
-        VoodooError: it cannot be written.
-        OSError: PyAV cannot write it.
-    """
-    codec = codec_for_browsers()
-    if codec is not None:
-        return _ForBrowsers(place, shape, Fraction(rate_hz).limit_denominator(1001), codec)
-    made = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"mp4v"), rate_hz, shape[1::-1])
-    if not made.isOpened():
-        raise VoodooError(f"{place.name}: expected a file that can be written as MPEG-4, found that OpenCV cannot")
-    return made
 
 
 class _ForBrowsers:
@@ -70,15 +44,34 @@ class _ForBrowsers:
         self._count = 0
 
     def write(self, picture: Picture) -> None:
-        """See Film."""
+        """As cv2.VideoWriter."""
         whole = np.ascontiguousarray(picture[: self._stream.height, : self._stream.width])
         frame = self._encoded(whole, format="bgr24")
         frame.pts, self._count = self._count, self._count + 1
         self._file.mux(self._stream.encode(frame))
 
     def release(self) -> None:
-        """See Film."""
+        """As cv2.VideoWriter."""
         try:
             self._file.mux(self._stream.encode(None))
         finally:
             self._file.close()
+
+
+Film: TypeAlias = _ForBrowsers | cv2.VideoWriter
+
+
+def film(place: Path, shape: tuple[int, ...], *, rate_hz: float) -> Film:
+    """Begin a video in .mp4 of pictures of a shape (height, width, 3); `write` adds one, and `release` completes the file.
+
+    Raises:
+        VoodooError: it cannot be written.
+        OSError: PyAV cannot write it.
+    """
+    codec = codec_for_browsers()
+    if codec is not None:
+        return _ForBrowsers(place, shape, Fraction(rate_hz).limit_denominator(100_000), codec)
+    made = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"mp4v"), rate_hz, shape[1::-1])
+    if not made.isOpened():
+        raise VoodooError(f"{place.name}: expected a file that can be written as MPEG-4, found that OpenCV cannot")
+    return made

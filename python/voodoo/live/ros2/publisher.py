@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from voodoo._core import Estimate
 from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
 from voodoo.export.upright import Turn
@@ -14,7 +16,8 @@ from voodoo.live.session import Output
 from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
-RESET = "/voodoo/reset"
+RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
+_PLACE = "geometry_msgs/msg/PointStamped"
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -24,7 +27,8 @@ class Ros2Output(Output):
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
     Stamps are those of the data. Persons that are lost or searched for are not listed as tracked and have no transforms.
-    A message on RESET (std_msgs/Empty) lets everybody be searched for again.
+    A message on RESET (std_msgs/Empty) lets everybody be searched for again, and one on FOLLOW (geometry_msgs/PointStamped) lets
+    only the person at that place be followed.
 
     Args:
         root_frame: returns the frame of the poses, once a frame has arrived.
@@ -43,6 +47,7 @@ class Ros2Output(Output):
         self._bodies: dict[int, Body] = {}
         self._described: dict[int, float] = {}
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
+        self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
         self._publish_on(TRACKED, IDS, 1)
         # Subscribers can discover these topics before the first pose.
@@ -54,6 +59,10 @@ class Ros2Output(Output):
         """See Output."""
         if self._resets.take() and self.on_reset is not None:
             self.on_reset()
+        for raw in self._follows.take():
+            chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
+            if self.on_choice is not None:
+                self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
         observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
         for number in sorted(observed):
             self._write_person(number, step.estimates[number], step.bodies[number], step.turn)
