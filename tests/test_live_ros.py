@@ -201,12 +201,16 @@ class FakeNode:
 
     def __init__(self):
         self.sent, self.heard = [], {}
-        self.offered, self.published = {}, {}
+        self.offered, self.published, self.unheard = {}, {}, set()
 
     def advertise(self, topic, kind, *, depth=10, latched=False):
         node = self
 
         class Publication:
+            @property
+            def subscribers(self):
+                return topic not in node.unheard
+
             def write(self, message):
                 node.sent.append((topic, STORE.deserialize_cdr(message, kind)))
 
@@ -275,6 +279,9 @@ def test_what_is_published_has_the_stamps_of_the_data():
     assert gone[TRACKED][0].ids == []
     assert set(publish(step.estimate.stamp + 0.2, nobody(step.estimate.stamp + 0.2))) == {TRACKED}
     assert gone[TRACKED][0].__msgtype__ == IDS
+    node.unheard.add(f"{body}/markers")
+    unheard = publish(step.estimate.stamp + 0.3, step.estimate)
+    assert set(sent) - set(unheard) == {f"{body}/markers", "/human_description_p1"}, "made for nobody"
 
 
 def test_a_whole_recording_goes_through_the_bus():

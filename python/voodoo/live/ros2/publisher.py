@@ -17,7 +17,7 @@ from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
-_PLACE = "geometry_msgs/msg/PointStamped"
+_PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -26,9 +26,9 @@ class Ros2Output(Output):
     """`/tf`, `/humans/bodies/<id>/joint_states`, `.../pose`, `.../markers`, `/human_description_<id>` (URDF), and
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
-    Stamps are those of the data. Persons that are lost or searched for are not listed as tracked and have no transforms.
-    A message on RESET (std_msgs/Empty) lets everybody be searched for again, and one on FOLLOW (geometry_msgs/PointStamped) lets
-    only the person at that place be followed.
+    Markers are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or searched for are not
+    listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched for again, and one on
+    FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
 
     Args:
         root_frame: returns the frame of the poses, once a frame has arrived.
@@ -53,7 +53,7 @@ class Ros2Output(Output):
         # Subscribers can discover these topics before the first pose.
         self._publish_on(f"{BODIES}/{person_id(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
         self._publish_on(f"{BODIES}/{person_id(1)}/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10)
-        self._publish_on(f"{BODIES}/{person_id(1)}/markers", "visualization_msgs/msg/MarkerArray", 10)
+        self._publish_on(f"{BODIES}/{person_id(1)}/markers", _MARKERS, 10)
 
     def publish(self, step: Step) -> None:
         """See Output."""
@@ -79,7 +79,9 @@ class Ros2Output(Output):
         if estimate.joints and abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
             self._write(description(body, person))
             self._described[number] = size
-        self._write(instant(estimate, body, root_frame=self._root(), person=person, turn=turn))
+        # Markers take as long as all other messages together.
+        seen = self._publish_on(f"{BODIES}/{person}/markers", _MARKERS, 10).subscribers > 0
+        self._write(instant(estimate, body, root_frame=self._root(), person=person, markers=seen, turn=turn))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
