@@ -70,7 +70,7 @@ def film(place: Path, shape: tuple[int, ...], *, rate_hz: float) -> Film:
     """
     codec = codec_for_browsers()
     if codec is not None:
-        return _ForBrowsers(place, shape, Fraction(rate_hz).limit_denominator(100_000), codec)
+        return _ForBrowsers(place, shape, max(Fraction(rate_hz).limit_denominator(1001), Fraction(1, 1000)), codec)
     made = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"mp4v"), rate_hz, shape[1::-1])
     if not made.isOpened():
         raise VoodooError(f"{place.name}: expected a file that can be written as MPEG-4, found that OpenCV cannot")

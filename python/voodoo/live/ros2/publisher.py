@@ -27,8 +27,8 @@ class Ros2Output(Output):
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
     Markers are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or searched for are
-    not listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched for again, and one
-    on FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
+    not listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched for again; one on
+    FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
 
     Args:
         root_frame: returns the frame of the poses, once a frame has arrived.
