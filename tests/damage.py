@@ -120,8 +120,8 @@ def several(entries: list[Entry]) -> list[Entry]:
     return DAMAGES["repeated"][0](entries, 10)
 
 
-def set_back(entries: list[Entry], seconds: float, at: int = 45) -> list[Entry]:
-    """The clock is set back before a depth image: what comes from then on has earlier stamps, transforms as well."""
+def set_back(entries: list[Entry], seconds: float, at: int = 45, *, recorder: bool = False) -> list[Entry]:
+    """The clock is set back before a depth image: what comes then has earlier stamps, and times if it is the recorder's."""
 
     def moved(entry: Entry) -> Entry:
         message = ROS2.deserialize_cdr(entry[3], entry[1])
@@ -132,7 +132,11 @@ def set_back(entries: list[Entry], seconds: float, at: int = 45) -> list[Entry]:
         return changed(entry, header=_earlier(message.header, seconds))
 
     row = depth_rows(entries)[at]
-    return [*entries[:row], *map(moved, entries[row:])]
+    earlier = round(seconds * 1e9) if recorder else 0
+    return [
+        *entries[:row],
+        *((topic, kind, time - earlier, raw) for topic, kind, time, raw in map(moved, entries[row:])),
+    ]
 
 
 def _earlier(header: object, seconds: float) -> object:

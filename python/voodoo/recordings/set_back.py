@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 BACK_S = 1.0
 """A stamp that is less before the last one is out of order."""
+
+
+def falls(times: Iterable[tuple[int, int]]) -> bool:
+    """Whether, of (connection, time of recording [ns]) as they were written, the times of one connection fall by over BACK_S."""
+    last: dict[int, int] = {}
+    return any(time < last.get(one, time) - BACK_S * 1e9 or last.update({one: time}) for one, time in times)
 
 
 @dataclass
