@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -44,6 +45,7 @@ from voodoo.cli.options import (
 from voodoo.cli.paths import check_paths
 from voodoo.cli.signals import INTERRUPTED, deferred
 from voodoo.errors import NoPoseError
+from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
     from voodoo.export.spool import Spool
@@ -170,7 +172,7 @@ def track_command(
     from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
     from voodoo.pipeline.people import track_people
     from voodoo.pipeline.run import track
-    from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
+    from voodoo.pipeline.start import AUTO, beginning_of, start_tracker, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
@@ -287,7 +289,11 @@ def track_command(
         told = height or getattr(beginning, "height_m", None)
         if told is None and beginning is None and source.start is not None:
             told = source.start.get("height_m")
-        for doubt in closing_doubts(spool.states, stature=size, told=told) if spool.found and not several else ():
+        # Frames before a given start are meant to be without a pose.
+        begun = (
+            spool.states if beginning is None or beginning is AUTO else spool.states - Counter({SEARCHING: len(source)})
+        )
+        for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, spool, left_out)
 
@@ -299,6 +305,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         NoPoseError: nobody was found.
     """
     from voodoo.recordings.depth_range import depth_range
+    from voodoo.recordings.first_images import first_images
 
     if left_out is not None:
         for reason, count in left_out.counts.items():
@@ -310,5 +317,8 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
+        for image in first_images(source)[0]:
+            if image.doubt:
+                print_message(f"{source.name}: {image.doubt}")
     if not spool.found:
         raise NoPoseError(f"{source.name}: nobody was found in {spool.frames} frames")

@@ -14,6 +14,8 @@ from voodoo.recordings.recording import Recording, RecordingInfo
 
 _FRAMES = 10
 """Frames in which the first images are looked for."""
+_LEAST_DEG, _MOST_DEG = 30.0, 150.0
+"""Fields of view that depth cameras have."""
 FIXED_FRAMES = ("odom", "map", "world")
 """Root frames that stay where they are while a robot drives."""
 
@@ -37,6 +39,15 @@ class FirstImage:
     bits: str
     meters_per_unit: float | None
     field_of_view: tuple[float, float]
+
+    @property
+    def doubt(self) -> str:
+        """What is unlikely about it; "" if nothing."""
+        across, down = self.field_of_view
+        if self.meters_per_unit is None or _LEAST_DEG < across < _MOST_DEG:
+            return ""
+        words = f"{self.sensor} sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
+        return f"{words}: are its focal lengths right?"
 
     def __str__(self) -> str:
         """One line."""
