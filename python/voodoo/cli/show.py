@@ -44,12 +44,8 @@ def info_command(
         with left_out.aside():
             depth = depth_range(source)
         images, damage = first_images(source)
-        notes = [
-            *doubts(about, left_out),
-            damage,
-            *(image.doubt for image in images),
-            "" if depth is None else depth.warning,
-        ]
+        notes = [*doubts(about, left_out), damage, "" if depth is None else depth.warning]
+        notes += [image.doubt for image in images]
         if as_json:
             print_json(
                 {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}

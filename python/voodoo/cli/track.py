@@ -290,9 +290,7 @@ def track_command(
         if told is None and beginning is None and source.start is not None:
             told = source.start.get("height_m")
         # Frames before a given start are meant to be without a pose.
-        begun = (
-            spool.states if beginning is None or beginning is AUTO else spool.states - Counter({SEARCHING: len(source)})
-        )
+        begun = spool.states - Counter({SEARCHING: 0 if beginning in (None, AUTO) else len(source)})
         for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, spool, left_out)
@@ -317,8 +315,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
-        for image in first_images(source)[0]:
-            if image.doubt:
-                print_message(f"{source.name}: {image.doubt}")
+        for doubt in filter(None, (image.doubt for image in first_images(source)[0])):
+            print_message(f"{source.name}: {doubt}")
     if not spool.found:
         raise NoPoseError(f"{source.name}: nobody was found in {spool.frames} frames")

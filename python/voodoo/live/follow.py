@@ -126,7 +126,7 @@ class Follower:
         Of several persons it is one of those who are tracked; a single person is searched for in the depth images of `frame`.
 
         Raises:
-            VoodooError: nobody is within NEAR_M of the place; the state is unchanged.
+            VoodooError: nobody is within NEAR_M of the place, or the body is no person's; the state is unchanged.
         """
         if self._all is not None:
             tracked = [person for person in self._all.people.estimate if person.estimate.joints]
@@ -141,12 +141,10 @@ class Follower:
             self._all.people.only(tracked[chosen].id)
             return f"person {self._numbers + tracked[chosen].id} only"
         assert self._one is not None
-        joints = {name: (float(x), float(y), float(z)) for name, (x, y, z) in bodies[chosen].items()}
-        self._one.tracker.search()
-        self._one.tracker.reset(joints=joints)
+        self._one.tracker.reset(joints={name: tuple(at) for name, at in bodies[chosen].items()})
         self._one = FrontEnd(self._one.tracker, settings=self._settings)
         # Found, not given: one who leaves is searched for.
-        self._one.search.found = FoundStart({name: np.array(at) for name, at in joints.items()}, {}, "follow")
+        self._one.search.found = FoundStart(bodies[chosen], {}, "follow")
         return f"the person {away[chosen]:.2f} m from there"
 
     def restart(self, *, back: bool, gone: bool) -> None:

@@ -15,6 +15,7 @@ from voodoo.live.stream import Live
 from voodoo.measurements import ColorImage, DepthImage
 from voodoo.model.standing import is_optical
 from voodoo.pipeline.floor import EVERY, FloorSight
+from voodoo.sensors.settings import LEVEL_FRAMES
 
 _SIGHTS, _LOOKS = 5, 50
 """After seeing the floor so often, or searching so many frames for it, the search ends."""
@@ -40,20 +41,21 @@ class Upright:
         root = self._live.root_frame
         if self._turn is None:
             cameras = [item for item in step.frame.measurements if isinstance(item, DepthImage | ColorImage)]
-            optical = is_optical(root) or any(np.array_equal(item.root_from_sensor, np.eye(4)) for item in cameras)
+            own = any(np.array_equal(item.root_from_sensor, np.eye(4)) for item in cameras)
+            optical = is_optical(root) or (own and root not in LEVEL_FRAMES)
             self._turn = by_axes(root, optical=optical)
             self._sight = FloorSight() if optical else None
         there = [one for one in step.estimates.values() if one.joints]
         self._steps += bool(there)
         if not there or self._steps % EVERY or self._steps > _LOOKS * EVERY:
             return self._turn
+        self._seen.append(there[0])
         if self._sight is not None:
             with suppress(VoodooError):  # tracking reports damage
                 self._sight.look(step.frame)
             if len(self._sight) >= _SIGHTS and (floor := self._sight.floor) is not None:
                 self._turn, self._sight = by_floor(floor, optical=True), None
                 self._live.faults.log(f"outputs are turned upright {self._turn.words}")
-        self._seen.append(there[0])
         if len(self._seen) == 2 * _SIGHTS and (words := lying_words(Track.of(self._seen), root, self._turn)):
             self._live.faults.log(words)
         return self._turn

@@ -39,7 +39,7 @@ class BagFile(Protocol):
         """Times and number of messages."""
 
     def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:
-        """Messages in the order of their time."""
+        """Messages in the order of their time, or as they were written if the clock was set back."""
 
 
 def bag_file(path: Path, unpacking: Unpacking) -> Any:  # noqa: ANN401 - rosbags declares other messages
@@ -93,7 +93,7 @@ class Ros1File(Reader):
     def messages(  # type: ignore[override]
         self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """Messages in the order of their time, or as they were written if the clock was set back."""
+        """See BagFile.messages."""
         first = -1 if start is None else start
         entries = [(entry, one) for one in connections for entry in self.indexes[one.id] if first <= entry.time]
         entries.sort(key=lambda item: (item[0].chunk_pos, item[0].offset))

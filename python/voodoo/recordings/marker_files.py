@@ -152,11 +152,8 @@ class MarkerRecording(Recording):
                 return ()
             words = f"{self._up} of the file is taken for up, and no marker is lower than {heights.min():.1f} m"
             return (f"{self.path.name}: {words}; are axes and unit right?",)
-        remedies = {
-            "+Y": "y_up = true in a --marker-map takes it",
-            "+Z": "y_up = false in a --marker-map keeps the axes",
-        }
-        remedy = remedies.get(likely, "exchange the axes of the file")
+        y_up = {"+Y": "true", "+Z": "false"}.get(likely)
+        remedy = f"y_up = {y_up} in a --marker-map says so" if y_up else "exchange the axes of the file"
         words = f"{self._up} of the file is taken for up, but the body stands along its {likely}"
         return (f"{self.path.name}: {words}; if that is up, {remedy}",)
 

@@ -192,21 +192,17 @@ class SqliteFile:
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """Messages in the order of their time, or as they were written if the clock was set back.
-
-        Those in a damaged part of the file are errors.
-        """
+        """See BagFile.messages; those in a damaged part of the file are errors."""
         wanted = {item.id: item for item in connections}
         places = ",".join("?" * len(wanted))
-        order = list(
-            self._rows(
-                "SELECT rowid, topic_id, timestamp FROM messages "
-                f"WHERE topic_id IN ({places}) AND timestamp >= ? ORDER BY timestamp, rowid",
-                (*wanted, -(2**63) if start is None else start),
-            )
+        rows = self._rows(
+            f"SELECT rowid, topic_id, timestamp FROM messages WHERE topic_id IN ({places}) AND timestamp >= ?",
+            (*wanted, -(2**63) if start is None else start),
         )
-        written = sorted(order)
-        for row, topic, time in written if falls((topic, time) for _, topic, time in written) else order:
+        order = sorted(rows)
+        if not falls((topic, time) for _, topic, time in order):
+            order.sort(key=lambda row: row[2])
+        for row, topic, time in order:
             yield wanted[topic], time, self._data(row)
 
     def _data(self, row: int) -> bytes | RecordingError:
