@@ -57,11 +57,8 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
     text = []
     deviations = deviations_of(scores, tables)
     for summary in summarize(scores):
-        text += [
-            f"## Against {summary.kind}: {summary.sequences} sequence{'s' * (summary.sequences > 1)}\n"
-            if summary.sequences
-            else "## Not tracked\n"
-        ]
+        count = f"{summary.sequences} sequence{'s' * (summary.sequences > 1)}"
+        text += [f"## Against {summary.kind}: {count}\n" if summary.sequences else "## Not tracked\n"]
         if summary.sequences:
             zero, one, two = summary.classes
             text += ["| | |", "|---|---|", f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |"]
