@@ -15,6 +15,7 @@ from voodoo.export.track import Track
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.bag_files import BagFolder
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.set_back import SetBack
 
 SETTLED_S = 0.2
 WITHIN_M = 0.005
@@ -189,3 +190,29 @@ def test_images_that_were_left_out_keep_the_numbers_of_the_others(entries, start
     )
     numbers = [frame.measurements[0].people[0][0, 0] - 1.0 for frame in source]
     assert numbers == [number for number in range(len(rows)) if number != 2]
+
+
+@pytest.mark.parametrize(
+    ("stamps", "moved"),
+    [
+        ([1.0, 1.1, 1.2], [1.0, 1.1, 1.2]),
+        ([9.0, 9.1, 5.0, 5.1, 5.2], [9.0, 9.1, None, 9.3, 9.4]),
+        ([9.0, 9.1, 5.0, 9.2, 9.3], [9.0, 9.1, None, 9.2, 9.3]),  # one is out of order
+        ([9.0, 9.1, 8.5, 8.6], [9.0, 9.1, 8.5, 8.6]),  # by less, which its reader sees
+        ([9.0, 9.1, 99.0, 9.2, 9.3, 9.4], [9.0, 9.1, 99.0, None, 9.3, 9.4]),  # one is wild
+        ([9.0, 9.1, 5.0, 5.1, 2.0, 2.1], [9.0, 9.1, None, 9.3, None, 9.5]),  # twice
+    ],
+)
+def test_stamps_go_on_after_a_clock_was_set_back(stamps, moved):
+    clock = SetBack()
+    assert [clock.of("a", stamp) for stamp in stamps] == [None if one is None else pytest.approx(one) for one in moved]
+
+
+def test_sensors_of_one_clock_are_moved_together_and_of_another_by_themselves():
+    clock = SetBack()
+    rows = {"a": [9.0, 9.1, 5.0, 5.1], "slow": [8.9, 9.2, 5.1, 5.5], "other": [70.0, 70.1, 30.0, 30.1]}
+    found = {name: [clock.of(name, stamp) for stamp in stamps] for name, stamps in rows.items()}
+    assert found["a"][3] == pytest.approx(9.3) and found["slow"][3] == pytest.approx(9.7)
+    assert found["other"][3] == pytest.approx(70.3) and len(clock.steps) == len(clock.words) == 2
+    again = SetBack(clock)
+    assert [again.of("slow", stamp) for stamp in rows["slow"]] == found["slow"] and len(clock.words) == 2

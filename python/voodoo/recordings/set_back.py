@@ -18,18 +18,20 @@ def falls(times: Iterable[tuple[int, int]]) -> bool:
 @dataclass
 class _Sensor:
     last: float
-    steps: int = 0
+    before: float | None = None
     apart: float | None = None
+    steps: int = 0
+    moved: float = 0.0
 
 
 class SetBack:
-    """Stamps of several sensors by one clock.
+    """Stamps of several sensors, whose clocks may be set back.
 
     A single stamp that is before the last one of its sensor is out of order. If the next one goes on from it, the clock was set
     back; then this and all later stamps are moved on to where they were expected, by the same amount for all sensors.
 
     Attributes:
-        steps: by how much stamps are moved on after each time the clock was set back, in all [s].
+        steps: by how much stamps were moved on each time a clock was set back [s].
         words: the same in words, for whoever reads the stamps.
     """
 
@@ -46,14 +48,21 @@ class SetBack:
             if state.apart is None or not 0.0 < stamp - state.apart < BACK_S:
                 state.apart = stamp
                 return None
-            if state.steps == len(self.steps):
-                # The stamp that was put aside had followed the last one as this one follows it.
-                step = state.last - state.apart + (stamp - state.apart)
-                self.steps.append(step + (self.steps[-1] if self.steps else 0.0))
-                self.words.append(
-                    f"the clock of {sensor} was set back from {state.last:.6f} to {state.apart:.6f} s; "
-                    f"stamps after that are moved on by {self.steps[-1]:.6f} s"
-                )
-            state.steps += 1
-        state.last, state.apart = stamp, None
-        return stamp + (self.steps[state.steps - 1] if state.steps else 0.0)
+            if state.before is None or not 0.0 < state.apart - state.before < BACK_S:  # else the last one was wild
+                self._step(sensor, state, stamp)
+        state.before, state.last, state.apart = state.last, stamp, None
+        return stamp + state.moved
+
+    def _step(self, sensor: str, state: _Sensor, stamp: float) -> None:
+        assert state.apart is not None
+        # The stamp that was put aside had followed the last one as this one follows it.
+        own = state.last - state.apart + (stamp - state.apart)
+        near = (at for at, one in enumerate(self.steps) if at >= state.steps and abs(one - own) < BACK_S)
+        at = next(near, len(self.steps))
+        if at == len(self.steps):
+            self.steps.append(own)
+            self.words.append(
+                f"the clock of {sensor} was set back from {state.last:.6f} to {state.apart:.6f} s; "
+                f"stamps after that are moved on by {state.moved + own:.6f} s"
+            )
+        state.steps, state.moved = at + 1, state.moved + self.steps[at]
