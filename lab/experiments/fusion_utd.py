@@ -67,7 +67,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
                 )
                 for site, direction in zip(SITES, directions, strict=True)
                 if np.isfinite(direction).all()
-                and gate.accepts(site, ray_distance(origin, direction, predicted[site]), recorded.stamp, "rays")
+                and gate.accepts(site, float(ray_distance(origin, direction, predicted[site])), recorded.stamp, "rays")
             ]
             add_rays(frame, observed, model=model)
         estimate = tracker.step(frame)

@@ -303,7 +303,6 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         NoPoseError: nobody was found.
     """
     from voodoo.recordings.depth_range import depth_range
-    from voodoo.recordings.first_images import first_images
 
     if left_out is not None:
         for reason, count in left_out.counts.items():
@@ -315,7 +314,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
-        for doubt in filter(None, (image.doubt for image in first_images(source)[0])):
-            print_message(f"{source.name}: {doubt}")
     if not spool.found:
-        raise NoPoseError(f"{source.name}: nobody was found in {spool.frames} frames")
+        raise NoPoseError(
+            f"{source.name}: nobody was found in {spool.frames} frames; voodoo info doubts what is unlikely"
+        )

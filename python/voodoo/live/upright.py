@@ -53,7 +53,7 @@ class Upright:
         if self._sight is not None:
             with suppress(VoodooError):  # tracking reports damage
                 self._sight.look(step.frame)
-            if len(self._sight) >= _SIGHTS and (floor := self._sight.floor) is not None:
+            if len(self._sight.planes) >= _SIGHTS and (floor := self._sight.floor) is not None:
                 self._turn, self._sight = by_floor(floor, optical=True), None
                 self._live.faults.log(f"outputs are turned upright {self._turn.words}")
         if len(self._seen) == 2 * _SIGHTS and (words := lying_words(Track.of(self._seen), root, self._turn)):

@@ -41,16 +41,15 @@ class FloorSight:
 
     Args:
         up: direction upwards in the root frame; None: unknown.
+
+    Attributes:
+        planes: the floors that were seen.
     """
 
     def __init__(self, *, up: tuple[float, float, float] | None = None) -> None:
         """Nothing is seen yet."""
         self._detector, self._up = Detector(), up
-        self._planes: list[tuple[float, ...]] = []
-
-    def __len__(self) -> int:
-        """How often a floor was seen."""
-        return len(self._planes)
+        self.planes: list[tuple[float, ...]] = []
 
     def look(self, recorded: RecordedFrame) -> None:
         """Search a frame.
@@ -63,16 +62,16 @@ class FloorSight:
             if found.floor is not None and low:
                 normal, height = np.asarray(found.floor[0]), found.floor[1]
                 if abs(min(float(normal @ ankle) for ankle in low) - height) < _ON_FLOOR_M:
-                    self._planes.append((*normal, height))
+                    self.planes.append((*normal, height))
 
     @property
     def floor(self) -> tuple[FloatArray, float] | None:
         """Unit normal upwards (3,) and height along it [m]; None if no floor was seen, or not always the same."""
-        if not self._planes:
+        if not self.planes:
             return None
-        middle = np.median(self._planes, axis=0)
+        middle = np.median(self.planes, axis=0)
         normal, height = middle[:3] / np.linalg.norm(middle[:3]), float(middle[3])
-        alike = np.asarray(self._planes)[:, :3] @ normal >= _ALIKE
+        alike = np.asarray(self.planes)[:, :3] @ normal >= _ALIKE
         return (normal, height) if alike.mean() > 0.5 else None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -39,15 +40,6 @@ class FirstImage:
     bits: str
     meters_per_unit: float | None
     field_of_view: tuple[float, float]
-
-    @property
-    def doubt(self) -> str:
-        """What is unlikely about it; "" if nothing."""
-        across, down = self.field_of_view
-        if self.meters_per_unit is None or _LEAST_DEG < across < _MOST_DEG:
-            return ""
-        words = f"{self.sensor} sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
-        return f"{words}: are its focal lengths right?"
 
     def __str__(self) -> str:
         """One line."""
@@ -88,10 +80,15 @@ def _of(item: DepthImage | ColorImage) -> FirstImage:
     )
 
 
-def doubts(about: RecordingInfo, left_out: LeftOut) -> list[str]:
+def doubts(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage] = ()) -> list[str]:
     """What is not right with a recording, after its first images were read."""
     found = [f"left out {count} {reason}: {left_out.first[reason]}" for reason, count in left_out.counts.items()]
     found += left_out.notes
+    for image in images:
+        across, down = image.field_of_view
+        if image.meters_per_unit is not None and not _LEAST_DEG < across < _MOST_DEG:
+            words = f"{image.sensor} sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
+            found.append(f"{words}: are its focal lengths right?")
     if about.duration < 0.0:
         found.append(
             f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first; voodoo track "

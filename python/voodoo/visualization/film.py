@@ -65,8 +65,7 @@ def film(place: Path, shape: tuple[int, ...], *, rate_hz: float) -> Film:
     """Begin a video in .mp4 of pictures of a shape (height, width, 3); `write` adds one, and `release` completes the file.
 
     Raises:
-        VoodooError: it cannot be written.
-        OSError: PyAV cannot write it.
+        VoodooError, OSError: it cannot be written.
     """
     codec = codec_for_browsers()
     if codec is not None:
