@@ -105,8 +105,7 @@ def test_strictly_the_first_damage_ends_without_a_result(entries, start):
     assert done.exit_code == 1 and done.stderr.count("voodoo: ") == 1 and not (start / "no.npz").exists()
 
 
-@pytest.mark.parametrize("recorder", [False, True])
-@pytest.mark.parametrize("seconds", [1.5, 3600.0])
+@pytest.mark.parametrize(("seconds", "recorder"), [(1.5, False), (3600.0, True)])
 def test_after_a_clock_was_set_back_it_is_tracked_on(entries, start, undamaged, seconds, recorder):
     bag = damage.write(start / f"back-{seconds}-{recorder}", damage.set_back(entries, seconds, recorder=recorder))
     result, reported = tracked(bag)

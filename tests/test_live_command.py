@@ -261,7 +261,7 @@ def test_a_frame_that_the_tracker_refuses_is_the_only_loss():
                 raise VoodooError("not this one")
             return super().step(frame)
 
-    with played(3.0) as source:
+    with played(6.0) as source:
         session = Session(source, lambda _: Refuses(voodoo.Tracker(voodoo.Body.human())))
         while session.wait(0.05):
             pass
