@@ -345,21 +345,24 @@ def _point(position: FloatArray) -> Any:  # noqa: ANN401
     return _new("geometry_msgs/msg/Point", x=x, y=y, z=z)
 
 
-def instant(estimate: Estimate, body: Body, *, root_frame: str, person: str, markers: bool = True) -> dict[str, Any]:
+def instant(
+    estimate: Estimate, body: Body, *, root_frame: str, person: str, markers: bool = True, turn: Turn | None = None
+) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
 
     Args:
         estimate: of the frame; without a pose (status "searching") there are no transforms and no joint states.
         body: in its current sizes.
-        root_frame: frame of the estimate; if it is an optical frame by its name, see `write_bag`.
+        root_frame: frame of the estimate; if it is turned, see `write_bag`.
         person: REP-155 id.
         markers: also make the markers.
+        turn: see `write_bag`.
 
     Raises:
         VoodooError: a stamp before zero.
     """
     # Angles are not needed; if nobody was found, the names come from the body.
-    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, root_frame)
+    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, root_frame, turn)
     return human.messages(0, markers=markers)
 
 

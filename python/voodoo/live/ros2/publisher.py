@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from voodoo._core import Estimate
 from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
+from voodoo.export.upright import Turn
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
 from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
-RESET = "/voodoo/reset"
+RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
+_PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -22,8 +26,9 @@ class Ros2Output(Output):
     """`/tf`, `/humans/bodies/<id>/joint_states`, `.../pose`, `.../markers`, `/human_description_<id>` (URDF), and
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
-    Stamps are those of the data. Persons that are lost or searched for are not listed as tracked and have no transforms.
-    A message on RESET (std_msgs/Empty) lets everybody be searched for again.
+    Markers are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or searched for are
+    not listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched for again; one on
+    FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
 
     Args:
         root_frame: returns the frame of the poses, once a frame has arrived.
@@ -42,33 +47,41 @@ class Ros2Output(Output):
         self._bodies: dict[int, Body] = {}
         self._described: dict[int, float] = {}
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
+        self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
         self._publish_on(TRACKED, IDS, 1)
         # Subscribers can discover these topics before the first pose.
         self._publish_on(f"{BODIES}/{person_id(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
         self._publish_on(f"{BODIES}/{person_id(1)}/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10)
-        self._publish_on(f"{BODIES}/{person_id(1)}/markers", "visualization_msgs/msg/MarkerArray", 10)
+        self._publish_on(f"{BODIES}/{person_id(1)}/markers", _MARKERS, 10)
 
     def publish(self, step: Step) -> None:
         """See Output."""
         if self._resets.take() and self.on_reset is not None:
             self.on_reset()
+        for raw in self._follows.take():
+            chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
+            if self.on_choice is not None:
+                self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
         observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
         for number in sorted(observed):
-            self._write_person(number, step.estimates[number], step.bodies[number])
+            self._write_person(number, step.estimates[number], step.bodies[number], step.turn)
         for number in sorted(self._displayed - observed):
             # Markers of persons who left are deleted once.
-            self._write_person(number, nobody(step.stamp), step.bodies.get(number, self._bodies[number]))
+            body = step.bodies.get(number, self._bodies[number])
+            self._write_person(number, nobody(step.stamp), body, step.turn)
         self._displayed = observed
         self._bodies = {number: step.bodies[number] for number in observed}
         self._write(tracked(step.stamp, [person_id(number) for number in sorted(observed)], root_frame=self._root()))
 
-    def _write_person(self, number: int, estimate: Estimate, body: Body) -> None:
+    def _write_person(self, number: int, estimate: Estimate, body: Body, turn: Turn | None) -> None:
         person, size = person_id(number), sum(limb.shape.length for limb in body.limbs)
         if estimate.joints and abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
             self._write(description(body, person))
             self._described[number] = size
-        self._write(instant(estimate, body, root_frame=self._root(), person=person))
+        # Markers take as long as all other messages together.
+        seen = self._publish_on(f"{BODIES}/{person}/markers", _MARKERS, 10).subscribers > 0
+        self._write(instant(estimate, body, root_frame=self._root(), person=person, markers=seen, turn=turn))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
