@@ -48,6 +48,16 @@ impl Motion {
         self.interval = None;
     }
 
+    /// Forgets the motion of these limbs, parents first, relative to their parents.
+    pub(crate) fn forget_joints(&mut self, body: &Body, limbs: impl Iterator<Item = usize>) {
+        for limb in limbs {
+            if let Some((parent, joint)) = &body.limbs()[limb].parent {
+                let now = joint_turn(joint, &self.poses[*parent], &self.poses[limb]);
+                self.previous[limb] = place(joint, &self.previous[*parent], now);
+            }
+        }
+    }
+
     /// Moves the working frame to the body, so that single precision is enough for points.
     fn follow(&mut self) {
         let shift = self.poses[0].translation;

@@ -26,7 +26,7 @@ use branch::Branch;
 use history::History;
 use leg_swap::LegSwap;
 use proposals::{ColorDirections, DetectedBody, DetectedEnd, LastGoodEnd, Pool, Propose, UnexplainedCluster};
-use refined::Refined;
+use refined::{Refined, is_apart, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
 
@@ -42,6 +42,8 @@ pub(crate) struct Hypotheses {
     pool: Pool,
     refined: Refined,
     branch: Branch,
+    /// The poses before this frame's hypotheses.
+    before: Vec<Pose>,
     /// Stamp of the last frame, seconds; `None` after a restart.
     stamp: Option<f64>,
 }
@@ -59,6 +61,8 @@ impl Hypotheses {
         self.leg_swap.prepare(limbs);
         self.branch.prepare(limbs);
         self.refined.prepare(limbs);
+        self.before.clear();
+        self.before.reserve(limbs);
     }
 
     /// Fits the second branch to a frame of few color images, before the body itself is fitted. Returns the number of ICP steps.
@@ -84,6 +88,7 @@ impl Hypotheses {
         detection: Option<Detected>,
         detected: &[Pose],
     ) -> usize {
+        self.before.clone_from(poses);
         self.make_room(context, fit);
         let now = context.observation.frame().stamp;
         let elapsed = now - self.stamp.replace(now).unwrap_or(now);
@@ -124,6 +129,23 @@ impl Hypotheses {
             fit.match_last(context, poses);
         }
         steps
+    }
+
+    /// Forgets the motion of what a hypothesis has moved in this frame, the body or an arm or leg: it did not move there since the
+    /// last frame.
+    pub(crate) fn forget_motion(&self, model: &Model, motion: &mut Motion) {
+        let Self { before, .. } = self;
+        if before.len() != motion.poses.len() {
+            return;
+        }
+        if is_apart(before[0].translation, motion.poses[0].translation) {
+            motion.previous.clone_from(&motion.poses);
+        }
+        for chain in &model.extremities {
+            if is_elsewhere(chain, before, &motion.poses) {
+                motion.forget_joints(&model.body, chain.limbs());
+            }
+        }
     }
 
     /// Stores the end position of every arm and leg that this frame does not contradict and whose limbs are all `measured`. If

@@ -2,6 +2,7 @@
 
 use super::score::{Cost, SURE_GAIN, overall_cost};
 use crate::association::correspondence::Correspondences;
+use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3};
 use crate::regions::{self, Backdrop, Posed};
@@ -166,8 +167,16 @@ impl Refined {
 
 /// Whether an arm or leg is at another place in one pose than in the other.
 fn is_another(context: Context, one: &[Pose], other: &[Pose]) -> bool {
-    let apart = |one: Vec3, other: Vec3| one.distance(other) > SAME_POSE;
-    context.model.extremities.iter().any(|chain| {
-        apart(one[chain.lower].translation, other[chain.lower].translation) || apart(chain.end(one), chain.end(other))
-    })
+    context.model.extremities.iter().any(|chain| is_elsewhere(chain, one, other))
 }
+
+/// Whether this arm or leg is at another place in one pose than in the other.
+pub(super) fn is_elsewhere(chain: &TwoBone, one: &[Pose], other: &[Pose]) -> bool {
+    is_apart(one[chain.lower].translation, other[chain.lower].translation) || is_apart(chain.end(one), chain.end(other))
+}
+
+/// Whether two positions are of different poses.
+pub(super) fn is_apart(one: Vec3, other: Vec3) -> bool {
+    one.distance(other) > SAME_POSE
+}
+

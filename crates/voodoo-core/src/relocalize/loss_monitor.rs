@@ -40,6 +40,11 @@ impl LossMonitor {
         self.lost.checked_sub(PATIENCE)
     }
 
+    /// Monitors the body as if it had just recovered, after a time without frames.
+    pub(super) fn interrupt(&mut self, stamp: f64) {
+        self.until = Some(stamp + NEW_TRACK_AGE);
+    }
+
     /// Whether the body recovered recently and is still monitored.
     pub(super) fn recently_recovered(&self) -> bool {
         self.until.is_some()

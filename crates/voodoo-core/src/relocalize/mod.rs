@@ -141,6 +141,11 @@ impl Relocalizer {
         fit_pose(body, self.people.detection()?)
     }
 
+    /// Notes that no frame has come for long before the one of `stamp`: the body may be anywhere, in any pose.
+    pub(crate) fn interrupt(&mut self, stamp: f64) {
+        self.loss.interrupt(stamp);
+    }
+
     /// Runs the detector on a frame where that is due. `root` is the expected position of the body, world frame. `limb_suspect`:
     /// in the frame before, a limb was not supported in its pose; `pose_uncertain`: it was uncertain whether one was; `lost`: the
     /// body was lost.
@@ -225,7 +230,10 @@ impl Relocalizer {
         Some(match lost {
             true if self.tentative.observe(self.people.place()) => DetectionVerdict::Elsewhere,
             true => DetectionVerdict::Inconsistent,
-            false => self.check.compare(detected, body, world_from_limb, new_track, among),
+            false => {
+                let new_track = new_track || self.loss.recently_recovered();
+                self.check.compare(detected, body, world_from_limb, new_track, among)
+            }
         })
     }
 

@@ -25,6 +25,9 @@ use assess::Assessor;
 use estimate::{Estimate, Status};
 use expected::Before;
 
+/// After this time without a frame the body may be anywhere, in any pose, seconds.
+const INTERRUPTION: f64 = 0.5;
+
 /// Tracks one body through a sequence of frames.
 ///
 /// ```
@@ -246,6 +249,11 @@ impl Tracker {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
+        let interrupted = motion.stamp.is_some_and(|last| frame.stamp - last > INTERRUPTION);
+        if interrupted {
+            assessor.moved();
+            relocalizer.interrupt(frame.stamp);
+        }
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
         let searched = relocalizer.frames_searched().filter(|_| config.relocalization);
@@ -270,7 +278,7 @@ impl Tracker {
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
         if schedule.whole_body && known {
-            let lost = assessor.status() == Status::Lost;
+            let lost = interrupted || assessor.status() == Status::Lost;
             let (root, limb_suspect) =
                 (poses[0].translation + *origin, assessor.has_suspect_limb() || sizes.is_uncertain());
             match ownership {
@@ -290,6 +298,7 @@ impl Tracker {
         // Assessment: status of the body and its limbs.
         assessor.assess(setting.with_model(model), fit.matched(poses), relocalizer.detected());
         fit.learn_regions(setting.with_model(model));
+        hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
         if relocalizes && self.relocalize(frame, known, ownership.is_some()) {
