@@ -38,6 +38,7 @@ from voodoo.people import People
 from voodoo.pipeline.people import check_inputs
 from voodoo.pipeline.start import Beginning, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.sensors.settings import Box, FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
@@ -101,6 +102,7 @@ def entered(
     root_frame: str | None,
     options: Mapping[str, Any],
     several: bool = False,
+    network: KeypointNetwork | None = None,
 ) -> Live:
     """The sources of the command line.
 
@@ -118,7 +120,7 @@ def entered(
         )
         for word, place in zip(words, places, strict=True)
     ]
-    return Live(sources, on_message=print_message, eager=not several)
+    return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
 def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | None) -> Done:

@@ -122,6 +122,15 @@ LayoutOption = Annotated[
         help=f"Layout of all keypoints: {', '.join(LAYOUTS)}; by default told by their number and the shape of the persons.",
     ),
 ]
+KeypointsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--keypoints",
+        metavar="NETWORK|SENSOR=DIR",
+        help="A network to run on color images: mediapipe[:FILE.task], rtmpose[:MODE or :DETECTOR.onnx,POSE.onnx], or "
+        "MODULE:FUNCTION of yours; or OpenPose JSON files, one for each image of SENSOR; repeatable.",
+    ),
+]
 UseOption = Annotated[
     str | None,
     typer.Option(
