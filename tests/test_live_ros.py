@@ -16,9 +16,9 @@ from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_in
 from voodoo.live.ros2.dds import Offer
 from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
 from voodoo.live.ros2.listing import listing
-from voodoo.live.ros2.publisher import RESET, Ros2Output
 from voodoo.live.ros2.types import dds_name, ros_name
 from voodoo.live.session import Output, Session
+from voodoo.live.sinks.ros2 import RESET, Ros2Sink
 from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source
@@ -205,6 +205,8 @@ class FakeNode:
         node = self
 
         class Publication:
+            subscribers = 1
+
             def write(self, message):
                 node.sent.append((topic, STORE.deserialize_cdr(message, kind)))
 
@@ -234,7 +236,7 @@ class FakeNode:
 
 def test_what_is_published_has_the_stamps_of_the_data():
     node = FakeNode()
-    output = Ros2Output(lambda: "base_link", node=node)
+    output = Ros2Sink(root_frame=lambda: "base_link", node=node)
     recording = open_recording(sample_path(), use=("depth",))
     tracker = start_tracker(recording)
     step = next(track(recording, tracker))
@@ -322,7 +324,7 @@ def test_a_wrong_topic_says_which_there_are(monkeypatch):
 
 def test_a_message_lets_everybody_be_searched_for_again():
     node, asked = FakeNode(), []
-    output = Ros2Output(lambda: "base_link", node=node)
+    output = Ros2Sink(root_frame=lambda: "base_link", node=node)
     output.on_reset = lambda: asked.append(True)
     step = Step(LiveFrame(2.0, (), 1, 0.0, 0.0, False), {1: nobody(2.0)}, {1: voodoo.Body.human()}, 0.0)
     output.publish(step)

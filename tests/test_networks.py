@@ -242,7 +242,7 @@ def test_mediapipe_by_the_network_it_ships_by_a_file_and_without_either(monkeypa
     image[:] = (10, 20, 30)
     (rows,) = network.detect(image)
     assert network.layout == "blazepose33" and rows.shape == (33, 3)
-    np.testing.assert_allclose(rows[0], [29.5, 9.5, 0.8])  # the center of the first pixel is (0, 0)
+    np.testing.assert_allclose(rows[0], [29.5, 9.5, 0.67 * 0.8])  # the center of the first pixel is (0, 0)
     assert tuple(seen[-1][0, 0]) == (30, 20, 10)  # RGB
     # As of the versions without `solutions`.
     vision = SimpleNamespace(

@@ -51,6 +51,8 @@ _STANDING = {
     "l_hip": (2.4, 0.09, 0.93),
     "r_hip": (2.4, -0.09, 0.93),
 }
+ROS2 = "ros2://"
+"""Address of `--publish`."""
 _TICK_S = 0.05
 _LINE_S = 1.0
 _TOGETHER = 30
@@ -196,12 +198,9 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
 
 def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | None]:
     # Addresses come first: one that is of no use leaves no file behind.
-    outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in wishes.to]
+    addresses = [*wishes.to, *([ROS2] if wishes.publish and ROS2 not in wishes.to else [])]
+    outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
-    if wishes.publish:
-        from voodoo.live.ros2.publisher import Ros2Output
-
-        outputs.append(Ros2Output(lambda: live.root_frame))
     if wishes.targets:
         files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
         outputs.append(files)

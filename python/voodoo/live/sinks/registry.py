@@ -21,7 +21,13 @@ def _websocket() -> Sink:
     return WebSocketSink
 
 
-_sinks: dict[str, Callable[[], Sink]] = {"vmc": _vmc, "ws": _websocket}
+def _ros2() -> Sink:
+    from voodoo.live.sinks.ros2 import Ros2Sink
+
+    return Ros2Sink
+
+
+_sinks: dict[str, Callable[[], Sink]] = {"ros2": _ros2, "vmc": _vmc, "ws": _websocket}
 
 
 def register(scheme: str, find: Callable[[], Sink]) -> None:

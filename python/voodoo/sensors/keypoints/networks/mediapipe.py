@@ -13,6 +13,9 @@ from voodoo.errors import ConfigError
 
 _MOST = 6
 """Persons that a pose landmarker may find in an image."""
+_CERTAIN = 0.67
+"""Greatest confidence: a visibility of 1 does not say how exact a landmark is. With 6 px instead of 4 px of noise rendered
+people are followed best."""
 
 
 class MediaPipe:
@@ -43,7 +46,8 @@ class MediaPipe:
         height, width = image.shape[:2]
         for marks in self._found(np.ascontiguousarray(image[:, :, ::-1])):
             # Shares of the image, from the outer edge of the first pixel.
-            yield np.array([(one.x * width - 0.5, one.y * height - 0.5, one.visibility or 0.0) for one in marks])
+            rows = [(one.x * width - 0.5, one.y * height - 0.5, _CERTAIN * (one.visibility or 0.0)) for one in marks]
+            yield np.array(rows)
 
 
 def _landmarker(mediapipe: Any, model: Path) -> Callable[[npt.NDArray[np.uint8]], Any]:  # noqa: ANN401

@@ -6,19 +6,25 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from voodoo._core import Estimate
+from voodoo.errors import VoodooError
 from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
+from voodoo.export.skeleton import Skeleton
+from voodoo.export.track import Track
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
+from voodoo.live.sinks.people import upright_person
 from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
+ADDRESS = "ros2://"
 RESET = "/voodoo/reset"
+MARKERS = "visualization_msgs/msg/MarkerArray"
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
 
-class Ros2Output(Output):
+class Ros2Sink(Output):
     """`/tf`, `/humans/bodies/<id>/joint_states`, `.../pose`, `.../markers`, `/human_description_<id>` (URDF), and
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
@@ -26,15 +32,31 @@ class Ros2Output(Output):
     A message on RESET (std_msgs/Empty) lets everybody be searched for again.
 
     Args:
-        root_frame: returns the frame of the poses, once a frame has arrived.
+        address: ros2://; the network is that of the environment.
+        root_frame: see `Sink`.
+        on_message: see `Sink`.
         node: None: one of its own.
+
+    Raises:
+        VoodooError: another address, no network, or cyclonedds is not installed.
     """
 
     name = "ros2"
-    prompt = True
+    prompt = receiver = True
 
-    def __init__(self, root_frame: Callable[[], str], *, node: Node | None = None) -> None:
+    def __init__(
+        self,
+        address: str = ADDRESS,
+        *,
+        root_frame: Callable[[], str],
+        on_message: Callable[[str], None] = print,
+        node: Node | None = None,
+    ) -> None:
         """Join the network."""
+        if address != ADDRESS:
+            raise VoodooError(
+                f"{address}: expected {ADDRESS} without a host, found one; ROS_DOMAIN_ID chooses the network"
+            )
         self._root = root_frame
         self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
@@ -47,7 +69,7 @@ class Ros2Output(Output):
         # Subscribers can discover these topics before the first pose.
         self._publish_on(f"{BODIES}/{person_id(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
         self._publish_on(f"{BODIES}/{person_id(1)}/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10)
-        self._publish_on(f"{BODIES}/{person_id(1)}/markers", "visualization_msgs/msg/MarkerArray", 10)
+        self._publish_on(f"{BODIES}/{person_id(1)}/markers", MARKERS, 10)
 
     def publish(self, step: Step) -> None:
         """See Output."""
@@ -55,7 +77,8 @@ class Ros2Output(Output):
             self.on_reset()
         observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
         for number in sorted(observed):
-            self._write_person(number, step.estimates[number], step.bodies[number])
+            posed = upright_person(step, number, self._root())
+            self._write_person(number, step.estimates[number], step.bodies[number], posed)
         for number in sorted(self._displayed - observed):
             # Markers of persons who left are deleted once.
             self._write_person(number, nobody(step.stamp), step.bodies.get(number, self._bodies[number]))
@@ -63,12 +86,17 @@ class Ros2Output(Output):
         self._bodies = {number: step.bodies[number] for number in observed}
         self._write(tracked(step.stamp, [person_id(number) for number in sorted(observed)], root_frame=self._root()))
 
-    def _write_person(self, number: int, estimate: Estimate, body: Body) -> None:
+    def _write_person(
+        self, number: int, estimate: Estimate, body: Body, posed: tuple[Track, Skeleton] | None = None
+    ) -> None:
         person, size = person_id(number), sum(limb.shape.length for limb in body.limbs)
         if estimate.joints and abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
             self._write(description(body, person))
             self._described[number] = size
-        self._write(instant(estimate, body, root_frame=self._root(), person=person))
+        # Markers take longest; without a subscriber they are not made.
+        drawn = self._publish_on(f"{BODIES}/{person}/markers", MARKERS, 10).subscribers > 0
+        how: dict[str, Any] = {"root_frame": self._root(), "person": person, "markers": drawn, "posed": posed}
+        self._write(instant(estimate, body, **how))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
