@@ -71,8 +71,8 @@ def live_command(
         list[str] | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Send poses to vmc://HOST[:PORT], or serve them at ws://[HOST][:PORT]; repeatable "
-            "(pip install 'voodoo-tracker[stream]').",
+            help="Send poses to vmc://HOST[:PORT] or ros2://, or serve them at ws://[HOST][:PORT] or "
+            "foxglove://[HOST][:PORT]; repeatable (pip install 'voodoo-tracker[stream,foxglove]').",
         ),
     ] = None,
     publish: Annotated[

@@ -159,8 +159,8 @@ UprightOption = Annotated[
     ),
 ]
 RESULTS = (
-    "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, a folder (ROS 2 bag), or - for CSV on stdout; "
-    "repeatable"
+    "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, .foxglove.mcap, a folder (ROS 2 bag), or - for CSV on "
+    "stdout; repeatable"
 )
 OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}.")]
 OutOrNameOption = Annotated[

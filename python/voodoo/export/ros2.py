@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.human_frames import frame_poses
+from voodoo.export.human_frames import frame_poses, on_parents
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
@@ -165,7 +165,10 @@ class _Human:
         messages: dict[str, Any] = {}
         if self._displayed[index]:
             frames = frame_poses(self.track, self._posed, index, self.person)
-            transforms = _transforms(frames, self.root, nanoseconds)
+            transforms = [
+                _transform(_header(nanoseconds, parent or self.root), name, turn, place)
+                for name, parent, place, turn in on_parents(frames)
+            ]
             if self.root != self._given_root:
                 above = _header(nanoseconds, self._given_root)
                 transforms.insert(0, _transform(above, self.root, *self._above))
@@ -216,18 +219,6 @@ def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None
             first = {}
             for name, message in messages.items():
                 writer.write(connect[name], round(stamp * 1e9), STORE.serialize_cdr(message, message.__msgtype__))
-
-
-def _transforms(frames: Mapping[str, tuple[str | None, FloatArray]], root_frame: str, nanoseconds: int) -> list[Any]:
-    poses = np.array([pose for _, pose in frames.values()])
-    above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
-    relative = np.linalg.inv(above) @ poses
-    turns = quaternions(relative[:, :3, :3]).tolist()
-    places = relative[:, :3, 3].tolist()
-    result = []
-    for (name, (parent, _)), place, turn in zip(frames.items(), places, turns, strict=True):
-        result.append(_transform(_header(nanoseconds, parent or root_frame), name, turn, place))
-    return result
 
 
 def _transform(header: Any, child: str, turn: Sequence[float], place: Sequence[float]) -> Any:  # noqa: ANN401

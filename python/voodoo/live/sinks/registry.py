@@ -27,7 +27,13 @@ def _ros2() -> Sink:
     return Ros2Sink
 
 
-_sinks: dict[str, Callable[[], Sink]] = {"ros2": _ros2, "vmc": _vmc, "ws": _websocket}
+def _foxglove() -> Sink:
+    from voodoo.live.sinks.foxglove import FoxgloveSink
+
+    return FoxgloveSink
+
+
+_sinks: dict[str, Callable[[], Sink]] = {"foxglove": _foxglove, "ros2": _ros2, "vmc": _vmc, "ws": _websocket}
 
 
 def register(scheme: str, find: Callable[[], Sink]) -> None:
