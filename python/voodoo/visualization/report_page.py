@@ -60,7 +60,7 @@ def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = N
     if film is not None:
         data = b64encode(playable(film)).decode("ascii")
         parts.append(
-            f"<video id=film controls muted style='max-width:45%;float:right' src='data:video/webm;base64,{data}'></video>"
+            f"<video id=film controls muted style='display:block;max-width:100%;max-height:45vh' src='data:video/webm;base64,{data}'></video>"
         )
     for number, (person, track) in enumerate(tracks.items()):
         figure = _figure(track).to_html(
