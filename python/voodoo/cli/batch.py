@@ -55,10 +55,10 @@ def batch_command(
     option: LoaderNumberOption = None,
     layout: LayoutOption = None,
     strict: StrictOption = False,
-    report: Annotated[
+    pages: Annotated[
         bool,
         typer.Option(
-            "--report", help="Also write a page for each recording that is tracked, and index.html with links."
+            "--pages", help="Also write a page for each recording that is tracked, and index.html with links."
         ),
     ] = False,
     as_json: JsonOption = False,
@@ -69,7 +69,7 @@ def batch_command(
     every recording: recording, frames, seconds, status (done, failed), error, and more. It needs
     pip install 'voodoo-tracker[batch]'.
 
-    --report writes DIR/reports/NAME.html, the page of voodoo report, for each recording that is tracked now, and DIR/index.html.
+    --pages writes DIR/reports/NAME.html, the page of voodoo report, for each recording that is tracked now, and DIR/index.html.
 
     Run it again to resume: finished recordings are skipped, failed ones are repeated. The row of a failed recording has the
     reason, and the command ends with exit code 1. The task of a worker that dies is repeated once.
@@ -119,7 +119,7 @@ def batch_command(
             out if "://" in out else str(local_path(out).absolute()),
             settings,
             limit_s=time_limit,
-            report=report,
+            report=pages,
         )
         for note in batch.notes:
             print_message(note)

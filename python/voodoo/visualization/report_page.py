@@ -59,9 +59,8 @@ def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = N
     parts += [f"<body style='font:15px sans-serif;margin:1.5em'><h1>{escape(name)}</h1>"]
     if film is not None:
         data = b64encode(playable(film)).decode("ascii")
-        parts.append(
-            f"<video id=film controls muted style='display:block;max-width:100%;max-height:45vh' src='data:video/webm;base64,{data}'></video>"
-        )
+        style = "display:block;max-width:100%;max-height:45vh"
+        parts.append(f"<video id=film controls muted style='{style}' src='data:video/webm;base64,{data}'></video>")
     for number, (person, track) in enumerate(tracks.items()):
         figure = _figure(track).to_html(
             full_html=False, include_plotlyjs=number == 0, auto_play=False, config={"displaylogo": False}
