@@ -1,250 +1,152 @@
-"""What live sinks cost: time a frame of four people with every sink on, and how late frames are beside receivers that hang.
+"""What live sinks cost: time of a frame of four people with all of them, and how late poses are beside receivers that hang.
 
-    python benches/sinks.py [--frames 60] [--rounds 3]
+    python benches/sinks.py [--seconds 4] [--rounds 3]
 
-On one core; the receivers are processes of another one, if there is one. Sessions with and without sinks take turns, so that
-both are measured in one run. Sinks whose library is missing are named.
+On one core; receivers are processes of the last one. Sessions with and without sinks take turns. A sink whose library is
+missing is named.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import socket
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Sequence
-from itertools import islice
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 import voodoo
 from voodoo.errors import VoodooError
-from voodoo.live.assembly import LiveFrame
-from voodoo.live.clock import HostClock
 from voodoo.live.follow import Follower, Step
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks import sink_of
-from voodoo.live.source import Arrival, Source, SourceEnded
+from voodoo.live.sources.played import PlayedSource
 from voodoo.live.stream import Live
-from voodoo.measurements import DepthImage
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.gait import path
 from voodoo.synthetic.people import MadeUpRecording, Scene, Walker
 from voodoo.synthetic.stories import base_from_camera
 
-RATE = 15.0
-_CLIENT = "import sys, websockets.sync.client as c\nfor _ in c.connect(sys.argv[1], max_size=None): pass"
-_OSC = """
-import socket, sys
-place = socket.socket(type=socket.SOCK_DGRAM)
-place.bind(("127.0.0.1", int(sys.argv[1])))
-while place.recv(65536):
-    pass
-"""
-
-
-def four_people(seconds: float) -> list[LiveFrame]:
-    """Frames of four people who stand and walk."""
-    places = ((2.6, -1.0), (2.6, 1.0), (3.4, -0.1), (4.3, 1.1))
-    walkers = tuple(
-        Walker(body=voodoo.Body.human(1.65 + 0.06 * k), stops=path([(0.0, x, y), (seconds, x + 0.3, y)]))
-        for k, (x, y) in enumerate(places)
-    )
-    scene = Scene(
-        name="four",
-        people=walkers,
-        seconds=seconds,
-        furniture=(((5.4, -4.0, 0.0), (5.6, 4.0, 3.0)),),
-        root_from_sensor=lambda _: base_from_camera(),
-        rate_hz=RATE,
-        seed=1,
-    )
-    return [LiveFrame(one.stamp, one.measurements, k, 0.0, 0.0, False) for k, one in enumerate(MadeUpRecording(scene))]
-
-
-def sinks() -> tuple[list[Output], list[subprocess.Popen[bytes]]]:
-    """All live sinks with a receiver each."""
-    outputs: list[Output] = []
-    receivers = []
-    with socket.socket(type=socket.SOCK_DGRAM) as place:
-        place.bind(("127.0.0.1", 0))
-        port = place.getsockname()[1]
-    receivers.append(subprocess.Popen([sys.executable, "-c", _OSC, str(port)], preexec_fn=elsewhere))
-    for address in ("ros2://", f"vmc://127.0.0.1:{port}", "ws://:0", "foxglove://:0"):
-        try:
-            outputs.append(sink_of(address, root_frame=lambda: "base_link"))
-        except VoodooError as error:
-            print(f"without {address}: {error}")
-            continue
-        if address.startswith(("ws", "foxglove")):
-            code = _CLIENT if address.startswith("ws") else FOXGLOVE
-            words = [sys.executable, "-c", code, f"ws://127.0.0.1:{outputs[-1].port}"]  # type: ignore[attr-defined]
-            receivers.append(subprocess.Popen(words, preexec_fn=elsewhere))
-    time.sleep(2.0)
-    return outputs, receivers
-
-
-FOXGLOVE = """
+OSC = "import socket as s; p = s.socket(type=s.SOCK_DGRAM); p.bind(('127.0.0.1', 39540))\nwhile p.recv(65536): pass"
+CLIENT = """
 import json, sys, websockets.sync.client as c
-with c.connect(sys.argv[1], subprotocols=["foxglove.sdk.v1"], max_size=None) as client:
+with c.connect(sys.argv[1], subprotocols=["foxglove.sdk.v1"] if sys.argv[2:] else None, max_size=None) as client:
     for message in client:
-        if isinstance(message, str) and json.loads(message)["op"] == "advertise":
-            channels = json.loads(message)["channels"]
-            wanted = [{"id": one["id"], "channelId": one["id"]} for one in channels]
+        if sys.argv[2:] and isinstance(message, str) and json.loads(message)["op"] == "advertise":
+            wanted = [{"id": one["id"], "channelId": one["id"]} for one in json.loads(message)["channels"]]
             client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 """
 
 
-def elsewhere() -> None:
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0)) if os.cpu_count() == 1 else (os.cpu_count() or 1) - 1})
-
-
-def cost(frames: Sequence[LiveFrame], rounds: int) -> None:
-    """Print the time of a frame with and without sinks."""
-    outputs, receivers = sinks()
-    os.sched_setaffinity(0, {0})
-    tracked: dict[bool, list[float]] = {True: [], False: []}
-    used: dict[bool, list[float]] = {True: [], False: []}
-    persons = 0
-    try:
-        for number in range(2 * rounds):
-            on = number % 2 == 0
-            with Live([Paced(frames, RATE)], on_message=lambda words: None) as live:
-                began, steps = time.process_time(), Steps()
-                lent = [Lent(output) for output in outputs] if on else []
-                session = Session(live, lambda _: follower(), outputs=[steps, *lent])
-                while session.wait(0.2):
-                    pass
-                session.finish()
-                used[on].append((time.process_time() - began) / len(steps.seconds))
-            tracked[on] += steps.seconds[len(steps.seconds) // 3 :]  # everybody is found
-            persons = max(persons, *steps.persons)
-            if on:
-                late = [f"{one.name} {lane.box.dropped}" for lane in session._lanes for one in lane.outputs]
-    finally:
-        for receiver in receivers:
-            receiver.kill()
-        for output in outputs:
-            output.close()
-    # A quarter of the frames had the core for themselves, whatever else the machine does.
-    without, with_ = (1e3 * float(np.percentile(tracked[on], 25)) for on in (False, True))
-    less, more = (1e3 * float(np.median(used[on])) for on in (False, True))
-    print(f"{persons} people at {RATE:.0f} Hz on one core, all sinks on; missed poses: {', '.join(late)}")
-    print(f"tracking a frame: {without:.2f} ms without, {with_:.2f} ms with: {100 * (with_ / without - 1):+.1f} %")
-    print(
-        f"all work for a frame (CPU of the process): {less:.2f} ms without, {more:.2f} ms with: +{more - less:.2f} ms"
-    )
-
-
-def follower() -> Follower:
-    return Follower(people=lambda: voodoo.People(voodoo.Body.human()), settings=FrontEndSettings(use=("depth",)))
-
-
-class Steps(Output):
-    """Notes how long tracking took."""
-
-    name, waiting = "steps", 1000
-
-    def __init__(self) -> None:
-        self.seconds: list[float] = []
-        self.persons: list[int] = []
-
-    def publish(self, step: Step) -> None:
-        self.seconds.append(step.seconds)
-        self.persons.append(sum(bool(one.joints) for one in step.estimates.values()))
-
-
-class Lent(Output):
-    """An output that stays open after the session."""
-
-    def __init__(self, output: Output) -> None:
-        self.name, self.prompt, self.receiver = output.name, output.prompt, output.receiver
-        self.publish = output.publish  # type: ignore[method-assign]
-
-    def publish(self, step: Step) -> None:
-        """Of the output."""
-
-
-class Paced(Source):
-    """Hands frames over at their rate."""
-
-    name, root_frame, stays = "paced", "base_link", False
-
-    def __init__(self, frames: Sequence[LiveFrame], rate: float) -> None:
-        self.items = [next(item for item in one.measurements if isinstance(item, DepthImage)) for one in frames]
-        self.period, self.number = 1.0 / rate, 0
-
-    def open(self, clock: HostClock, faults: object) -> None:
-        self.clock, self.began = clock, clock.now()
-
-    def read(self, timeout: float) -> list[Arrival]:
-        if self.number >= len(self.items):
-            raise SourceEnded("end")
-        due = self.began + self.number * self.period
-        time.sleep(min(max(due - self.clock.now(), 0.0), timeout))
-        if self.clock.now() < due:
-            return []
-        item = self.items[self.number]
-        self.number += 1
-        return [Arrival("depth", "depth", item.stamp, lambda: item, drives=True, taken=due)]
-
-    def close(self) -> None:
-        pass
-
-
-class Receiver(Output):
-    """Notes when it gets a pose; hangs, or fails, between two frames."""
+class Watched(Output):
+    """Calls a function with every step; the output that it belongs to stays open."""
 
     receiver = True
 
-    def __init__(self, name: str, *, prompt: bool = False, hangs: range = range(0), fails: range = range(0)) -> None:
-        self.name, self.prompt, self.hangs, self.fails = name, prompt, hangs, fails
-        self.late: dict[float, float] = {}
-        self.go = threading.Event()
+    def __init__(self, name: str, call: Callable[[Step], object], *, prompt: bool = False) -> None:
+        self.name, self.prompt, self.publish = name, prompt, call  # type: ignore[method-assign,assignment]
+        self.waiting = 1 if prompt or name != "steps" else 1000
 
     def publish(self, step: Step) -> None:
-        number = step.frame.number
-        self.late[step.stamp] = time.time() - step.frame.taken
-        if number in self.hangs:
-            self.go.wait(2.0)
-        if number in self.fails:
-            raise ConnectionResetError(104, "Connection reset by peer")
+        """Replaced."""
 
 
-def lateness(frames: Sequence[LiveFrame], rounds: int) -> None:
-    """Print how much later poses are beside receivers that hang, die and return: of each frame the least of all rounds."""
-    late: dict[bool, dict[float, list[float]]] = {True: {}, False: {}}
+def four_people(seconds: float) -> MadeUpRecording:
+    places = ((2.6, -1.0), (2.6, 1.0), (3.4, -0.1), (4.3, 1.1))
+    bodies = [voodoo.Body.human(1.65 + 0.06 * number) for number in range(4)]
+    stops = [path([(0.0, x, y), (seconds, x + 0.3, y)]) for x, y in places]
+    people = tuple(Walker(body=body, stops=way) for body, way in zip(bodies, stops, strict=True))
+    walls = (((5.4, -4.0, 0.0), (5.6, 4.0, 3.0)),)
+    view = {"root_from_sensor": lambda _: base_from_camera(), "rate_hz": 15.0, "seed": 1}
+    return MadeUpRecording(Scene(name="four", people=people, seconds=seconds, furniture=walls, **view))  # type: ignore[arg-type]
+
+
+def session(recording: MadeUpRecording, outputs: Sequence[Output], told: list[str]) -> Session:
+    settings = FrontEndSettings(use=("depth",))
+    with Live([PlayedSource(recording)], on_message=told.append) as live:
+        made = Session(
+            live,
+            lambda _: Follower(people=lambda: voodoo.People(voodoo.Body.human()), settings=settings),
+            outputs=outputs,
+        )
+        while made.wait(0.05):
+            pass
+        made.finish()
+    return made
+
+
+def cost(recording: MadeUpRecording, rounds: int) -> None:
+    """Print the time of a frame with and without sinks."""
+    last = {(os.cpu_count() or 1) - 1}
+    receivers = [subprocess.Popen([sys.executable, "-c", OSC], preexec_fn=lambda: os.sched_setaffinity(0, last))]
+    outputs = []
+    for address in ("ros2://", "vmc://127.0.0.1:39540", "ws://:0", "foxglove://:0"):
+        try:
+            outputs.append(sink_of(address, root_frame=lambda: "base_link", on_message=lambda words: None))
+        except VoodooError as error:
+            print(f"without {address}: {error}")
+        if outputs and outputs[-1].name == address and hasattr(outputs[-1], "port"):
+            words = [f"ws://127.0.0.1:{outputs[-1].port}", *["foxglove"] * address.startswith("fox")]
+            command = [sys.executable, "-c", CLIENT, *words]
+            receivers.append(subprocess.Popen(command, preexec_fn=lambda: os.sched_setaffinity(0, last)))
+    time.sleep(2.0)
+    os.sched_setaffinity(0, {0})
+    tracked: dict[bool, list[float]] = {True: [], False: []}
+    used: dict[bool, list[float]] = {True: [], False: []}
     for number in range(2 * rounds):
-        bad = number % 2 == 0
-        told: list[str] = []
-        prompt = Receiver("prompt", prompt=True)
-        beside = [Receiver("hangs", hangs=range(8, 12)), Receiver("dies", fails=range(8, 20))] if bad else []
-        with Live([Paced(frames, RATE)], on_message=told.append) as live:
-            session = Session(live, lambda _: follower(), outputs=[prompt, *beside])
-            while session.wait(0.05):
-                pass
-            session.finish()
-        for stamp, seconds in prompt.late.items():
-            late[bad].setdefault(stamp, []).append(seconds)
-        if bad:
+        on, steps = number % 2 == 0, list[Step]()
+        began = time.process_time()
+        beside = [Watched(one.name, one.publish, prompt=one.prompt) for one in outputs if on]
+        report = session(recording, [Watched("steps", steps.append), *beside], []).report()
+        used[on].append((time.process_time() - began) / len(steps))
+        tracked[on] += [step.seconds for step in steps[len(steps) // 3 :]]  # everybody is found
+        if on:
+            print(f"{len(steps[-1].estimates)} people; poses missed: {report['late_outputs']}")
+    # A quarter of the frames had the core for themselves, whatever else the machine does.
+    without, with_ = (1e3 * float(np.percentile(tracked[on], 25)) for on in (False, True))
+    less, more = (1e3 * float(np.median(used[on])) for on in (False, True))
+    print(f"tracking a frame: {without:.2f} ms without, {with_:.2f} ms with all: {100 * (with_ / without - 1):+.1f} %")
+    print(f"processor time of a frame, all threads: {less:.2f} ms without, {more:.2f} ms with all")
+    for receiver in receivers:
+        receiver.kill()
+
+
+def hangs(step: Step) -> None:
+    time.sleep(1.5 if step.frame.number == 8 else 0.0)
+
+
+def dies(step: Step) -> None:
+    if 8 <= step.frame.number < 20:
+        raise ConnectionResetError(104, "Connection reset by peer")
+
+
+def lateness(recording: MadeUpRecording, rounds: int) -> None:
+    """Print how much later poses are beside receivers that hang, die and return: of each frame the least of all rounds."""
+    late: dict[bool, dict[float, float]] = {True: {}, False: {}}
+    for number in range(2 * rounds):
+        bad, told, found = number % 2 == 0, list[str](), late[number % 2 == 0]
+
+        def keep(step: Step, found: dict[float, float] = found) -> None:
+            found[step.stamp] = min(found.get(step.stamp, np.inf), time.time() - step.frame.taken)
+
+        beside = [Watched("hangs", hangs), Watched("dies", dies)] if bad else []
+        session(recording, [Watched("prompt", keep, prompt=True), *beside], told)
+        if told:
             print("; ".join(told))
-    more = 1e3 * np.array([min(late[True][stamp]) - min(late[False][stamp]) for stamp in sorted(late[True])])
-    print(
-        f"beside receivers that hang and die, later by {np.median(more):+.2f} ms in the median, at most {more.max():+.2f} ms"
-    )
+    more = 1e3 * np.array([late[True][stamp] - late[False][stamp] for stamp in late[True].keys() & late[False].keys()])
+    print(f"beside receivers that hang and die {np.median(more):+.2f} ms in the median, {more.max():+.2f} ms at most")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--seconds", type=float, default=4.0)
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
-    frames = list(islice(four_people(arguments.frames / RATE), arguments.frames))
-    lateness(frames, arguments.rounds)
-    cost(frames, arguments.rounds)
+    recording = four_people(arguments.seconds)
+    lateness(recording, arguments.rounds)
+    cost(recording, arguments.rounds)
 
 
 if __name__ == "__main__":

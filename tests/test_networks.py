@@ -25,7 +25,7 @@ from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
-from voodoo.sensors.keypoints.networks import KeypointNetwork, network_of, register
+from voodoo.sensors.keypoints.networks import KeypointNetwork, network_of
 from voodoo.sensors.pixels import in_sensor
 from voodoo.sensors.settings import FrontEndSettings
 
@@ -150,8 +150,6 @@ def test_a_function_of_the_users_own_by_one_option_from_a_recording_and_live(own
 def test_what_is_not_possible_is_refused(tmp_path):
     with pytest.raises(VoodooError, match="expected one network, found mediapipe, rtmpose"):
         keypoint_words(["mediapipe", "rtmpose"], None)
-    with pytest.raises(ConfigError, match="expected a new name"):
-        register("rtmpose", lambda words: None)
     recording = open_recording(sample_path())
     (item, *_) = color_images(Short(recording, 2))
     for detect, words in {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,7 +20,9 @@ from voodoo.model.rotations import quaternions
 SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
 """Topics: foxglove.FrameTransforms and foxglove.SceneUpdate."""
-_LEFT, _RIGHT, _JOINT = (0.9, 0.6, 0.3), (0.3, 0.6, 0.9), (0.9, 0.1, 0.1)
+_LEFT, _RIGHT, _JOINT = (
+    dict(zip("rgba", one, strict=True)) for one in ((0.9, 0.6, 0.3, 0.6), (0.3, 0.6, 0.9, 0.6), (0.9, 0.1, 0.1, 0.6))
+)
 _JOINT_M = 0.04
 
 
@@ -78,8 +80,8 @@ class Channels:
                         timestamp=time,
                         parent_frame_id=parent or root_frame,
                         child_frame_id=name,
-                        translation=_vector(m, place),
-                        rotation=_turn(m, turn),
+                        translation=m.Vector3(**_xyz(place)),
+                        rotation=m.Quaternion(**_xyz(turn, "xyzw")),
                     )
                 )
             entities.append(self._entity(time, person, track, body, root_frame))
@@ -101,34 +103,24 @@ class Channels:
             low = (limb.shape.a0 / a + limb.shape.b0 / b) if a and b else 1.0
             cylinders.append(
                 m.CylinderPrimitive(
-                    pose=m.Pose(position=_vector(m, place), orientation=_turn(m, turn)),
+                    pose=m.Pose(position=m.Vector3(**_xyz(place)), orientation=m.Quaternion(**_xyz(turn, "xyzw"))),
                     size=m.Vector3(x=a, y=b, z=limb.shape.length),
                     bottom_scale=low,
                     top_scale=2.0 - low,
-                    color=_color(m, _LEFT if limb.name.startswith("l_") else _RIGHT),
+                    color=m.Color(**(_LEFT if limb.name.startswith("l_") else _RIGHT)),
                 )
             )
-        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), _color(m, _JOINT)
+        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**_JOINT)
         still = m.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
         spheres = [
-            m.SpherePrimitive(pose=m.Pose(position=_vector(m, place), orientation=still), size=size, color=red)
+            m.SpherePrimitive(pose=m.Pose(position=m.Vector3(**_xyz(place)), orientation=still), size=size, color=red)
             for place in track.joints[0].tolist()
         ]
         return m.SceneEntity(timestamp=time, frame_id=root_frame, id=person, cylinders=cylinders, spheres=spheres)
 
 
-def _vector(m: Any, values: Any) -> Any:  # noqa: ANN401
-    x, y, z = values
-    return m.Vector3(x=x, y=y, z=z)
-
-
-def _turn(m: Any, values: Any) -> Any:  # noqa: ANN401
-    x, y, z, w = values
-    return m.Quaternion(x=x, y=y, z=z, w=w)
-
-
-def _color(m: Any, rgb: tuple[float, float, float]) -> Any:  # noqa: ANN401
-    return m.Color(r=rgb[0], g=rgb[1], b=rgb[2], a=0.6)
+def _xyz(values: Iterable[float], names: str = "xyz") -> dict[str, float]:
+    return dict(zip(names, values, strict=True))
 
 
 def write_foxglove(

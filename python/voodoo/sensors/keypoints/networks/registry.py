@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,35 +10,8 @@ from typing import Any
 from voodoo.errors import ConfigError
 from voodoo.sensors.keypoints.networks.network import Detect, KeypointNetwork
 
-
-def _mediapipe(words: str) -> Detect:
-    from voodoo.sensors.keypoints.networks.mediapipe import MediaPipe
-
-    return MediaPipe(words)
-
-
-def _rtmpose(words: str) -> Detect:
-    from voodoo.sensors.keypoints.networks.rtmpose import RtmPose
-
-    return RtmPose(words)
-
-
-_networks: dict[str, Callable[[str], Detect]] = {"mediapipe": _mediapipe, "rtmpose": _rtmpose}
-
-
-def register(name: str, load: Callable[[str], Detect]) -> None:
-    """Register a network: `register("mine", lambda words: MyNetwork(words))`.
-
-    Args:
-        name: `--keypoints NAME` or `--keypoints NAME:WORDS`.
-        load: imports and loads it; called with the words after the colon. The result has the attribute `layout`.
-
-    Raises:
-        ConfigError: the name is taken.
-    """
-    if name in _networks:
-        raise ConfigError(f"network {name!r}: expected a new name, found one that is registered")
-    _networks[name] = load
+NETWORKS = {"mediapipe": "MediaPipe", "rtmpose": "RtmPose"}
+"""Name, which is that of the module here, -> class, which is made of the words after the colon."""
 
 
 def network_of(word: str, *, layout: str | None = None) -> KeypointNetwork:
@@ -54,12 +26,12 @@ def network_of(word: str, *, layout: str | None = None) -> KeypointNetwork:
         MeasurementError: an unknown layout.
     """
     name, colon, words = word.partition(":")
-    if name in _networks:
-        detect: Any = _networks[name](words)
+    if name in NETWORKS:
+        detect: Any = getattr(import_module(f"{__package__}.{name}"), NETWORKS[name])(words)
     elif colon and words:
         detect = _own(name, words)
     else:
-        known = ", ".join(sorted(_networks))
+        known = ", ".join(NETWORKS)
         raise ConfigError(f"keypoints: expected SENSOR=FOLDER, {known} or MODULE:FUNCTION, found {word!r}")
     chosen = layout or getattr(detect, "layout", None)
     if not isinstance(chosen, str):
