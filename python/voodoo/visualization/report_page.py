@@ -70,28 +70,25 @@ def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = N
 
 
 def playable(film: Path) -> bytes:
-    """A film as a WebM that browsers play: as it is, or encoded anew, which drops nothing but sound.
+    """A film as a WebM, which browsers play.
 
     Raises:
         VoodooError: it cannot be read.
     """
     source = cv2.VideoCapture(str(film))
-    try:
-        if film.suffix == ".webm" and source.isOpened():
-            return film.read_bytes()
-        with TemporaryDirectory() as folder:
-            place, writer = Path(folder) / "film.webm", None
-            while (read := source.read())[0]:
-                if writer is None:
-                    code, size = cv2.VideoWriter.fourcc(*"VP80"), read[1].shape[1::-1]
-                    writer = cv2.VideoWriter(str(place), code, source.get(cv2.CAP_PROP_FPS) or 30.0, size)
-                writer.write(read[1])
-            if writer is None:
-                raise VoodooError(f"{film}: expected a film, found none that can be read")
-            writer.release()
-            return place.read_bytes()
-    finally:
+    readable, picture = source.read()
+    if not readable:
+        raise VoodooError(f"{film}: expected a film, found none that can be read")
+    with TemporaryDirectory() as folder:
+        place = Path(folder) / "film.webm"
+        rate, size = source.get(cv2.CAP_PROP_FPS) or 30.0, picture.shape[1::-1]
+        writer = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
+        while readable:
+            writer.write(picture)
+            readable, picture = source.read()
+        writer.release()
         source.release()
+        return place.read_bytes()
 
 
 def _words(track: Track) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ _MOST = 6
 _CERTAIN = 0.67
 """Greatest confidence: a visibility of 1 does not say how exact a landmark is. With 6 px instead of 4 px of noise rendered
 people are followed best."""
+_PAGE = "https://ai.google.dev/edge/mediapipe/solutions/vision/pose_landmarker"
 
 
 class MediaPipe:
@@ -36,49 +37,38 @@ class MediaPipe:
         try:
             import mediapipe
         except ImportError:
+            advice = "pip install 'voodoo-tracker[mediapipe]'"
+            raise ConfigError(f"mediapipe: expected the package, found none; {advice}") from None
+        self._mediapipe: Any = mediapipe
+        self._landmarker: Any = None
+        if model:
+            from mediapipe.tasks.python import BaseOptions, vision
+
+            try:
+                base = BaseOptions(model_asset_buffer=Path(model).read_bytes())
+                options = vision.PoseLandmarkerOptions(base_options=base, num_poses=_MOST)
+                self._landmarker = vision.PoseLandmarker.create_from_options(options)
+            except Exception as error:  # those of MediaPipe share no other class
+                raise ConfigError(f"{model}: expected a pose landmarker of MediaPipe, found: {error}") from error
+        elif hasattr(mediapipe, "solutions"):
+            self._shipped: Any = mediapipe.solutions.pose.Pose(static_image_mode=True)
+        else:
             raise ConfigError(
-                "mediapipe: expected the package, found none; pip install 'voodoo-tracker[mediapipe]'"
-            ) from None
-        self._found = _landmarker(mediapipe, Path(model)) if model else _shipped(mediapipe)
+                f"mediapipe: expected mediapipe:FILE.task, a pose landmarker of {_PAGE}, found none; MediaPipe "
+                f"{mediapipe.__version__} ships no network"
+            )
 
     def __call__(self, image: npt.NDArray[np.uint8]) -> Iterator[npt.NDArray[np.float64]]:
         """See `Detect`."""
         height, width = image.shape[:2]
-        for marks in self._found(np.ascontiguousarray(image[:, :, ::-1])):
+        image = np.ascontiguousarray(image[:, :, ::-1])
+        if self._landmarker is not None:
+            form = self._mediapipe.ImageFormat.SRGB
+            people = self._landmarker.detect(self._mediapipe.Image(image_format=form, data=image)).pose_landmarks
+        else:
+            found = self._shipped.process(image).pose_landmarks
+            people = [] if found is None else [found.landmark]
+        for marks in people:
             # Shares of the image, from the outer edge of the first pixel.
             rows = [(one.x * width - 0.5, one.y * height - 0.5, _CERTAIN * (one.visibility or 0.0)) for one in marks]
             yield np.array(rows)
-
-
-def _landmarker(mediapipe: Any, model: Path) -> Callable[[npt.NDArray[np.uint8]], Any]:  # noqa: ANN401
-    from mediapipe.tasks.python import BaseOptions, vision
-
-    try:
-        base = BaseOptions(model_asset_buffer=model.read_bytes())
-        options = vision.PoseLandmarkerOptions(base_options=base, num_poses=_MOST)
-        network = vision.PoseLandmarker.create_from_options(options)
-    except Exception as error:  # those of MediaPipe share no other class
-        raise ConfigError(f"{model}: expected a pose landmarker of MediaPipe (.task), found: {error}") from error
-
-    def found(image: npt.NDArray[np.uint8]) -> Any:  # noqa: ANN401
-        picture = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=image)
-        return network.detect(picture).pose_landmarks
-
-    return found
-
-
-def _shipped(mediapipe: Any) -> Callable[[npt.NDArray[np.uint8]], Any]:  # noqa: ANN401
-    if not hasattr(mediapipe, "solutions"):
-        version = getattr(mediapipe, "__version__", "")
-        raise ConfigError(
-            f"mediapipe: expected mediapipe:FILE.task, a pose landmarker of "
-            f"https://ai.google.dev/edge/mediapipe/solutions/vision/pose_landmarker, found none; MediaPipe {version} ships no "
-            "network"
-        )
-    network = mediapipe.solutions.pose.Pose(static_image_mode=True)
-
-    def found(image: npt.NDArray[np.uint8]) -> Any:  # noqa: ANN401
-        marks = network.process(image).pose_landmarks
-        return [] if marks is None else [marks.landmark]
-
-    return found
