@@ -118,3 +118,28 @@ def several(entries: list[Entry]) -> list[Entry]:
     for name, at in (("blank", 25), ("garbled", 40), ("resized", 55), ("reordered", 70)):
         entries = DAMAGES[name][0](entries, at)
     return DAMAGES["repeated"][0](entries, 10)
+
+
+def set_back(entries: list[Entry], seconds: float, at: int = 45, *, recorder: bool = False) -> list[Entry]:
+    """The clock is set back before a depth image: what comes then has earlier stamps, and times if it is the recorder's."""
+
+    def moved(entry: Entry) -> Entry:
+        message = ROS2.deserialize_cdr(entry[3], entry[1])
+        if entry[1] == "tf2_msgs/msg/TFMessage":
+            return changed(
+                entry, transforms=[replace(one, header=_earlier(one.header, seconds)) for one in message.transforms]
+            )
+        return changed(entry, header=_earlier(message.header, seconds))
+
+    row = depth_rows(entries)[at]
+    earlier = round(seconds * 1e9) if recorder else 0
+    return [
+        *entries[:row],
+        *((topic, kind, time - earlier, raw) for topic, kind, time, raw in map(moved, entries[row:])),
+    ]
+
+
+def _earlier(header: object, seconds: float) -> object:
+    nanoseconds = header.stamp.sec * 10**9 + header.stamp.nanosec - round(seconds * 1e9)
+    sec, nanosec = divmod(nanoseconds, 10**9)
+    return replace(header, stamp=replace(header.stamp, sec=sec, nanosec=nanosec))

@@ -1,5 +1,7 @@
 """A .mkv of an Azure Kinect: depth and color fit together by its calibration, and damage is named."""
 
+import shutil
+
 import cv2
 import numpy as np
 import pytest
@@ -112,6 +114,12 @@ def test_a_calibration_that_is_no_use_is_named(real, tmp_path, change, words):
     path = rewritten(real, tmp_path / "damaged.mkv", **change)
     with pytest.raises(RecordingError, match=words):
         open_recording(path)
+
+
+def test_the_folder_of_the_only_file_is_opened(real, tmp_path):
+    shutil.copy(real, tmp_path / "walk.mkv")
+    (tmp_path / "notes.txt").write_text("of today")
+    assert len(open_recording(tmp_path)) == len(open_recording(real)) == 1
 
 
 def test_a_damaged_file_and_a_film_are_refused_without_a_result(real, tmp_path):

@@ -164,6 +164,11 @@ def test_init_for_a_time_starts_there(run):
     Path("start.json").write_text(json.dumps({"stamp_s": 1700200000.09, "joints": T_POSE}))
     assert run("track", "somewhere", "--init", "start.json", "--out", "pose.csv").exit_code == 0
     assert Track.load("pose.csv").status == ("searching",) * 3 + ("tracking",) * 9
+    # Frames before it are not held against the track.
+    Path("start.json").write_text(json.dumps({"stamp_s": 1700200000.25, "joints": T_POSE}))
+    done = run("track", "somewhere", "--init", "start.json", "--out", "pose.csv")
+    assert Track.load("pose.csv").status == ("searching",) * 8 + ("tracking",) * 4
+    assert done.exit_code == 0 and "of the frames are tracking" not in done.stderr
 
 
 def test_an_earlier_result_is_a_start(run):

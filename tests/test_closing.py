@@ -12,7 +12,8 @@ def test_the_end_tells_stature_speed_root_frame_and_shares(tmp_path):
     first, second, third = done.stdout.splitlines()
     assert "90 frames" in first and done.stderr == ""
     assert second.startswith("stature 1.7") and "frames a second; root frame base_link" in second
-    assert third == "100 % tracking (docs/how-to/read-the-status.md says what that means)"
+    share, _, rest = third.partition(" % tracking")
+    assert int(share) >= 98 and rest.endswith(" (docs/how-to/read-the-status.md says what that means)")
     told = run("track", sample_path(), "--height", "1.3", "--out", tmp_path / "o.csv")
     assert "1.30 m was told" in told.stderr
 

@@ -1,6 +1,7 @@
 """`voodoo track` over damaged recordings: a pose for every good frame, and what was left out is counted."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from voodoo.export.track import Track
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.bag_files import BagFolder
 from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.set_back import SetBack
 
 SETTLED_S = 0.2
 WITHIN_M = 0.005
@@ -103,6 +105,43 @@ def test_strictly_the_first_damage_ends_without_a_result(entries, start):
     assert done.exit_code == 1 and done.stderr.count("voodoo: ") == 1 and not (start / "no.npz").exists()
 
 
+@pytest.mark.parametrize(("seconds", "recorder"), [(1.5, False), (3600.0, True)])
+def test_after_a_clock_was_set_back_it_is_tracked_on(entries, start, undamaged, seconds, recorder):
+    bag = damage.write(start / f"back-{seconds}-{recorder}", damage.set_back(entries, seconds, recorder=recorder))
+    result, reported = tracked(bag)
+    kept = np.setdiff1d(np.arange(90), [45])  # which might have been out of order
+    np.testing.assert_allclose(result.stamps, undamaged.stamps[kept], atol=1e-5)
+    assert result.found.all() and set(result.status) <= {"tracking", "degraded"}
+    off = np.linalg.norm(result.joints - undamaged.joints[kept], axis=2)[result.stamps > result.stamps[45] + SETTLED_S]
+    assert off.mean() < WITHIN_M, f"{1000 * off.mean():.1f} mm"
+    said = " ".join(reported.split())
+    assert said.count("was set back") == 1 and f"are moved on by {seconds:.6f} s" in said
+    with pytest.raises(RecordingError, match="expected rising stamps"):
+        list(open_recording(bag))
+
+
+def test_transforms_by_a_clock_that_was_set_back_hold_for_their_images(entries, start):
+    """A camera moves to the side; where its clock was set back, two transforms have each stamp."""
+    moving = [entry for entry in entries if entry[0] in (damage.DEPTH, damage.INFO)]
+    static = next(entry for entry in entries if entry[0] == "/tf_static")
+    for number, row in reversed(list(enumerate(damage.depth_rows(moving)))):
+        message = damage.ROS2.deserialize_cdr(moving[row][3], moving[row][1])
+        (one,) = damage.ROS2.deserialize_cdr(static[3], static[1]).transforms[:1]
+        aside = replace(one.transform.translation, y=0.01 * number)
+        one = replace(one, header=replace(one.header, stamp=message.header.stamp))
+        one = replace(one, transform=replace(one.transform, translation=aside))
+        moving.insert(row, damage.changed(("/tf", static[1], moving[row][2], static[3]), transforms=[one]))
+    others = damage.changed(static, transforms=damage.ROS2.deserialize_cdr(static[3], static[1]).transforms[1:])
+    left_out = LeftOut()
+    bag = damage.write(start / "moving", [others, *damage.set_back(moving, 1.0 + 1.0 / 3.0)])
+    frames = list(open_recording(bag, left_out=left_out, use=("depth",)))
+    aside = np.array([frame.measurements[0].root_from_sensor[1, 3] for frame in frames])
+    aside -= aside[0]
+    np.testing.assert_allclose(aside[:45], 0.01 * np.arange(45), atol=1e-9)
+    np.testing.assert_allclose(aside[45:], 0.01 * np.arange(46, 90), atol=1e-9)
+    assert len(left_out.notes) == 1
+
+
 def test_a_picture_that_does_not_decode_costs_no_frame(entries, start):
     found = list(entries)
     rows = [row for row, entry in enumerate(found) if entry[0] == "/camera/color/image_raw/compressed"][5:8]
@@ -150,3 +189,29 @@ def test_images_that_were_left_out_keep_the_numbers_of_the_others(entries, start
     )
     numbers = [frame.measurements[0].people[0][0, 0] - 1.0 for frame in source]
     assert numbers == [number for number in range(len(rows)) if number != 2]
+
+
+@pytest.mark.parametrize(
+    ("stamps", "moved"),
+    [
+        ([1.0, 1.1, 1.2], [1.0, 1.1, 1.2]),
+        ([9.0, 9.1, 5.0, 5.1, 5.2], [9.0, 9.1, None, 9.3, 9.4]),
+        ([9.0, 9.1, 5.0, 9.2, 9.3], [9.0, 9.1, None, 9.2, 9.3]),  # one is out of order
+        ([9.0, 9.1, 8.5, 8.6], [9.0, 9.1, 8.5, 8.6]),  # by less, which its reader sees
+        ([9.0, 9.1, 99.0, 9.2, 9.3, 9.4], [9.0, 9.1, 99.0, None, 9.3, 9.4]),  # one is wild
+        ([9.0, 9.1, 5.0, 5.1, 2.0, 2.1], [9.0, 9.1, None, 9.3, None, 9.5]),  # twice
+    ],
+)
+def test_stamps_go_on_after_a_clock_was_set_back(stamps, moved):
+    clock = SetBack()
+    assert [clock.of("a", stamp) for stamp in stamps] == [None if one is None else pytest.approx(one) for one in moved]
+
+
+def test_sensors_of_one_clock_are_moved_together_and_of_another_by_themselves():
+    clock = SetBack()
+    rows = {"a": [9.0, 9.1, 5.0, 5.1], "slow": [8.9, 9.2, 5.1, 5.5], "other": [70.0, 70.1, 30.0, 30.1]}
+    found = {name: [clock.of(name, stamp) for stamp in stamps] for name, stamps in rows.items()}
+    assert found["a"][3] == pytest.approx(9.3) and found["slow"][3] == pytest.approx(9.7)
+    assert found["other"][3] == pytest.approx(70.3) and len(clock.steps) == len(clock.words) == 2
+    again = SetBack(clock)
+    assert [again.of("slow", stamp) for stamp in rows["slow"]] == found["slow"] and len(clock.words) == 2

@@ -1,5 +1,6 @@
 """A room without a person is the same exit code for every command."""
 
+import shutil
 from pathlib import Path
 
 import cv2
@@ -50,6 +51,17 @@ def test_nobody_is_the_same_exit_code_everywhere(room, words, tmp_path: Path, mo
     done = CliRunner().invoke(app, [*words.split(), str(room), *(["--init", "auto"] if words == "track" else [])])
     assert done.exit_code == NO_POSE, done.output
     assert "nobody" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("words", ["track --init auto", "live --rate 20", "live --rate 20 --out pose.csv"])
+def test_nothing_usable_is_that_code_as_well(room, words, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    blank = Path(shutil.copytree(room, tmp_path / "blank"))
+    for file in (blank / "depth").iterdir():
+        cv2.imwrite(str(file), np.zeros((60, 80), np.uint16))
+    done = CliRunner().invoke(app, [*words.split(), str(blank)])
+    assert done.exit_code == NO_POSE, done.output
+    assert "blank" in done.stderr and not Path("pose.csv").exists()
 
 
 def test_the_page_has_every_code():

@@ -63,3 +63,12 @@ def test_time_that_goes_backwards_and_lasers_without_odometry_are_doubted(tmp_pa
     assert told("odom", 1.0) == []
     assert len(told("base_link", 1.0)) == 1 and "/scan" in told("base_link", 1.0)[0]
     assert "the last frame is 4.000 s before the first" in told("odom", -4.0)[0]
+
+
+def test_focal_lengths_that_no_depth_camera_has_are_doubted(folder):
+    path = folder(80, 60)
+    assert "focal lengths" not in run("info", path).stdout
+    calibration = path / "calibration.toml"
+    calibration.write_text(calibration.read_text().replace("fx=40", "fx=525"))
+    said = " ".join(run("info", path).stdout.split())
+    assert "depth sees 9 x 89 deg by its calibration, and depth cameras 40 to 120: are its focal lengths right?" in said

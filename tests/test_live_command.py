@@ -251,6 +251,26 @@ def test_a_slow_viewer_holds_nobody_up():
     assert slow.closed
 
 
+def test_a_frame_that_the_tracker_refuses_is_the_only_loss():
+    class Refuses(Follower):
+        asked = 0
+
+        def step(self, frame):
+            self.asked += 1
+            if self.asked == 5:
+                raise VoodooError("not this one")
+            return super().step(frame)
+
+    with played(6.0) as source:
+        session = Session(source, lambda _: Refuses(voodoo.Tracker(voodoo.Body.human())))
+        while session.wait(0.05):
+            pass
+        session.finish()
+    report = session.report()
+    assert report["refused"] == 1 and report["first_faults"]["refused"] == "not this one"
+    assert session.published == report["received"] - report["dropped"] - 1 > 10
+
+
 def test_an_output_that_fails_ends_the_session():
     failing = Slow(0.0, prompt=True, error=VoodooError("disk full"))
     with played(3.0) as source:

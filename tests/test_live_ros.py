@@ -10,6 +10,7 @@ import pytest
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
 from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr
+from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
@@ -23,6 +24,7 @@ from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
+from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.run import start_tracker, track
 from voodoo.pipeline.search import nobody
 from voodoo.recordings import open_recording, sample_path
@@ -199,13 +201,15 @@ class FakeNode:
 
     def __init__(self):
         self.sent, self.heard = [], {}
-        self.offered, self.published = {}, {}
+        self.offered, self.published, self.unheard = {}, {}, set()
 
     def advertise(self, topic, kind, *, depth=10, latched=False):
         node = self
 
         class Publication:
-            subscribers = 1
+            @property
+            def subscribers(self):
+                return topic not in node.unheard
 
             def write(self, message):
                 node.sent.append((topic, STORE.deserialize_cdr(message, kind)))
@@ -275,6 +279,9 @@ def test_what_is_published_has_the_stamps_of_the_data():
     assert gone[TRACKED][0].ids == []
     assert set(publish(step.estimate.stamp + 0.2, nobody(step.estimate.stamp + 0.2))) == {TRACKED}
     assert gone[TRACKED][0].__msgtype__ == IDS
+    node.unheard.add(f"{body}/markers")
+    unheard = publish(step.estimate.stamp + 0.3, step.estimate)
+    assert set(sent) - set(unheard) == {f"{body}/markers", "/human_description_p1"}, "made for nobody"
 
 
 def test_a_whole_recording_goes_through_the_bus():
@@ -336,6 +343,8 @@ def test_a_message_lets_everybody_be_searched_for_again():
     messages, statuses = [], []
 
     class Asks(Output):
+        waiting = 1000
+
         def publish(self, step):
             statuses.append(str(step.estimates[1].status))
             if len(statuses) == 15:
@@ -349,3 +358,39 @@ def test_a_message_lets_everybody_be_searched_for_again():
         session.finish()
     assert any(message.startswith("reset") for message in messages)
     assert statuses[14] != "searching" and "searching" in statuses[15:20] and statuses[-1] == "tracking"
+
+
+@pytest.mark.parametrize(("root", "rate"), [("camera_depth_optical_frame", 3.0), ("base_link", 8.0)])
+def test_live_topics_stand_on_the_floor_that_is_seen_as_files_do(root, rate):
+    recording = open_recording(sample_path(), use=("depth",), root_frame=root)
+    node, messages, turns = FakeNode(), [], []
+
+    class Turns(Output):
+        waiting = 1000
+
+        def publish(self, step):
+            turns.append(step.turn)
+
+    with Live([PlayedSource(recording, rate=rate)], on_message=messages.append) as live:
+        outputs = [Ros2Sink(root_frame=lambda: live.root_frame, node=node), Turns()]
+        session = Session(live, lambda _: follower_of(root), outputs=outputs)
+        while session.wait(0.05):
+            pass
+        session.finish()
+    said = [message for message in messages if "upright by the floor" in message]
+    poses = [one.transforms for one in node.take()["/tf"]]
+    (body,) = (one for one in poses[-1] if one.child_frame_id == "body_p1")
+    if root == "base_link":
+        assert not said and turns[-1].words == "" and body.header.frame_id == root
+        return
+    assert len(said) == 1 and turns[0].words == by_axes(root).words
+    expected = by_floor(seen_floor(recording), optical=True)
+    assert turns[-1].words == expected.words
+    # The camera is 1.3 m high, and looks down by 7 degrees.
+    np.testing.assert_allclose(turns[-1].pose, expected.pose, atol=0.03)
+    assert np.degrees(np.arccos(turns[-1].pose[2, :3] @ turns[0].pose[2, :3])) == pytest.approx(7.0, abs=1.0)
+    assert body.header.frame_id == f"{root}_upright"
+    (above,) = (one.transform for one in poses[-1] if one.child_frame_id == f"{root}_upright")
+    assert above.translation.y == pytest.approx(1.3, abs=0.05), "in the camera's frame the floor is below"
+    pelvis = body.transform.translation.z
+    assert 0.8 < pelvis < 1.1, "above the floor"

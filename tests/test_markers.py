@@ -172,17 +172,46 @@ def upright(recording):
 )
 def test_a_c3d_says_which_axis_is_up(tmp_path, screen, axes, signs):
     names, rows = walking(axes)
-    writer = c3d.Writer(point_rate=50.0, point_units="m  ", gen_scale=-1.0)
-    writer.set_point_labels(names)
-    writer.set_screen_axis("+X" if screen[1] != "X" else "+Y", screen)
-    for row in rows * signs:
-        writer.add_frames([(np.column_stack([row, np.zeros((len(row), 2))]), np.zeros((0, 1)))])
-    with (tmp_path / "x.c3d").open("wb") as file:
-        writer.write(file)
-    recording = open_recording(tmp_path / "x.c3d")
+    right = "+X" if screen[1] != "X" else "+Y"
+    recording = open_recording(write_c3d(tmp_path / "x.c3d", names, rows * signs, X=right, Y=screen))
     assert f"up is {screen} of the file" in str(recording.info())
     assert upright(recording) > 0.4
     assert recording.start["joints"]["l_shoulder"][2] > 1.2
+    assert recording.assumed == ()
+
+
+def write_c3d(path, names, rows, **screens):
+    writer = c3d.Writer(point_rate=50.0, point_units="m  ", gen_scale=-1.0)
+    writer.set_point_labels(names)
+    for screen, axis in screens.items():
+        writer.point_group.set_str(f"{screen}_SCREEN", "", axis, len(axis))
+    for row in rows:
+        writer.add_frames([(np.column_stack([row, np.zeros((len(row), 2))]), np.zeros((0, 1)))])
+    with path.open("wb") as file:
+        writer.write(file)
+    return path
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+@pytest.mark.parametrize(
+    ("axes", "screens", "up", "said"),
+    [
+        ([0, 1, 2], {"Y": "Z"}, "+Z", None),
+        ([0, 1, 2], {"X": "+X"}, "+Z", "only that X is level; +Z is taken for up, along which the body stands"),
+        ([1, 2, 0], {"X": "-Z"}, "+Y", "only that Z is level; +Y is taken for up, along which"),
+        ([1, 2, 0], {"X": "+Y"}, "+Z", "+Z is taken for up, a guess"),  # which the body contradicts
+        ([0, 1, 2], {"X": "+Z", "Y": "-Z"}, "+Y", "X_SCREEN +Z and Y_SCREEN -Z are the same axis"),
+        ([0, 1, 2], {"X": "+X", "Y": "+Y"}, "+Y", "the body stands along its +Z"),
+        ([1, 2, 0], {"X": "+X", "Y": "+Z"}, "+Z", "if that is up, y_up = true"),
+        ([0, 1, 2], {}, "+Y", "the body stands along its +Z"),
+    ],
+)
+def test_half_of_the_screen_of_a_c3d_and_a_wrong_one_are_said(tmp_path, axes, screens, up, said):
+    recording = open_recording(write_c3d(tmp_path / "x.c3d", *walking(axes), **screens))
+    assert f"up is {up} of the file" in str(recording.info())
+    assert (said in " ".join(recording.assumed)) if said else recording.assumed == ()
+    doubted = any("the body stands along its" in words for words in recording.assumed)
+    assert (upright(recording) > 0.4) != doubted
 
 
 def test_c3d_round_trip_with_the_library_that_defines_it(tmp_path):

@@ -1,3 +1,6 @@
+import sys
+
+import av
 import cv2
 import numpy as np
 import pytest
@@ -6,6 +9,7 @@ from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of
 from voodoo.errors import VoodooError
 from voodoo.model.projection import CameraView, TopView, limb_silhouette
 from voodoo.recordings import ColorImage, RecordedFrame
+from voodoo.visualization import film as film_module
 from voodoo.visualization.body_drawing import side_color
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.overlay import Overlay
@@ -96,16 +100,39 @@ def test_color_is_the_background_when_there_is_no_depth():
     assert image[0, 0].tolist() == [10, 200, 30]
 
 
-def test_film_can_be_read_back(tmp_path):
+def read_back(path, count, codec):
+    """The first picture of a film of `count` pictures, read by PyAV."""
+    with av.open(str(path)) as film:
+        frames = list(film.decode(video=0))
+        (track,) = film.streams
+        assert (track.codec_context.name, len(frames), track.average_rate) == (codec, count, 30)
+        assert [frame.time for frame in frames] == pytest.approx(np.arange(count) / 30.0)
+        assert track.codec_context.pix_fmt == "yuv420p"
+    return frames[0].to_ndarray(format="bgr24")
+
+
+@pytest.mark.parametrize("codec", ["h264", "vp9"])
+def test_a_film_is_one_that_browsers_play(tmp_path, monkeypatch, codec):
+    if codec == "vp9":
+        monkeypatch.delitem(film_module._CODECS, "libx264")
     with PictureWriter(tmp_path / "look.mp4", rate_hz=30.0) as writer:
         for _ in range(7):
-            writer.write(draw())
-    film = cv2.VideoCapture(str(tmp_path / "look.mp4"))
-    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 7
-    assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(30.0)
-    readable, picture = film.read()
-    assert readable
-    assert np.abs(picture.astype(int) - draw()).mean() < 12
+            writer.write(draw()[:-1, :-1])
+    assert writer.failure is None and writer.note == "" and [tmp_path / "look.mp4"] == list(tmp_path.iterdir())
+    picture = read_back(tmp_path / "look.mp4", 7, codec)
+    height, width = (size // 2 * 2 for size in draw()[:-1, :-1].shape[:2])
+    assert np.abs(picture.astype(int) - draw()[:height, :width]).mean() < 12
+    content = (tmp_path / "look.mp4").read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat"), "it plays while it is loaded"
+
+
+def test_without_pyav_a_film_is_mpeg_4_and_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    with PictureWriter(tmp_path / "look.mp4", rate_hz=30.0) as writer:
+        writer.write(draw())
+        writer.write(draw())
+    assert "look.mp4 is MPEG-4" in writer.note and "voodoo-tracker[film]" in writer.note
+    read_back(tmp_path / "look.mp4", 2, "mpeg4")
 
 
 def test_folder_of_pictures(tmp_path):

@@ -11,6 +11,7 @@ from bag_writer import Messages, write_bag
 from ros_bags import DEPTH, IDENTITY, INFO, TF, bag, depth_entry, only
 from voodoo.errors import RecordingError
 from voodoo.recordings import open_recording
+from voodoo.recordings.left_out import LeftOut
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
@@ -123,3 +124,23 @@ def test_a_zip_without_a_bag_is_refused(tmp_path):
         archive.writestr("readme.txt", "nothing")
     with pytest.raises(RecordingError, match=r"b\.zip: found no loader"):
         open_recording(tmp_path / "b.zip")
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3", "ros1"])
+def test_messages_are_read_as_written_where_the_recorders_clock_was_set_back(tmp_path, storage):
+    """Times of recording and stamps: 10.0 to 10.4 s, then 7.5 to 7.9 s. In the order of time the second half would come first."""
+    stamps = [*np.arange(10.0, 10.45, 0.1), *np.arange(7.5, 7.95, 0.1)]
+    if storage == "ros1":
+        m1 = Messages(ros=1)
+        tf = m1.tf((9.9, "base_link", "cam", (1, 2, 3), IDENTITY))
+        entries = [("/tf_static", 9.9, tf), ("/d/depth/camera_info", 10.0, m1.camera_info(10.0))]
+        entries += [("/d/depth/image", at, m1.image(at, DEPTH + number, "16UC1")) for number, at in enumerate(stamps)]
+        path = write_bag(tmp_path / "b.bag", entries, ros=1)
+    else:
+        entries = [depth_entry(at, DEPTH + number) for number, at in enumerate(stamps)]
+        path = bag(tmp_path, TF, INFO, *entries, storage=storage)
+    left_out = LeftOut()
+    found = only(open_recording(path, left_out=left_out))
+    assert [int(item.image[0, 1]) - 300 for item in found] == [0, 1, 2, 3, 4, 6, 7, 8, 9]
+    assert [item.stamp for item in found] == pytest.approx([*np.arange(10.0, 10.45, 0.1), *np.arange(10.6, 10.95, 0.1)])
+    assert left_out.counts == {"with a stamp before the last one": 1} and len(left_out.notes) == 1

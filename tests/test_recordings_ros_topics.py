@@ -150,7 +150,7 @@ def test_a_topic_chosen_for_a_kind_is_guessed_for_no_other(tmp_path):
 @pytest.mark.parametrize("command", ["track", "info", "init", "ik", "live", "eval", "batch"])
 def test_every_command_that_reads_a_recording_has_its_options(tmp_path, command):
     if command == "batch":
-        pytest.importorskip("fsspec")
+        pytest.importorskip("distributed")
     path = bag(tmp_path, TF, INFO, depth_entry(10.2))
     how = {"track": ["--out", "x.csv"], "batch": ["--out", str(tmp_path / "o"), "--workers", "1"]}.get(command, [])
     options = ["--topic", "depth=/nowhere", "--option", "meters_per_unit=0.001", "--frame", "cam"]

@@ -16,6 +16,7 @@ from voodoo.export.people_files import save_people
 from voodoo.export.ros2 import person_id, write_bag
 from voodoo.export.track import Track
 from voodoo.export.urdf import urdf
+from voodoo.live.sinks.ros2 import FOLLOW
 from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track as run_track
 from voodoo.pipeline.start import start_tracker
@@ -106,7 +107,9 @@ def test_any_body_is_described():
 
 
 def test_the_display_of_rviz_names_what_is_published():
-    displays = yaml.safe_load((ROOT / "examples/voodoo.rviz").read_text())["Visualization Manager"]["Displays"]
+    manager = yaml.safe_load((ROOT / "examples/voodoo.rviz").read_text())["Visualization Manager"]
+    assert [tool["Topic"]["Value"] for tool in manager["Tools"] if "Topic" in tool] == [FOLLOW]
+    displays = manager["Displays"]
     topics = {display.get(key, {}).get("Value") for display in displays for key in ("Topic", "Description Topic")}
     body = f"/humans/bodies/{person_id(1)}"
     assert topics - {None} == {f"{body}/markers", f"{body}/pose", f"/human_description_{person_id(1)}"}

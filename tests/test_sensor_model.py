@@ -88,9 +88,8 @@ def test_world_rays_pass_through_the_point():
 
 def test_gate_opens_while_nothing_passes_and_closes_again():
     gate = SiteGate(radius=0.1, growth=1.0, widest=0.25)
-    at = np.zeros(3)
-    assert not gate.accepts_point("l_wrist", at, np.array([0.15, 0, 0]), 0.0)
-    assert gate.accepts_point("l_wrist", at, np.array([0.15, 0, 0]), 0.1)
-    assert not gate.accepts_point("l_wrist", at, np.array([0.15, 0, 0]), 0.11)
+    assert not gate.accepts("l_wrist", 0.15, 0.0, "points")
+    assert gate.accepts("l_wrist", 0.15, 0.1, "points")
+    assert not gate.accepts("l_wrist", 0.15, 0.11, "points")
     assert gate.limit("l_wrist", "points", 100.0) == 0.25
     assert gate.limit("r_wrist", "points", 0.1) == 0.1  # each site has its own

@@ -237,6 +237,19 @@ def test_damaged_images_of_a_folder_are_left_out(tmp_path):
         open_recording(path)
 
 
+def test_a_list_of_images_whose_clock_was_set_back_goes_on(tmp_path):
+    path = folder(tmp_path / "f", ["a", "b", "c", "d", "e"])
+    stamps = (100.0, 100.1, 50.0, 50.1, 50.2)
+    lines = (f"{stamp} depth/{name}.png\n" for stamp, name in zip(stamps, "abcde", strict=True))
+    (path / "depth.txt").write_text("".join(lines))
+    left_out = LeftOut()
+    recording = open_recording(path, left_out=left_out)
+    assert [frame.stamp for frame in recording] == pytest.approx([100.0, 100.1, 100.3, 100.4])
+    assert left_out.counts == {"with a stamp before the last one": 1}
+    (said,) = recording.assumed
+    assert "was set back from 100.100000 to 50.000000 s" in said and "moved on by 50.200000 s" in said
+
+
 def test_what_is_not_read_reports_what_to_do(tmp_path):
     for name, words in {
         "a.mkv": "an Azure Kinect",

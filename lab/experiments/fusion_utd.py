@@ -18,7 +18,7 @@ from voodoo.recordings import open_recording
 from voodoo.recordings.utd_mhad import CAMERA
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import world_rays
+from voodoo.sensors.pixels import ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
 from voodoo.sensors.settings import FrontEndSettings
 
@@ -67,7 +67,7 @@ def run(path: Path, *, rays: bool, solver: str) -> dict[str, float]:
                 )
                 for site, direction in zip(SITES, directions, strict=True)
                 if np.isfinite(direction).all()
-                and gate.accepts_ray(site, predicted[site], origin, direction, recorded.stamp, "rays")
+                and gate.accepts(site, float(ray_distance(origin, direction, predicted[site])), recorded.stamp, "rays")
             ]
             add_rays(frame, observed, model=model)
         estimate = tracker.step(frame)

@@ -14,8 +14,8 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     100)
     """
     min_change: float = 1e-07
-    """Convergence threshold: the steps end when the mean squared distance changes by less (K06 III-B step 6).
-    (unit: m^2; range: 0 to 1)
+    """Convergence threshold: the steps end when the mean squared distance changes by less (K06 III-B step 6;
+    limbwise solver). (unit: m^2; range: 0 to 1)
     """
     body_box_margin: float = 0.2
     """Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1). (unit: m;

@@ -723,7 +723,8 @@ class Estimate:
         """Time of the frame [s]; NaN after a reset and before the first one."""
     @property
     def status(self) -> str:
-        """One of four words: tracking; degraded (more than a quarter of the limbs are not measured); lost (hardly any limb is
+        """One of four words: tracking; degraded (more than a quarter of the limbs are not measured,
+        or a source's measurements are 15 cm from the pose, root mean square); lost (hardly any limb is
         measured, or the measured surface is flat); searching (there is no pose, because no person was detected)."""
     @property
     def steps(self) -> int:

@@ -275,7 +275,8 @@ config! {
     solver: SolverKind = SolverKind::Chain, "";
     /// Maximum number of ICP steps per frame (K07 section 7 recommends 6 of the published ones).
     max_steps: usize = 5, "", 1 ..= 100;
-    /// Convergence threshold: the steps end when the mean squared distance changes by less (K06 III-B step 6).
+    /// Convergence threshold: the steps end when the mean squared distance changes by less (K06 III-B step 6;
+    /// limbwise solver).
     min_change: f64 = 1e-7, "m^2", 0.0 ..= 1.0;
     /// Enlargement of the box around the whole body; free points outside are background (K06 IV-B.1).
     body_box_margin: f64 = 0.20, "m", 0.0 ..= 10.0;

@@ -112,7 +112,7 @@ def live_command(
     Faults of the source are reported there and counted.
 
     voodoo live ros2: prints the topics that are published, with type and rate. A message on /voodoo/reset (std_msgs/Empty)
-    forgets everybody and searches again.
+    forgets everybody and searches again; one on /voodoo/follow (geometry_msgs/PointStamped) chooses the person there.
 
     Examples
 

@@ -22,6 +22,7 @@ from voodoo.detectors import AnyDetector
 from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import instant
 from voodoo.export.spool import Spool
+from voodoo.export.upright import Turn
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.first_frame import FirstFrame
 from voodoo.live.follow import ONE, Follower, Step
@@ -232,10 +233,12 @@ class FileOutput(Output):
         """Make the folder of the poses."""
         self._spool = Spool(paths, root_frame=root_frame, several=several, together=_TOGETHER)
         self._several = several
+        self._turn: Turn | None = None
         self.written: list[Path] = []
 
     def publish(self, step: Step) -> None:
         """See Output."""
+        self._turn = step.turn
         self._spool.add(step.people if self._several else step.estimates[ONE], step.bodies)
 
     def close(self) -> None:
@@ -244,7 +247,7 @@ class FileOutput(Output):
         Raises:
             VoodooError: there were no frames, or a file cannot be written; names the folder that is kept then.
         """
-        self.written, failed = self._spool.write()
+        self.written, failed = self._spool.write(turn=self._turn)
         if failed:
             raise VoodooError("; ".join(map(reason, failed))) from failed[0]
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from voodoo.cli.common import progressing
+from voodoo.cli.common import print_message, progressing
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
@@ -193,6 +193,8 @@ def run(
     chosen = set(np.linspace(0, len(source) - 1, sheet).round().astype(int).tolist())
     rate = source.info().rate_hz
     writer = None if overlay is None else PictureWriter(overlay, rate_hz=rate if np.isfinite(rate) else 30.0)
+    if writer is not None and writer.note:
+        print_message(writer.note)
     drawing: list[Overlay] = []
 
     def drawn(step: Any) -> None:  # noqa: ANN401 - of one person or several

@@ -44,7 +44,7 @@ def info_command(
         with left_out.aside():
             depth = depth_range(source)
         images, damage = first_images(source)
-        notes = [*doubts(about, left_out), damage, "" if depth is None else depth.warning]
+        notes = [*doubts(about, left_out, images), damage, "" if depth is None else depth.warning]
         if as_json:
             print_json(
                 {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,6 +46,7 @@ from voodoo.cli.options import (
 from voodoo.cli.paths import check_paths
 from voodoo.cli.signals import INTERRUPTED, deferred
 from voodoo.errors import NoPoseError
+from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
     from voodoo.export.spool import Spool
@@ -170,7 +172,7 @@ def track_command(
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
     from voodoo.pipeline.people import track_people
     from voodoo.pipeline.run import track
-    from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
+    from voodoo.pipeline.start import AUTO, beginning_of, start_tracker, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
@@ -289,7 +291,9 @@ def track_command(
         told = height or getattr(beginning, "height_m", None)
         if told is None and beginning is None and source.start is not None:
             told = source.start.get("height_m")
-        for doubt in closing_doubts(spool.states, stature=size, told=told) if spool.found and not several else ():
+        # Frames before a given start are meant to be without a pose.
+        begun = spool.states - Counter({SEARCHING: 0 if beginning in (None, AUTO) else len(source)})
+        for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, spool, left_out)
 
@@ -306,9 +310,13 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         for reason, count in left_out.counts.items():
             first = left_out.first[reason]
             print_message(f"{source.name}: left out {count} {reason} (the first: {first}); --strict refuses them")
+        for note in left_out.notes:
+            print_message(f"{source.name}: {note}")
     if not {"tracking", "degraded"} & spool.states.keys():
         depth = depth_range(source)
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
     if not spool.found:
-        raise NoPoseError(f"{source.name}: nobody was found in {spool.frames} frames")
+        raise NoPoseError(
+            f"{source.name}: nobody was found in {spool.frames} frames; voodoo info doubts what is unlikely"
+        )

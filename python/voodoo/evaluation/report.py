@@ -57,9 +57,8 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
     text = []
     deviations = deviations_of(scores, tables)
     for summary in summarize(scores):
-        text += [
-            f"## Against {summary.kind}: {summary.sequences} sequences\n" if summary.sequences else "## Not tracked\n"
-        ]
+        count = f"{summary.sequences} sequence{'s' * (summary.sequences > 1)}"
+        text += [f"## Against {summary.kind}: {count}\n" if summary.sequences else "## Not tracked\n"]
         if summary.sequences:
             zero, one, two = summary.classes
             text += ["| | |", "|---|---|", f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |"]
@@ -113,7 +112,11 @@ def brief(scores: Sequence[Score]) -> str:
     for summary in summarize(scores):
         if summary.sequences:
             zero, one, two = summary.classes
-            text += [f"## Against {summary.kind}: {summary.sequences} sequences\n", "| | |", "|---|---|"]
+            text += [
+                f"## Against {summary.kind}: {summary.sequences} sequence{'s' * (summary.sequences > 1)}\n",
+                "| | |",
+                "|---|---|",
+            ]
             text += [f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |"]
             text += [
                 f"| {words} | {_word(summary.means[name], form)} |" for name, words, form in _LINES if name in _BRIEF

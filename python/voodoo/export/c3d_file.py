@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -39,5 +40,6 @@ def write_c3d(path: str | Path, track: Track) -> None:
     nothing = np.empty((0, 0), dtype=np.float32)
     for frame in points:
         writer.add_frames((frame, nothing))
-    with Path(path).open("wb") as file:
+    with Path(path).open("wb") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the library, where there are no forces
         writer.write(file)

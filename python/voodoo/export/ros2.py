@@ -358,6 +358,7 @@ def instant(
     root_frame: str,
     person: str,
     markers: bool = True,
+    turn: Turn | None = None,
     posed: tuple[Track, Skeleton] | None = None,
 ) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
@@ -365,9 +366,10 @@ def instant(
     Args:
         estimate: of the frame; without a pose (status "searching") there are no transforms and no joint states.
         body: in its current sizes.
-        root_frame: frame of the estimate; if it is an optical frame by its name, see `write_bag`.
+        root_frame: frame of the estimate; if it is turned, see `write_bag`.
         person: REP-155 id.
         markers: also make the markers.
+        turn: see `write_bag`.
         posed: track and skeleton of the frame, already upright, if they are known.
 
     Raises:
@@ -375,7 +377,7 @@ def instant(
     """
     # Angles are not needed; if nobody was found, the names come from the body.
     track, bones = posed or (Track.of([estimate], body=None if estimate.joints else body), None)
-    human = _Human(track, body, person, root_frame, posed=bones)
+    human = _Human(track, body, person, root_frame, turn, bones)
     return human.messages(0, markers=markers)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, a_path, reading, reason
+from voodoo.errors import NoPoseError, VoodooError, a_path, reading, reason
 from voodoo.export.cut_off import complete
 from voodoo.export.files import FORMATS, STDOUT, check_target, is_table, on_stdout, save, written
 from voodoo.export.people import PeopleTrack
@@ -173,7 +173,7 @@ class Spool:
         """
         if not self.frames:
             self._hidden.remove()
-            raise VoodooError("expected at least one frame to write, found none")
+            raise NoPoseError("expected at least one frame to write, found none")
         failing: list[Path] = []
         contents = self._contents()
         self._turn = turn

@@ -6,20 +6,28 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from voodoo._core import Estimate
+import numpy as np
+
+from voodoo._core import Detector, Estimate
 from voodoo.errors import VoodooError
+from voodoo.export.upright import Turn
 from voodoo.live.assembly import LiveFrame
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate, Person
+from voodoo.pipeline.floor import detections
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.people import PeopleFrontEnd
 from voodoo.pipeline.run import decodable
+from voodoo.pipeline.starts.base import FoundStart
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
 GONE_S = 5.0
 """After this time without a frame, persons are treated as new, with their own sizes."""
+NEAR_M = 1.0
+"""A person is chosen by a place that is at most this far from the nearest joint."""
 ONE = 1
 """Number of the person if only one is tracked."""
 
@@ -34,6 +42,7 @@ class Step:
         bodies: person number -> body, with current sizes.
         seconds: duration of tracking [s].
         front_end: for a single person: the front end that made the tracker's frame.
+        turn: how outputs turn the root frame upright; None: by its axes if it is an optical frame by its name.
     """
 
     frame: LiveFrame
@@ -41,6 +50,7 @@ class Step:
     bodies: Mapping[int, Body]
     seconds: float
     front_end: FrontEnd | None = None
+    turn: Turn | None = None
 
     @property
     def stamp(self) -> float:
@@ -109,6 +119,33 @@ class Follower:
         self._most = max(self._most, *numbers.values(), 0)
         bodies = {numbers[person.id]: self._all.people.body(person.id) for person in estimate}
         return {numbers[person.id]: person.estimate for person in estimate}, bodies
+
+    def choose(self, frame: LiveFrame, place: FloatArray) -> str:
+        """Follow only the person at a place (3,) [m] in the root frame from now on; returns who that is.
+
+        Of several persons it is one of those who are tracked; a single person is searched for in the depth images of `frame`.
+
+        Raises:
+            VoodooError: nobody is within NEAR_M of the place, or the body is no person's; the state is unchanged.
+        """
+        if self._all is not None:
+            tracked = [person for person in self._all.people.estimate if person.estimate.joints]
+            bodies = [person.estimate.joints for person in tracked]
+        else:
+            bodies = [found.joints for found in detections(Detector(), frame)]
+        away = [float(np.linalg.norm(np.array(list(body.values())) - place, axis=1).min()) for body in bodies]
+        if not away or not min(away) < NEAR_M:
+            raise VoodooError(f"expected somebody within {NEAR_M:g} m of {np.round(place, 2).tolist()}, found nobody")
+        chosen = int(np.argmin(away))
+        if self._all is not None:
+            self._all.people.only(tracked[chosen].id)
+            return f"person {self._numbers + tracked[chosen].id} only"
+        assert self._one is not None
+        self._one.tracker.reset(joints={name: tuple(at) for name, at in bodies[chosen].items()})
+        self._one = FrontEnd(self._one.tracker, settings=self._settings)
+        # Found, not given: one who leaves is searched for.
+        self._one.search.found = FoundStart(bodies[chosen], {}, "follow")
+        return f"the person {away[chosen]:.2f} m from there"
 
     def restart(self, *, back: bool, gone: bool) -> None:
         """Continue after a break in the frames.

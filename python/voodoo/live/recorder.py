@@ -67,7 +67,8 @@ class Recorder(Output):
             self._write_item(item)
         for number, estimate in step.estimates.items():
             person = person_id(number)
-            messages = instant(estimate, step.bodies[number], root_frame=self._root(), person=person)
+            how: Any = {"root_frame": self._root(), "person": person, "turn": step.turn}
+            messages = instant(estimate, step.bodies[number], **how)
             if estimate.joints and person not in self._described:
                 messages |= description(step.bodies[number], person)
                 self._described.add(person)

@@ -7,7 +7,10 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from voodoo.errors import VoodooError, reason
 from voodoo.live.assembly import LiveFrame
@@ -15,6 +18,8 @@ from voodoo.live.follow import Follower, Step, without_damaged
 from voodoo.live.latencies import Latencies
 from voodoo.live.mailbox import Mailbox
 from voodoo.live.stream import Live
+from voodoo.live.upright import Upright
+from voodoo.measurements import FloatArray
 
 _TICK_S = 0.05
 _RATE_S = 2.0
@@ -37,6 +42,7 @@ class Output(ABC):
         receiver: it sends to programs that may be slow, hang or be gone: the session names that once, neither waits for it nor
             ends with it, and goes on when it takes poses again.
         on_reset: lets everybody be searched for again; set by the session.
+        on_choice: lets only the person at a place be followed, see `Session.choose`; set by the session.
     """
 
     name: str
@@ -44,6 +50,7 @@ class Output(ABC):
     waiting: int = 1
     receiver: bool = False
     on_reset: Callable[[], None] | None = None
+    on_choice: Callable[[str, FloatArray], None] | None = None
 
     @abstractmethod
     def publish(self, step: Step) -> None:
@@ -157,10 +164,11 @@ class Session:
         self.live = live
         self.latency, self.tracking = Latencies(), Latencies()
         self.published = self.with_pose = self.refused = 0
-        self._make = follower
+        self._make, self._upright = follower, Upright(live)
         self._is_reset = threading.Event()
+        self._choices: deque[tuple[str, FloatArray]] = deque(maxlen=1)
         for output in outputs:
-            output.on_reset = self.reset
+            output.on_reset, output.on_choice = self.reset, self.choose
         self._last: Step | None = None
         self._times: deque[float] = deque(maxlen=512)
         self._began = live.clock.now()
@@ -184,20 +192,34 @@ class Session:
                     self._is_reset.clear()
                     follower.restart(back=True, gone=True)
                     self.live.faults.log("reset: everybody is looked for again")
+                if self._choices:
+                    self._choose(follower, frame, *self._choices.popleft())
                 step = self._step(follower, frame)
                 if step is not None:
                     self.tracking.add(step.seconds)
+                    step = replace(step, turn=self._upright.of(step))
                     for lane in self._lanes:
                         lane.box.put(step)
         except BaseException as error:
             self._error = error
             self.live.stop()
 
+    def _choose(self, follower: Follower, frame: LiveFrame, name: str, place: FloatArray) -> None:
+        try:
+            here = name in ("", self.live.root_frame)
+            pose = np.eye(4) if here else self.live.root_from(name, frame.stamp)
+            if pose is None:
+                raise VoodooError(f"expected a frame that is known, found {name!r}")
+            self.live.faults.log(f"follow: {follower.choose(frame, pose[:3, :3] @ place + pose[:3, 3])}")
+        except VoodooError as error:
+            self.live.faults.log(f"follow: {error}")
+
     def _step(self, follower: Follower, frame: LiveFrame) -> Step | None:
         faults, clock = self.live.faults, self.live.clock
         try:
             return follower.step(frame)
-        except VoodooError:
+        except VoodooError as refusal:
+            error = refusal
             kept, damaged = without_damaged(frame)
             for problem in damaged:
                 faults.add_error(problem, clock.now(), "damaged picture")
@@ -222,6 +244,10 @@ class Session:
     def reset(self) -> None:
         """Forget everybody before the next frame, and search again."""
         self._is_reset.set()
+
+    def choose(self, frame: str, place: FloatArray) -> None:
+        """Follow only the person at a place (3,) [m] in a frame ("": the root frame) from the next frame on."""
+        self._choices.append((frame, place))
 
     # What is known
 

@@ -71,7 +71,9 @@ class PeopleOwn:
         pictured = [item for item in used if isinstance(item, ColorImage) and self.skin]
         depths = [item for item in used if isinstance(item, DepthImage)]
         self._cameras.update(item.sensor for item in images)
-        predicted = {number: Followed(self._people, number).predict(stamp) for number in self._persons}
+        # `People.only` lets go of persons between two frames.
+        kept = [number for number in self._persons if self._people._core.estimate(number) is not None]
+        predicted = {number: Followed(self._people, number).predict(stamp) for number in kept}
         assigned = [assign_keypoints(item, predicted) for item in images]
         pictures = {number: [each.of[number] for each in assigned if number in each.of] for number in predicted}
         for number, joints in self._come(stamp, [each.rest for each in assigned], predicted).items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import io
 import os
 from collections.abc import Collection, Iterator
@@ -18,6 +17,7 @@ from rosbags.rosbag2.reader import DirectoryReader
 
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings.mcap_file import DAMAGED, Item, McapFile, is_plain_yaml
+from voodoo.recordings.set_back import falls
 from voodoo.recordings.sqlite_file import SqliteFile
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored, read_stored_text
 from voodoo.unpacking import Unpacking, count_zstd
@@ -39,7 +39,7 @@ class BagFile(Protocol):
         """Times and number of messages."""
 
     def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:
-        """Messages in the order of their time."""
+        """Messages in the order of their time, or as they were written if the clock was set back."""
 
 
 def bag_file(path: Path, unpacking: Unpacking) -> Any:  # noqa: ANN401 - rosbags declares other messages
@@ -93,19 +93,20 @@ class Ros1File(Reader):
     def messages(  # type: ignore[override]
         self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """Messages in the order of their time."""
+        """See BagFile.messages."""
         first = -1 if start is None else start
-        entries = [
-            [(entry.time, entry, one) for entry in self.indexes[one.id] if first <= entry.time] for one in connections
-        ]
-        for time, entry, one in heapq.merge(*entries, key=lambda item: item[0]):
+        entries = [(entry, one) for one in connections for entry in self.indexes[one.id] if first <= entry.time]
+        entries.sort(key=lambda item: (item[0].chunk_pos, item[0].offset))
+        if not falls((one.id, entry.time) for entry, one in entries):
+            entries.sort(key=lambda item: item[0].time)
+        for entry, one in entries:
             data: bytes | RecordingError
             try:
                 with reading(self.path, f"a sound chunk at byte {entry.chunk_pos}"):
                     data = self._message(entry)
             except RecordingError as error:
                 data = RecordingError(str(error), reason=DAMAGED)
-            yield one, time, data
+            yield one, entry.time, data
 
     def _message(self, entry: IndexData) -> bytes:
         if self._last[0] != entry.chunk_pos:

@@ -46,7 +46,7 @@ class FolderCalibration:
 _TEMPLATE = """\
 width = {width}
 height = {height}
-fx = 525.0              # pixels: focal lengths and principal point of this camera, from its maker's tools
+fx = 525.0              # pixels, from the maker's tools; by the field of view F across: width / (2 tan(F / 2))
 fy = 525.0
 cx = {cx}
 cy = {cy}

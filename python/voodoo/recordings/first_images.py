@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -14,6 +15,8 @@ from voodoo.recordings.recording import Recording, RecordingInfo
 
 _FRAMES = 10
 """Frames in which the first images are looked for."""
+_LEAST_DEG, _MOST_DEG = 30.0, 150.0
+"""Fields of view that depth cameras have."""
 FIXED_FRAMES = ("odom", "map", "world")
 """Root frames that stay where they are while a robot drives."""
 
@@ -77,11 +80,20 @@ def _of(item: DepthImage | ColorImage) -> FirstImage:
     )
 
 
-def doubts(about: RecordingInfo, left_out: LeftOut) -> list[str]:
+def doubts(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage] = ()) -> list[str]:
     """What is not right with a recording, after its first images were read."""
     found = [f"left out {count} {reason}: {left_out.first[reason]}" for reason, count in left_out.counts.items()]
+    found += left_out.notes
+    for image in images:
+        across, down = image.field_of_view
+        if image.meters_per_unit is not None and not _LEAST_DEG < across < _MOST_DEG:
+            words = f"{image.sensor} sees {across:.0f} x {down:.0f} deg by its calibration, and depth cameras 40 to 120"
+            found.append(f"{words}: are its focal lengths right?")
     if about.duration < 0.0:
-        found.append(f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first")
+        found.append(
+            f"its time goes backwards: the last frame is {-about.duration:.3f} s before the first; voodoo track "
+            "moves stamps on where a clock was set back"
+        )
     lasers = [sensor.name for sensor in about.sensors if sensor.kind in ("scan", "points")]
     if lasers and about.root_frame not in FIXED_FRAMES and not about.camera_root:
         found.append(

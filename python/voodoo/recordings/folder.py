@@ -24,6 +24,7 @@ from voodoo.recordings.recording import (
     number_option,
     refuse_blank,
 )
+from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.truth import read_start, read_truth
 from voodoo.stored import read_stored, read_stored_text
 
@@ -100,7 +101,8 @@ class FolderRecording(Recording):
         clock = FrameClock(
             None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
         )
-        self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out)
+        set_back = SetBack()
+        self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)
         if not self._depth:
             raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
         file = path / "calibration.toml" if calibration is None else Path(calibration)
@@ -115,8 +117,8 @@ class FolderRecording(Recording):
             if self._calibration.color is None:
                 self._unused = (("rgb", "no [color] table in the calibration file"),)
             else:
-                self._color = _listing(path, "rgb", _PICTURES, clock, left_out)
-        self.assumed = tuple(clock.notes)
+                self._color = _listing(path, "rgb", _PICTURES, clock, left_out, set_back)
+        self.assumed = (*clock.notes, *set_back.words)
 
     def _read_beside(self) -> None:
         start, truth = self.path / "init.json", self.path / "truth.csv"
@@ -221,7 +223,7 @@ def depth_files(path: Path) -> list[Path]:
 
 
 def _listing(
-    path: Path, name: str, suffixes: tuple[str, ...], clock: FrameClock, left_out: LeftOut | None
+    path: Path, name: str, suffixes: tuple[str, ...], clock: FrameClock, left_out: LeftOut | None, set_back: SetBack
 ) -> list[tuple[float, Path]]:
     """(stamp, file) pairs of NAME.txt if it exists, else of the files in NAME/."""
     table = path / f"{name}.txt"
@@ -241,8 +243,10 @@ def _listing(
         files = [file for file in files if file.suffix.lower() in suffixes]
         entries = sorted(zip(clock.of(files), files, strict=True))
     rising = entries[:1]
-    for number, (stamp, file) in enumerate(entries):
-        if number and stamp <= rising[-1][0]:
+    for number, (written, file) in enumerate(entries):
+        moved = written if left_out is None else set_back.of(name, written)
+        stamp = written if moved is None else moved
+        if number and (moved is None or stamp <= rising[-1][0]):
             reason = "with a repeated stamp" if stamp == rising[-1][0] else "with a stamp before the last one"
             error = RecordingError(
                 f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}", reason=reason

@@ -16,6 +16,7 @@ class LeftOut:
     Attributes:
         counts: reason -> number.
         first: reason -> description of the first one.
+        notes: what else to know, each once.
         numbers: (sensor, stamp) -> index of that message among those of the sensor, for data that is paired by index.
     """
 
@@ -23,6 +24,7 @@ class LeftOut:
         """Start with no counts."""
         self.counts: dict[str, int] = {}
         self.first: dict[str, str] = {}
+        self.notes: dict[str, None] = {}
         self.numbers: dict[tuple[str, float], int] = {}
 
     def add(self, reason: str, words: object, count: int = 1) -> None:

@@ -110,7 +110,7 @@ def open_recording(
     """Open a recording.
 
     Args:
-        path: file or folder.
+        path: file or folder; of a folder with one .mkv and neither folders nor calibration, the .mkv.
         loader: name in LOADERS; guessed from the path when None.
         bare: leave out first pose, truth and reference, and read none of the files beside the recording that hold them.
         left_out: counts unusable measurements (repeated, late or undecodable images), which are left out; None: they are errors.
@@ -125,6 +125,9 @@ def open_recording(
         raise RecordingError(f"loader {loader!r}: expected one of {', '.join(LOADERS)}")
     if not path.exists():
         raise RecordingError(f"{path}: expected a recording, found no such file or folder")
+    if loader is None and path.is_dir() and len(films := list(path.glob("*.mkv"))) == 1:
+        beside = any(part.is_dir() or part.suffix == ".toml" for part in path.iterdir())
+        path = path if beside else films[0]
     name = guess_loader(path) if loader is None else loader
     known = options_of(name)
     if bare and "bare" in known:

@@ -15,7 +15,7 @@ from voodoo.model.body import Body
 from voodoo.model.joint import short
 from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
-from voodoo.recordings.marker_trajectories import Z_UP_FROM, read_markers
+from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
 from voodoo.recordings.pose2sim import SITES
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
 
@@ -45,8 +45,8 @@ class MarkerMap(BaseModel):
         sites: marker name -> site name. Markers named like a site of the default human need no entry, nor do
             Pose2Sim's.
         limbs: marker name -> its place on a limb; it becomes a new site.
-        y_up: the file's axes are OpenSim's (Y up) and are turned to z up; False keeps them; None: as a .c3d says (Y_SCREEN), else
-            OpenSim's.
+        y_up: the file's axes are OpenSim's (Y up) and are turned to z up; False keeps them; None: as a .c3d says (Y_SCREEN; with
+            X_SCREEN only, the axis across it along which the body stands), else OpenSim's.
         sigma_m: standard deviation of a marker's position [m].
     """
 
@@ -95,8 +95,6 @@ class MarkerRecording(Recording):
         self.path, self.name, self.root_frame = path, path.stem, FRAME
         self.map = markers or MarkerMap()
         content = read_markers(path)
-        told = self.map.y_up is not None or content.up is not None
-        self._up = (content.up or "+Y") if self.map.y_up is None else "+Y" if self.map.y_up else "+Z"
         names = (
             {name: name for name in Body.human(model="full").site_names}
             | SITES
@@ -104,6 +102,11 @@ class MarkerRecording(Recording):
             | {name: name for name in self.map.limbs}
         )
         sites, positions = content.of(names)
+        self._likely = standing_along(sites, positions)
+        if self.map.y_up is None:
+            self._up, half_told = self._up_of(content)
+        else:
+            self._up, half_told = "+Y" if self.map.y_up else "+Z", ()
         self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
         unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
@@ -115,7 +118,8 @@ class MarkerRecording(Recording):
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
         self.start = None if bare or not first else start
         self.reference = None
-        self.assumed = (*content.remarks, *self._unnamed(content.names), *(() if told else self._doubts(positions)))
+        doubts = self._doubts() if self.map.y_up is None else ()
+        self.assumed = (*content.remarks, *half_told, *self._unnamed(content.names), *doubts)
 
     def _at(self, index: int) -> dict[str, FloatArray]:
         rows = zip(self._sites, self._positions[index], strict=True)
@@ -128,16 +132,28 @@ class MarkerRecording(Recording):
         words = f"no marker is named like a site (l_wrist, ...): {shortened(', '.join(names))}"
         return (f'{self.path.name}: {words}; name their sites for --marker-map: [sites] "{names[0]}" = "l_wrist", ...',)
 
-    def _doubts(self, positions: FloatArray) -> tuple[str, ...]:
+    def _up_of(self, content: MarkerTrajectories) -> tuple[str, tuple[str, ...]]:
+        """The axis of the file that is taken for up, and what to know about it."""
+        if content.up or not content.right:
+            return content.up or "+Y", ()
+        level = content.right[1]
+        standing = self._likely if self._likely and self._likely[1] != level else ""
+        up = standing or ("+Z" if level == "Y" else "+Y")
+        why = "along which the body stands" if standing else "a guess"
+        words = f"X_SCREEN without Y_SCREEN says only that {level} is level; {up} is taken for up, {why}"
+        return up, (f"{self.path.name}: {words}",)
+
+    def _doubts(self) -> tuple[str, ...]:
         """What speaks against the axis that is taken for up."""
-        likely = standing_along(self._sites, positions)
+        likely = self._likely
         heights = self._positions[..., 2][np.isfinite(self._positions[..., 2])]
         if likely in ("", self._up):
             if not {"l_ankle", "r_ankle"} & set(self._sites) or not heights.size or heights.min() < _HIGH_M:
                 return ()
             words = f"{self._up} of the file is taken for up, and no marker is lower than {heights.min():.1f} m"
             return (f"{self.path.name}: {words}; are axes and unit right?",)
-        remedy = "y_up = false in a --marker-map keeps the axes" if likely == "+Z" else "exchange the axes of the file"
+        y_up = {"+Y": "true", "+Z": "false"}.get(likely)
+        remedy = f"y_up = {y_up} in a --marker-map says so" if y_up else "exchange the axes of the file"
         words = f"{self._up} of the file is taken for up, but the body stands along its {likely}"
         return (f"{self.path.name}: {words}; if that is up, {remedy}",)
 

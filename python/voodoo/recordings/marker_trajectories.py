@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -49,6 +49,7 @@ class MarkerTrajectories:
         positions: (F, M, 3) [m]; NaN = missing, as are empty cells and exact zeros of the file.
         rate_hz: nominal rate [Hz].
         up: the axis that points up, a key of Z_UP_FROM, if the file says so.
+        right: the horizontal axis to the right of its screen, if the file says so.
         remarks: what is unusual about the file.
     """
 
@@ -57,6 +58,7 @@ class MarkerTrajectories:
     positions: FloatArray
     rate_hz: float
     up: str | None = None
+    right: str | None = None
     remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -190,9 +192,7 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
         written = reader.get("POINT:UNITS")
         unit = "mm" if written is None else _one_unit(str(written.string_value))
         rate, first = float(reader.point_rate), int(reader.first_frame)
-        screen = reader.get("POINT:Y_SCREEN")
-        up = "" if screen is None else str(screen.string_value).strip().upper()
-        up = up if up[:1] in ("+", "-") else f"+{up}"
+        right, up = (_axis(reader.get(f"POINT:{screen}_SCREEN")) for screen in "XY")
     count = len(frames[0]) if frames else 0
     names = names[:count]
     if not count or unit not in _METERS or not 0.0 < rate < math.inf or len(set(names)) != count:
@@ -205,7 +205,18 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not observed
     stamps = (first + np.arange(len(table))) / rate
     found = _trajectories(path, stamps, names, positions, rate, world_from_file)
-    return replace(found, up=up if up in Z_UP_FROM else None)
+    if right and up and right[1] == up[1]:
+        return replace(
+            found, remarks=(f"{path.name}: X_SCREEN {right} and Y_SCREEN {up} are the same axis, and not used",)
+        )
+    return replace(found, up=up, right=right)
+
+
+def _axis(screen: Any) -> str | None:  # noqa: ANN401 - of a library without types
+    """The axis of a parameter like Y_SCREEN, a key of Z_UP_FROM; None: not given, or no axis."""
+    word = "" if screen is None else str(screen.string_value).strip().upper()
+    word = word if word[:1] in ("+", "-") else f"+{word}"
+    return word if word in Z_UP_FROM else None
 
 
 def _trajectories(

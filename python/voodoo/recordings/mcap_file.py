@@ -16,6 +16,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader
 
 from voodoo.errors import RecordingError, reading
+from voodoo.recordings.set_back import BACK_S, falls
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
 
@@ -71,7 +72,7 @@ class McapFile(McapReader):
     def messages(  # type: ignore[override]
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """Messages in the order of their time."""
+        """Messages in the order of their time, or as they were written if the clock was set back."""
         if not self.chunks:
             self._refuse_unindexed()
             yield from super().messages(connections, start, stop)
@@ -81,18 +82,31 @@ class McapFile(McapReader):
         wanted = {item.id: item for item in connections}
         first = -1 if start is None else start
         # The first item of every chunk is its start, so that a chunk is unpacked only when its time has come.
+        is_back = self._is_back(wanted)
         sources = [
-            self._of_chunk(chunk, wanted, first)
-            for chunk in self.chunks
+            self._of_chunk(chunk, wanted, first, as_written=is_back)
+            for chunk in sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
             if first <= chunk.message_end_time
             and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
         ]
-        for _, _, item in heapq.merge(*sources, key=lambda entry: entry[:2]):
+        for _, _, item in itertools.chain(*sources) if is_back else heapq.merge(*sources, key=lambda entry: entry[:2]):
             if item is not None:
                 yield item
 
+    def _is_back(self, wanted: Collection[int]) -> bool:
+        """Whether the clock of the recorder was set back; chunks are unpacked only where times of two are apart."""
+        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
+        apart = [before.message_end_time - chunk.message_start_time for before, chunk in itertools.pairwise(chunks)]
+        if apart and max(apart) < BACK_S * 1e9:
+            return False
+        try:
+            read = (entry for chunk in chunks for entry in _messages(self._content(chunk)))
+            return falls((one, time) for one, time, _ in read if one in wanted)
+        except Exception:
+            return False  # the damage is told where the messages are read
+
     def _of_chunk(
-        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int
+        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int, *, as_written: bool
     ) -> Iterator[tuple[int, int, Item | None]]:
         yield chunk.message_start_time, 0, None
         found: list[tuple[int, int, bytes]] = []
@@ -104,7 +118,8 @@ class McapFile(McapReader):
                         found.append((time, one, data))
         except RecordingError as error:
             lost = RecordingError(str(error), reason=DAMAGED)
-        found.sort(key=lambda entry: entry[0])
+        if not as_written:
+            found.sort(key=lambda entry: entry[0])
         for time, one, data in found:
             yield time, chunk.chunk_start_offset, (wanted[one], time, data)
         if lost is None:

@@ -38,6 +38,7 @@ from voodoo.recordings.ros_messages import (
     stamp_of,
 )
 from voodoo.recordings.ros_topics import COMPRESSED, TopicChoice, TopicFinder, TopicSource
+from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import together
 from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
@@ -127,7 +128,8 @@ class RosRecording(Recording):
         self._unused = finder.unused
         self._units = {s.topic: self._unit(s.topic, scale, given=meters_per_unit is not None) for s in sources}
         self._float_unit = 1.0 if meters_per_unit is None else scale
-        self._tree = TransformTree(path, max_age=max_age)
+        self._set_back = SetBack()
+        self._tree = TransformTree(path, max_age=max_age, set_back=self._set_back)
         self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
         self._sources = {s.topic: s for s in sources if self._connected(s, optional=color_topic is None)}
@@ -162,6 +164,7 @@ class RosRecording(Recording):
         """All used measurements, in the order of recording."""
         infos = {source.info_topic for source in self._sources.values() if source.info_topic is not None}
         last: dict[str, float] = {}
+        clock = SetBack(self._set_back)
         numbers = dict.fromkeys(self._sources, -1)
         for topic, message in self._bag.read([*self._sources, *infos]):
             if topic in infos:
@@ -170,7 +173,7 @@ class RosRecording(Recording):
                 continue
             numbers[topic] += 1
             try:
-                measured = None if message is None else self._measured(topic, message, last)
+                measured = None if message is None else self._measured(topic, message, last, clock)
             except RecordingError as error:
                 if self._left_out is None:
                     raise
@@ -180,15 +183,18 @@ class RosRecording(Recording):
                 continue
             if self._left_out is not None:
                 self._left_out.numbers[topic, measured.stamp] = numbers[topic]
+                self._left_out.notes |= dict.fromkeys(clock.words)
             yield measured
 
-    def _measured(self, topic: str, message: Message, last: dict[str, float]) -> Measurement:
+    def _measured(self, topic: str, message: Message, last: dict[str, float], clock: SetBack) -> Measurement:
         """The measurement of a message that is not older than the `last` of its topic."""
         where = f"{self.path}, topic {topic}"
         with reading(where, "a readable message"):
-            stamp = stamp_of(message, where)
+            written = stamp_of(message, where)
+            moved = written if self._left_out is None else clock.of(topic, written)
+            stamp = written if moved is None else moved
             before = last.get(topic, -math.inf)
-            if stamp < before or (stamp == before and self._left_out is not None):
+            if moved is None or stamp < before or (stamp == before and self._left_out is not None):
                 raise RecordingError(
                     f"{where}: expected rising stamps, found {stamp:.6f} after {before:.6f}",
                     reason="with a repeated stamp" if stamp == before else "with a stamp before the last one",

@@ -17,6 +17,7 @@ from rosbags.rosbag2.metadata import ReaderMetadata
 
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings.mcap_file import Item
+from voodoo.recordings.set_back import falls
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 
 _HOT_JOURNAL = bytes.fromhex("d9d505f920a163d7")
@@ -191,14 +192,16 @@ class SqliteFile:
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """Messages in the order of their time; those in a damaged part of the file are errors."""
+        """See BagFile.messages; those in a damaged part of the file are errors."""
         wanted = {item.id: item for item in connections}
         places = ",".join("?" * len(wanted))
-        order = self._rows(
-            "SELECT rowid, topic_id, timestamp FROM messages "
-            f"WHERE topic_id IN ({places}) AND timestamp >= ? ORDER BY timestamp, rowid",
+        rows = self._rows(
+            f"SELECT rowid, topic_id, timestamp FROM messages WHERE topic_id IN ({places}) AND timestamp >= ?",
             (*wanted, -(2**63) if start is None else start),
         )
+        order = sorted(rows)
+        if not falls((topic, time) for _, topic, time in order):
+            order.sort(key=lambda row: row[2])
         for row, topic, time in order:
             yield wanted[topic], time, self._data(row)
 

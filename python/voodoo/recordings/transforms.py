@@ -13,6 +13,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.rotations import turned_between
 from voodoo.recordings.ros_messages import Message
+from voodoo.recordings.set_back import SetBack
 
 WAVERS_M, WAVERS_RAD = 0.05, math.radians(2.0)
 """A robot whose odometry stays within these limits is standing: they cover the drift of odometry in a recording."""
@@ -101,10 +102,12 @@ class TransformTree:
     Args:
         source: name of the recording in errors.
         max_age: [s].
+        set_back: moves stamps on where the clock was set back; None: they are as they come.
     """
 
-    def __init__(self, source: object, *, max_age: float) -> None:
+    def __init__(self, source: object, *, max_age: float, set_back: SetBack | None = None) -> None:
         """Start without frames."""
+        self._set_back = set_back
         self.source = source
         self.max_age = max_age
         self._edges: dict[tuple[str, str], _Edge] = {}
@@ -124,7 +127,9 @@ class TransformTree:
                 raise RecordingError(f"{where}: expected two different frame names")
             stamp = float(item.header.stamp.sec) + float(item.header.stamp.nanosec) * 1e-9
             transform = matrix(item.transform.translation, item.transform.rotation, where)
-            self.add_edge(parent, child, stamp, transform, static=static)
+            moved = stamp if static or self._set_back is None else self._set_back.of(f"{parent} {child}", stamp)
+            if moved is not None:
+                self.add_edge(parent, child, moved, transform, static=static)
 
     def add_edge(self, parent: str, child: str, stamp: float, transform: FloatArray, *, static: bool) -> None:
         """Add parent_from_child (4, 4) at a stamp [s]."""

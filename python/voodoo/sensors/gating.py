@@ -5,11 +5,8 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass, field
 
-import numpy as np
-
 import voodoo._core as _core
 from voodoo.errors import MeasurementError
-from voodoo.sensors.pixels import FloatArray, ray_distance
 
 
 @dataclass
@@ -51,18 +48,6 @@ class SiteGate:
     def limit(self, site: str, source: str, stamp: float) -> float:
         """Radius [m] of a site's gate at `stamp` [s]."""
         return self.core.limit(site, source, stamp)
-
-    def accepts_ray(
-        self, site: str, predicted: FloatArray, origin: FloatArray, direction: FloatArray, stamp: float, source: str
-    ) -> bool:
-        """Whether a ray (unit direction) passes near enough to the predicted site (3,)."""
-        return self.accepts(site, float(ray_distance(origin, direction, predicted)), stamp, source)
-
-    def accepts_point(
-        self, site: str, predicted: FloatArray, point: FloatArray, stamp: float, source: str = "points"
-    ) -> bool:
-        """Whether a point (3,) is near enough to the predicted site."""
-        return self.accepts(site, float(np.linalg.norm(point - predicted)), stamp, source)
 
     def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool:
         """Whether a measurement this far [m] from the predicted site is near enough."""

@@ -11,6 +11,7 @@ from types import TracebackType
 import cv2
 
 from voodoo.errors import VoodooError, utf8_name
+from voodoo.visualization.film import NOT_IN_BROWSERS, Film, codec_for_browsers, film
 from voodoo.visualization.ink import Picture
 from voodoo.whole import appearing_whole, check_disk
 
@@ -31,6 +32,7 @@ class PictureWriter:
 
     Attributes:
         failure: why images are missing; None if there are all.
+        note: what to know about a film; "" if nothing.
 
     Raises:
         VoodooError: a suffix of another video or image format, a name that is not UTF-8, or a folder with other files.
@@ -44,7 +46,8 @@ class PictureWriter:
         self._path = path
         self._rate_hz = rate_hz
         self._is_film = path.suffix.lower() == ".mp4"
-        self._film: cv2.VideoWriter | None = None
+        self._film: Film | None = None
+        self.note = f"{path} {NOT_IN_BROWSERS}" if self._is_film and codec_for_browsers() is None else ""
         self._count = 0
         self._appearing = ExitStack()
         self._place = path
@@ -71,7 +74,7 @@ class PictureWriter:
                 else:
                     self._place.mkdir()
             if self._film is not None:
-                self._film.write(picture)  # which does not tell that the disk is full
+                self._film.write(picture)  # OpenCV does not tell that the disk is full
                 if shutil.disk_usage(self._place.parent).free < _LEAST_FREE:
                     check_disk(self._place.parent)
             else:
@@ -89,12 +92,12 @@ class PictureWriter:
     ) -> None:
         """Close the video and, without an error, check that it can be read."""
         if self._film is not None:
-            self._film.release()
-            if error is None and self.failure is None:
-                try:
+            try:
+                self._film.release()
+                if error is None and self.failure is None:
                     self._check()
-                except Exception as failure:
-                    self.failure = failure
+            except Exception as failure:
+                self.failure = self.failure or failure
         problem = error or self.failure
         try:
             self._appearing.__exit__(None if problem is None else type(problem), problem, None)
@@ -102,21 +105,20 @@ class PictureWriter:
             if error is None:
                 self.failure = failure  # which names the film
 
-    def _open(self, picture: Picture) -> cv2.VideoWriter:
-        height, width = picture.shape[:2]
-        film = cv2.VideoWriter(str(self._place), cv2.VideoWriter.fourcc(*"mp4v"), self._rate_hz, (width, height))
-        if not film.isOpened():
+    def _open(self, picture: Picture) -> Film:
+        try:
+            return film(self._place, picture.shape, rate_hz=self._rate_hz)
+        except VoodooError:
             check_disk(self._place.parent)
-            raise VoodooError(f"{self._path}: expected a file that can be written as MPEG-4, found that OpenCV cannot")
-        return film
+            raise
 
     def _check(self) -> None:
-        film = cv2.VideoCapture(str(self._place))
+        made = cv2.VideoCapture(str(self._place))
         try:
-            count = int(film.get(cv2.CAP_PROP_FRAME_COUNT)) if film.isOpened() else 0
-            readable, _ = film.read()
+            count = int(made.get(cv2.CAP_PROP_FRAME_COUNT)) if made.isOpened() else 0
+            readable, _ = made.read()
         finally:
-            film.release()
+            made.release()
         if count != self._count or not readable:
             check_disk(self._place.parent)
             raise VoodooError(f"{self._path}: expected a film of {self._count} pictures, found {count} readable ones")

@@ -115,20 +115,25 @@ fn pick(candidates: &Candidates, matches: &mut LimbMatches) {
     }
 }
 
+/// The weight of a point falls smoothly to zero over this last fraction of the maximum distance.
+const GATE_FADE: f32 = 0.3;
+
 /// Step 4: finds the closest points of a limb's sampled candidates. Points that are too far, or closest to a cap that faces a
-/// joint, get weight zero.
-pub(crate) fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, matches: &mut LimbMatches) {
+/// joint, get weight zero. With `fades`, the weight falls to zero continuously.
+pub(crate) fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, fades: bool, matches: &mut LimbMatches) {
     limb.shape.closest_points(pose, &matches.measured, &mut matches.surface);
     let (refused, limit) = (refused_regions(limb), max_distance as f32);
     let LimbMatches { weight, base_weight, surface, .. } = matches;
     weight.resize(base_weight.len(), 0.0);
+    let per_meter = if fades { 1.0 / (GATE_FADE * limit) } else { f32::INFINITY };
     widest(
         #[inline(always)]
         || {
             let found = base_weight.iter().zip(&surface.signed_distance).zip(&surface.region);
             for (weight, ((base_weight, distance), region)) in weight.iter_mut().zip(found) {
                 let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
-                *weight = if kept { *base_weight } else { 0.0 };
+                let fade = ((limit - distance.abs()) * per_meter).min(1.0);
+                *weight = if kept { *base_weight * fade * fade * (3.0 - 2.0 * fade) } else { 0.0 };
             }
         },
     );
@@ -256,7 +261,7 @@ mod tests {
             matches.measured.push(place.map(|value| value as f32));
             matches.base_weight.push(0.7);
         }
-        match_limb(limb, &Pose::IDENTITY, 0.15, &mut matches);
+        match_limb(limb, &Pose::IDENTITY, 0.15, false, &mut matches);
         assert_eq!(matches.weight, [0.7, 0.0, 0.0], "beside the limb, too far, beyond the elbow");
     }
 }

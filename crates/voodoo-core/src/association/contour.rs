@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3, widest};
+use crate::math::{Points, Pose, Vec3, smooth_step, widest};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
@@ -25,9 +25,18 @@ const STRIDE: f64 = 0.008;
 const MOST_STEPS: f64 = 4.0;
 /// The first sample after the axis is at this fraction of the rim's distance: far inside the limb there is no edge.
 const FIRST_STEP: f64 = 0.4;
-/// The edge lies between the last sample on the body and the first one past it. This interval is bisected this many times, to a
-/// sixteenth of a pixel; otherwise the fit would depend on the sampling positions.
+/// The edge lies between the last sample on the body and the first one past it, where half of the interpolated pixels show the
+/// body. This interval is bisected this many times, and the edge is interpolated in the last one.
 const HALVINGS: usize = 5;
+/// How far past the edge the camera must see past the body, in steps of half a pixel.
+const PAST_STEPS: f64 = 2.4;
+/// Fraction of the reach, and of the rim's distance, over which the weight of an edge fades at the ends of its search.
+const FADE: f64 = 0.4;
+/// Interval of the sine of the angle between a limb's axis and the line of sight over which the weight of its edges rises.
+const ASLANT_FADE: f64 = 0.1;
+/// Outside its rim, a limb loses the weight of an edge over this distance, meters, unless the edge is nearer to the limb than to
+/// all others: by the second distance for the full weight.
+const OWNER_FADE: [f64; 2] = [0.01, 0.02];
 /// Steps are at least half a pixel at this depth, meters.
 const NEAREST_STEP: f64 = 0.1;
 
@@ -43,35 +52,47 @@ pub(crate) struct DepthEdge {
     pub foot: Vec3,
     /// Distance of the observed edge, measured in the same way, meters.
     pub reach: f64,
-    /// The last point observed on the body, working frame.
+    /// A point observed on the body, a pixel inside of the edge, working frame.
     pub place: Vec3,
+    /// Weight from 0 to 1. It falls to 0 where the edge is lost to another limb or object, or to the end of the search.
+    pub weight: f64,
 }
 
 /// Finds the edges on both sides of a limb, and at its tip if that end is free.
 pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut found: impl FnMut(DepthEdge)) {
     let shape = &limb.shape;
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-    let mut search = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64| {
+    let mut search = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64, sine: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let search = ContourSearch { start, along, rim, thickness, reach };
         let edge = widest(
             #[inline(always)]
             || search.edge(view),
         );
-        if let Some((found_at, place)) = edge {
-            found(DepthEdge { side, rim, foot, reach: found_at, place: view.working_from_camera * place });
+        if let Some(PixelEdge { at, place, weight }) = edge {
+            let weight = weight * smooth_step((sine - ASLANT) / ASLANT_FADE);
+            found(DepthEdge { side, rim, foot, reach: at, place: view.working_from_camera * place, weight });
         }
     };
     for t in STATIONS {
         let section = shape.section(t);
         let Some(facing) = section.facing(&camera_from_limb) else { continue };
         // The sides of a limb viewed nearly end on are not visible.
-        if facing.across.length() < ASLANT * facing.to_camera.length() {
+        let sine = facing.across.length() / facing.to_camera.length();
+        if sine <= ASLANT {
             continue;
         }
         let thickness = section.extent(facing.ahead);
         for side in [facing.side, -facing.side] {
-            search(section.center(), side, section.extent(side), thickness, section.farthest_point(side), EDGE_REACH);
+            search(
+                section.center(),
+                side,
+                section.extent(side),
+                thickness,
+                section.farthest_point(side),
+                EDGE_REACH,
+                sine,
+            );
         }
     }
     let tip = Vec3::new(0.0, 0.0, shape.length());
@@ -84,7 +105,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
         let radius = (end.a * ahead.x).hypot(end.b * ahead.y);
         let foot = tip - ahead * (radius * sight.z.signum());
         let rim = shape.length() + radius * sight.z.abs() / across;
-        search(Vec3::ZERO, Vec3::Z, rim, end.a.max(end.b), foot, TIP_REACH);
+        search(Vec3::ZERO, Vec3::Z, rim, end.a.max(end.b), foot, TIP_REACH, across);
     }
 }
 
@@ -97,50 +118,62 @@ struct ContourSearch {
     reach: f64,
 }
 
+/// Where the body ends on a search path, a point that was observed a pixel before that, and the weight of the edge.
+struct PixelEdge {
+    at: f64,
+    place: Vec3,
+    weight: f64,
+}
+
 impl ContourSearch {
-    /// Distance from the start at which the body ends, and the last point observed on it. Returns `None` when another object
-    /// occludes it, when a pixel is unknown, or when there is no edge within reach.
+    /// Finds where the body ends. Returns `None` when another object occludes it, when the pixels past it are unknown, or when
+    /// there is no edge within reach.
     #[inline(always)]
-    fn edge(&self, view: &DepthView) -> Option<(f64, Vec3)> {
+    fn edge(&self, view: &DepthView) -> Option<PixelEdge> {
         let [fx, fy] = view.image.camera.focal();
         let focal = fx.max(fy);
         let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
         let deep = self.thickness + DEPTH_REACH;
-        // Long strides up to the first sample past the body, then bisection.
+        // Long strides up to the first sample past the body.
         let stride = step * (STRIDE / step).floor().clamp(1.0, MOST_STEPS);
-        let mut on: Option<(f64, f64)> = None;
+        let mut on = None;
         let mut r = 0.0;
         while r <= self.rim + self.reach {
             let place = self.start + self.along * r;
             match view.at(place) {
-                Pixel::Unknown => return None,
-                Pixel::Foreground(z) if z < place.z - deep => return None,
-                // Where another person begins, this one may continue behind.
-                Pixel::Other(z) if z < place.z + deep => return None,
-                Pixel::Foreground(z) if z <= place.z + deep => on = Some((r, z)),
-                Pixel::Foreground(_) | Pixel::Background(_) | Pixel::Other(_) => {
-                    return Some(self.halved(view, on?, r));
-                }
+                Pixel::Foreground(z) if (z - place.z).abs() <= deep => on = Some(r),
+                _ => return self.between(view, on?, r, step),
             }
             r = if r == 0.0 { (FIRST_STEP * self.rim).max(step) } else { r + stride };
         }
         None
     }
 
-    /// Bisects between a sample on the body, with known depth, and one past it. Returns where the body ends, and the last point
-    /// observed on it.
+    /// Locates the edge between a sample on the body and one past it, from interpolated pixels, so that it moves continuously
+    /// with the path. `step` is half a pixel.
     #[inline(always)]
-    fn halved(&self, view: &DepthView, (mut on, mut depth): (f64, f64), mut past: f64) -> (f64, Vec3) {
+    fn between(&self, view: &DepthView, on: f64, past: f64, step: f64) -> Option<PixelEdge> {
+        let deep = self.thickness + DEPTH_REACH;
+        let shares = |r: f64| view.shares(self.start + self.along * r, deep);
+        let (mut on, mut past) = ((on - step, 1.0), (past + step, 0.0));
         for _ in 0..HALVINGS {
-            let middle = 0.5 * (on + past);
-            let place = self.start + self.along * middle;
-            match view.at(place) {
-                Pixel::Foreground(z) if z <= place.z + self.thickness + DEPTH_REACH => (on, depth) = (middle, z),
-                _ => past = middle,
-            }
+            let middle = 0.5 * (on.0 + past.0);
+            let body = shares(middle).body;
+            *(if body >= 0.5 { &mut on } else { &mut past }) = (middle, body);
         }
-        let last = self.start + self.along * on;
-        (0.5 * (on + past), last * (depth / last.z))
+        let at = on.0 + (past.0 - on.0) * (on.1 - 0.5) / (on.1 - past.1);
+        let reached =
+            smooth_step((self.rim + self.reach - at) / (FADE * self.reach)) * smooth_step(at / (FADE * self.rim));
+        if reached <= 0.0 {
+            return None;
+        }
+        let weight = reached * smooth_step(2.0 * shares(at + PAST_STEPS * step).past - 0.5);
+        if weight <= 0.0 {
+            return None;
+        }
+        let inside = self.start + self.along * (at - 2.0 * step);
+        let depth = view.shares(inside, deep).depth.unwrap_or(inside.z);
+        Some(PixelEdge { at, place: inside * (depth / inside.z), weight })
     }
 }
 
@@ -150,8 +183,7 @@ pub(crate) struct Contours {
     edges: Vec<LimbEdge>,
     places: Points,
     distance: Vec<f32>,
-    least: Vec<f32>,
-    closest: Vec<usize>,
+    own: Vec<f32>,
     others: Vec<f32>,
 }
 
@@ -184,37 +216,33 @@ impl Contours {
                 });
             }
         }
-        self.find_closest(body, poses);
-        let mut closest = self.closest.iter();
-        let mut others = self.others.iter();
-        self.edges.retain_mut(|found| {
-            let closest = closest.next();
-            found.others = others.next().copied().unwrap_or(f32::INFINITY);
+        self.find_distances(body, poses);
+        let mut distances = self.own.iter().zip(&self.others);
+        self.edges.retain_mut(|LimbEdge { edge, others, .. }| {
+            let Some((own, other)) = distances.next() else { return false };
+            *others = *other;
             // Outside the rim, the edge may belong to another limb.
-            found.edge.reach <= found.edge.rim || closest == Some(&found.limb)
+            let [beyond, nearer] = OWNER_FADE;
+            let inside = 1.0 - smooth_step((edge.reach - edge.rim) / beyond);
+            edge.weight *= inside.max(smooth_step(f64::from(other - own) / nearer));
+            edge.weight > 0.0
         });
     }
 
-    /// Finds the limb nearest to each edge position, and the distance to the nearest limb other than the edge's own.
-    fn find_closest(&mut self, body: &Body, poses: &[Pose]) {
+    /// Finds the distances of each edge position to the edge's own limb and to the nearest other one.
+    fn find_distances(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
-        self.least.clear();
-        self.least.resize(count, f32::INFINITY);
-        self.closest.clear();
-        self.closest.resize(count, 0);
-        self.others.clear();
-        self.others.resize(count, f32::INFINITY);
+        for distances in [&mut self.own, &mut self.others] {
+            distances.clear();
+            distances.resize(count, f32::INFINITY);
+        }
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             limb.shape.approximate_distances(pose, &self.places, &mut self.distance);
-            for ((least, closest), distance) in self.least.iter_mut().zip(&mut self.closest).zip(&self.distance) {
-                if distance < least {
-                    (*least, *closest) = (*distance, index);
-                }
-            }
-            for ((found, others), distance) in self.edges.iter().zip(&mut self.others).zip(&self.distance) {
-                if found.limb != index {
-                    *others = others.min(*distance);
-                }
+            for ((found, [own, others]), distance) in
+                self.edges.iter().zip(self.own.iter_mut().zip(&mut self.others).map(<[_; 2]>::from)).zip(&self.distance)
+            {
+                let least = if found.limb == index { own } else { others };
+                *least = least.min(*distance);
             }
         }
     }
@@ -231,7 +259,7 @@ impl Contours {
         pairs.clear();
         pairs.extend(self.edges.iter().map(|LimbEdge { limb, edge, target, .. }| {
             let (x, normal) = (poses[*limb] * edge.foot, poses[*limb].rotation * edge.side);
-            ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x) }
+            ContourPair { limb: *limb, x, normal, distance: normal.dot(*target - x), weight: edge.weight }
         }));
     }
 }

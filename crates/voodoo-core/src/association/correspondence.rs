@@ -55,6 +55,8 @@ pub(crate) struct ContourPair {
     pub normal: Vec3,
     /// Distance of the edge outward along the direction, meters; negative when the observed limb is narrower than the model.
     pub distance: f64,
+    /// Weight from 0 to 1.
+    pub weight: f64,
 }
 
 /// A point of a limb's contour and the color edge there in an image: a distance along one direction.

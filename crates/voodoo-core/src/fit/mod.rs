@@ -1,4 +1,5 @@
-//! The loop of a frame: match, solve, until the mean squared distance settles (K06 III-B and IV-B.2 to 7).
+//! The loop of a frame: match and solve (K06 III-B and IV-B.2 to 7). With the published solver it ends when the mean squared
+//! distance settles.
 
 mod context;
 mod edges;
@@ -106,8 +107,9 @@ impl Fit {
             let distance = self.correspondences.mean_squared_distance().unwrap_or(0.0);
             self.solve(context, predicted, poses, steps);
             steps += 1;
-            let settled = (before - distance).abs() < context.config.min_change;
-            if settled && self.correspondences.regions.is_empty() || steps >= edges && context.pictures_alone() {
+            // Whole-body solvers always take all steps: a step more or less would be a jump of the result.
+            let settled = !schedule.whole_body && (before - distance).abs() < context.config.min_change;
+            if settled || steps >= edges && context.pictures_alone() {
                 break;
             }
             before = distance;
@@ -252,14 +254,15 @@ impl Fit {
     /// call.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
         let Context { config, model, observation, .. } = context;
-        let Self { assignment, correspondences, threads, .. } = self;
+        let Self { solver, assignment, correspondences, threads, .. } = self;
         let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), observation.candidates);
+        let whole_body = solver.schedule(config).whole_body;
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {
                 assignment.sample_limb(index, candidates, config, matches);
             }
-            match_limb(&limbs[index], &poses[index], gate.distance, matches);
+            match_limb(&limbs[index], &poses[index], gate.distance, whole_body, matches);
             if visible_side {
                 match_visible_side(&limbs[index].shape, &poses[index], candidates, gate.distance, matches);
             }

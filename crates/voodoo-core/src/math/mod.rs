@@ -15,6 +15,13 @@ pub use linear_sum_assignment::{CostTable, linear_sum_assignment};
 pub use simd::{LANES, has_avx512, widest};
 pub(crate) use weighted_points::WeightedPoints;
 
+/// The cubic that rises smoothly from 0 at `at = 0` to 1 at `at = 1`, and is constant outside.
+#[inline(always)]
+pub(crate) fn smooth_step(at: f64) -> f64 {
+    let at = at.clamp(0.0, 1.0);
+    at * at * (3.0 - 2.0 * at)
+}
+
 /// The dot product of two rows.
 pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()

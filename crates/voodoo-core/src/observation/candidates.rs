@@ -203,8 +203,11 @@ impl Candidates {
         widest(
             #[inline(always)]
             || {
-                for row in rows.step_by(grid.rows) {
-                    for start in (columns.start + grid.offset(row)..columns.end).step_by(STRETCH * stride) {
+                // The grid is fixed to the image: a box that moves takes the same pixels.
+                for row in (rows.start.next_multiple_of(grid.rows)..rows.end).step_by(grid.rows) {
+                    let offset = grid.offset(row);
+                    let first = (columns.start + stride - offset).next_multiple_of(stride) - stride + offset;
+                    for start in (first..columns.end).step_by(STRETCH * stride) {
                         let stretch = Stretch::load(image, background, row, start, columns.end, stride);
                         if stretch.returned() {
                             stretch.gather(&m, gate, points);

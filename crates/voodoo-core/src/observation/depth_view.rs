@@ -70,7 +70,13 @@ impl DepthView<'_> {
         if point.z < NEAREST_RETURN {
             return Pixel::Unknown;
         }
-        let Some(index) = image.camera.index_of(point) else { return Pixel::Unknown };
+        image.camera.index_of(point).map_or(Pixel::Unknown, |index| self.pixel(index))
+    }
+
+    /// What a pixel shows, by its row-major index.
+    #[inline(always)]
+    fn pixel(&self, index: usize) -> Pixel {
+        let image = self.image;
         let z = f64::from(image.pixels.get(index)) * image.meters_per_unit;
         if z.is_nan() || z <= 0.0 {
             return if self.segmented { Pixel::Background(f64::INFINITY) } else { Pixel::Unknown };
@@ -87,6 +93,59 @@ impl DepthView<'_> {
             _ => Pixel::Foreground(z),
         }
     }
+
+    /// What the four pixels about a point (camera frame) show, bilinearly interpolated: a body whose surface is within `deep`
+    /// meters of the point's depth, or what is behind it.
+    #[inline(always)]
+    pub(crate) fn shares(&self, point: Vec3, deep: f64) -> Shares {
+        let mut found = Shares::default();
+        let camera = &self.image.camera;
+        let Some([u, v]) = camera.project(point).filter(|_| point.z >= NEAREST_RETURN) else { return found };
+        let (width, height) = (camera.width() as f64, camera.height() as f64);
+        if !(u > -1.0 && v > -1.0 && u < width && v < height) {
+            return found;
+        }
+        let (left, top) = (u.floor(), v.floor());
+        let (across, down) = (u - left, v - top);
+        let mut sum = 0.0;
+        for (row, by_row) in [(top, 1.0 - down), (top + 1.0, down)] {
+            for (column, by_column) in [(left, 1.0 - across), (left + 1.0, across)] {
+                let weight = by_row * by_column;
+                if row < 0.0 || column < 0.0 || row >= height || column >= width {
+                    continue;
+                }
+                let beyond = |z: f64| ((z - point.z - deep) / DEPTH_FADE + 0.5).clamp(0.0, 1.0);
+                match self.pixel(row as i32 as usize * camera.width() + column as i32 as usize) {
+                    Pixel::Unknown => {}
+                    Pixel::Background(_) => found.past += weight,
+                    Pixel::Other(z) => found.past += weight * beyond(z),
+                    Pixel::Foreground(z) => {
+                        let past = beyond(z);
+                        let here = weight * (1.0 - past) * ((z - point.z + deep) / DEPTH_FADE + 0.5).clamp(0.0, 1.0);
+                        found.past += weight * past;
+                        found.body += here;
+                        sum += here * z;
+                    }
+                }
+            }
+        }
+        found.depth = (found.body > 0.0).then(|| sum / found.body);
+        found
+    }
+}
+
+/// Interval of depth over which a pixel passes from the body to what is before or behind it, meters.
+const DEPTH_FADE: f64 = 0.03;
+
+/// What the pixels about a point show, as fractions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Shares {
+    /// The body.
+    pub body: f64,
+    /// What is behind the body.
+    pub past: f64,
+    /// Mean depth of the body, meters; `None` where no pixel shows it.
+    pub depth: Option<f64>,
 }
 
 /// Finds in which images of a frame the body was segmented, and writes the result to `found`.

@@ -176,7 +176,7 @@ pub(super) fn first_system(
     system.scale((INDEPENDENT / points as f64).min(1.0) / (POINT_SIGMA * POINT_SIGMA));
     for edge in edges {
         let distance = edge.reach - edge.rim;
-        system.add(shape, edge.foot, edge.side, distance, kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA));
+        system.add(shape, edge.foot, edge.side, distance, edge.weight * kernel(distance) / (EDGE_SIGMA * EDGE_SIGMA));
     }
     Some(system)
 }
@@ -190,7 +190,7 @@ pub(super) fn side_system(
     let (mut system, mut thickness) = (GirthSystem::default(), Vector3::zeros());
     for edge in edges {
         let wider = edge.reach - edge.rim;
-        system.add(shape, edge.foot, edge.side, wider, kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
+        system.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
         let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
         let t = edge.foot.z / shape.length();
         let a = shape.a0() + t * (shape.a1() - shape.a0());
@@ -314,7 +314,14 @@ mod tests {
         let edge = |t: f64, sign: f64| {
             let rim = shape.b0() + t * (shape.b1() - shape.b0());
             let foot = Vec3::new(0.0, sign * rim, t * shape.length());
-            DepthEdge { side: Vec3::Y * sign, rim, foot, reach: rim + wider + sign * aside, place: Vec3::ZERO }
+            DepthEdge {
+                side: Vec3::Y * sign,
+                rim,
+                foot,
+                reach: rim + wider + sign * aside,
+                place: Vec3::ZERO,
+                weight: 1.0,
+            }
         };
         [0.2, 0.35, 0.5, 0.65, 0.8].map(|t| [edge(t, 1.0), edge(t, -1.0)]).to_vec()
     }

@@ -21,9 +21,10 @@ impl Term for Contour<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for pair in self.pairs {
             let (rho, kernel) = geman_mcclure(pair.distance, self.scale);
-            normal.cost += self.information * rho;
+            let information = self.information * pair.weight;
+            normal.cost += information * rho;
             let row = crate::terms::normal_equations::line(pair.x, pair.normal);
-            normal.limbs[pair.limb].add_row(self.information * kernel, &row, -pair.distance);
+            normal.limbs[pair.limb].add_row(information * kernel, &row, -pair.distance);
         }
     }
 }

@@ -57,7 +57,7 @@ impl<'a> Measurements<'a> {
         Self {
             surface: Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
             sites: Sites { correspondences, information, scale: site_scale, biased },
-            contour: Contour { pairs: &correspondences.contour, information: edge_information, scale: 2.0 * scale },
+            contour: Contour { pairs: &correspondences.contour, information: edge_information, scale },
             regions: Regions { pairs: &correspondences.regions },
         }
     }

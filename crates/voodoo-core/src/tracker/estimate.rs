@@ -11,7 +11,8 @@ use crate::uncertainty::Covariances;
 pub enum Status {
     /// Measurements support the pose.
     Tracking,
-    /// More than a quarter of the limbs are not measured.
+    /// More than a quarter of the limbs are not measured, or the measurements of a source are 15 cm from the pose, root mean
+    /// square.
     Degraded,
     /// Few measurements support the pose, or the observed surface is flat.
     Lost,

@@ -32,6 +32,24 @@ fn a_refused_frame_leaves_every_part_as_it_was() {
 }
 
 #[test]
+fn a_body_that_sites_miss_by_far_is_not_tracked_whatever_depth_says() {
+    let sites = ["l_wrist", "r_wrist", "l_elbow", "r_elbow", "l_knee", "r_knee"];
+    let status = |off: f64| {
+        let (mut tracker, pixels) = tracking();
+        let places: Vec<_> = sites
+            .iter()
+            .map(|name| {
+                let site = tracker.body().site_index(name).unwrap();
+                let position = tracker.estimate().sites[site] + off * Vec3::X;
+                crate::PositionRelation { site, position, weight: 0.1, bias: 0.0, source: 1 }
+            })
+            .collect();
+        with_frame(&pixels, 0.1, |frame| tracker.step(&frame.with_positions(&places)).unwrap().status)
+    };
+    assert_eq!([0.0, 0.08, 0.3].map(status), [Status::Tracking, Status::Tracking, Status::Degraded]);
+}
+
+#[test]
 fn edits_keep_the_track() {
     type Edit = fn(&mut Tracker);
     let edits: [Edit; 4] = [

@@ -121,7 +121,7 @@ proptest! {
         check(&body, &poses, &|poses, system| {
             let edges: Vec<ContourPair> = (0..poses.len()).map(|limb| {
                 let x = poses[limb] * feet[limb];
-                ContourPair { limb, x, normal, distance: normal.dot(targets[limb] - x) }
+                ContourPair { limb, x, normal, distance: normal.dot(targets[limb] - x), weight: 0.7 }
             }).collect();
             Contour { pairs: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
         })?;

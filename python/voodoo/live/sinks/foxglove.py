@@ -56,7 +56,7 @@ class FoxgloveSink(Output):
             for number, estimate in step.estimates.items()
             if estimate.joints and str(estimate.status) != "lost"
         }
-        self._channels.log(step.stamp, people, upright_frame(self._root()))
+        self._channels.log(step.stamp, people, upright_frame(step, self._root()))
 
     def close(self) -> None:
         """See Output."""

@@ -136,7 +136,7 @@ def message_of(step: Step, root_frame: str) -> dict[str, Any]:
         "format": FORMAT,
         "version": VERSION,
         "stamp_s": step.stamp,
-        "frame": upright_frame(root_frame),
+        "frame": upright_frame(step, root_frame),
         "people": [
             _person(number, *upright_person(step, number, root_frame))
             for number, estimate in step.estimates.items()

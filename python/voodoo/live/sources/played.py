@@ -59,7 +59,7 @@ class PlayedSource(Source):
         """See Source."""
         self._clock, self._faults = clock, faults
         self._frames = iter(paired(self.recording))
-        self._next = next(self._frames, None)
+        self._next = self._following()
         self._first = 0.0 if self._next is None else self._next.stamp
         self._began = clock.now()
         self._shift = 0.0
@@ -80,18 +80,23 @@ class PlayedSource(Source):
         return arrivals
 
     def _advance(self, frame: RecordedFrame) -> None:
-        self._next = next(self._frames, None)
+        self._next = self._following()
+        if self._next is None and self._loop:
+            self._frames = iter(paired(self.recording))
+            self._next = self._following()
+            period = (frame.stamp - self._first) / max(self._about.frames - 1, 1)
+            self._shift += frame.stamp - self._first + period
+
+    def _following(self) -> RecordedFrame | None:
+        """The next frame; reports what was left out before it."""
+        following = next(self._frames, None)
         for reason, count in self._left_out.counts.items():
             new = count - self._optional_fields.get(reason, 0)
             if new:
                 kind = kind_of_reason(reason, "unreadable message")
                 self._faults.add(kind, self._left_out.first[reason], self._clock.now(), new)
                 self._optional_fields[reason] = count
-        if self._next is None and self._loop:
-            self._frames = iter(paired(self.recording))
-            self._next = next(self._frames, None)
-            period = self._about.duration / max(self._about.frames - 1, 1)
-            self._shift += frame.stamp - self._first + period
+        return following
 
     def _arrivals(self, frame: RecordedFrame, due: float) -> list[Arrival]:
         arrivals = []

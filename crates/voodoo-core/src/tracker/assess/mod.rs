@@ -42,6 +42,8 @@ const ROUNDNESS_MEMORY: f64 = 0.9;
 /// Limits for the fraction of limbs. A tracked body has at most this fraction not measured. A body is lost if less than this
 /// fraction is measured, or, where the root is not measured, less than twice this fraction.
 const SOME: f64 = 0.25;
+/// A body is not tracked if it misses the measurements of a source by more than this, root mean square, meters.
+const MISSED: f64 = 0.15;
 
 /// Assesses every frame and keeps running means of past assessments.
 #[derive(Debug, Default)]
@@ -147,8 +149,8 @@ impl Assessor {
         }
     }
 
-    /// Writes the status of the body and its limbs into an estimate; no other function does. A body with too many limbs not
-    /// measured is not reported as tracked.
+    /// Writes the status of the body and its limbs into an estimate, whose sources must have been filled in; no other function
+    /// does. A body with too many limbs not measured, or far from a source's measurements, is not reported as tracked.
     pub(super) fn report_status(&self, model: &Model, estimate: &mut Estimate) {
         let statuses = &mut estimate.limb_status;
         statuses.clear();
@@ -170,8 +172,9 @@ impl Assessor {
             }
         }
         let status = if self.is_by_edges_alone() { overall(statuses) } else { self.status };
-        let limb_suspect = status == Status::Tracking && measured_fraction(statuses) < 1.0 - SOME;
-        estimate.status = if limb_suspect { Status::Degraded } else { status };
+        let missed = estimate.sources.iter().any(|source| source.residual > MISSED);
+        let doubtful = missed || measured_fraction(statuses) < 1.0 - SOME;
+        estimate.status = if status == Status::Tracking && doubtful { Status::Degraded } else { status };
     }
 
     fn forget_limbs(&mut self) {
