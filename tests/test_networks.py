@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 import color_scene as scene
+import voodoo
 from commands import run
 from live_rig import Rig, arrival_of
 from measurement_data import data_folder
 from test_track_inputs import COLOR, Short, errors_of
 from voodoo.errors import ConfigError, MeasurementError, RecordingError, VoodooError
 from voodoo.export.track import Track
-from voodoo.live import Live
+from voodoo.live import Follower, Live
+from voodoo.live.session import Output, Session
+from voodoo.live.sources.played import PlayedSource
 from voodoo.measurements import ColorImage, DepthImage, KeypointImage
 from voodoo.pipeline.detected import Detected
 from voodoo.pipeline.inputs import keypoint_words
@@ -91,6 +94,25 @@ def test_a_network_on_several_cameras_is_triangulated_from_the_search_on(tmp_pat
         for name in names
     ]
     assert result.found.sum() >= 6 and np.linalg.norm(errors, axis=2).mean() < 0.04
+    # and live
+    steps = []
+
+    class Keeps(Output):
+        name, waiting, publish = "keeps", 1000, lambda self, step: steps.append(step)
+
+    follower = Follower(voodoo.Tracker(voodoo.Body.human()), settings=FrontEndSettings(use=("keypoints",)))
+    with Live([PlayedSource(films, rate=0.5)], network=KeypointNetwork("stub", stub_of(films), "body25b")) as live:
+        session = Session(live, lambda _: follower, outputs=[Keeps()])
+        while session.wait(0.05):
+            pass
+        session.finish()
+    (estimate,) = steps[-1].estimates.values()
+    row = int(np.argmin(np.abs(films.reference.stamps - steps[-1].stamp)))
+    away = [
+        np.linalg.norm(estimate.joints[name] - films.reference.positions[row, films.reference.names.index(name)])
+        for name in names
+    ]
+    assert np.mean(away) < 0.04
 
 
 @pytest.fixture
