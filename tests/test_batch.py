@@ -21,7 +21,7 @@ from voodoo.batch import run as engine
 from voodoo.batch import task
 from voodoo.batch.run import Batch
 from voodoo.batch.storage import Store, find_sources, name_of, named, on_disk
-from voodoo.batch.summary import COLUMNS, DONE, FAILED, Row, read_table, write_table
+from voodoo.batch.summary import COLUMNS, DONE, FAILED, Row, read_table, write_index, write_table
 from voodoo.batch.table import columns_of, encode, note_of, stacked
 from voodoo.batch.task import Job, Settings, do, row_of
 from voodoo.cli import app
@@ -44,6 +44,26 @@ def track_of(stamps, offset=0.0):
         angle_names=("l_elbow_flexion",), angles=np.where(np.isnan(joints[:, :1, 0]), np.nan, 0.5),
         limb_status={"torso": tuple("" if k == 0 else "measured" for k in range(count))},
     )  # fmt: skip
+
+
+def test_an_index_links_the_reports_that_there_are():
+    rows = [Row("walk <1>", frames=90), Row("old", frames=3), Row("bad", status=FAILED, error="cut <off>")]
+    page = write_index(rows, {"walk <1>.html"})
+    assert "<a href='reports/walk%20%3C1%3E.html'>walk &lt;1&gt;</a>" in page and page.count("<a ") == 1
+    assert page.index("bad") < page.index("old") < page.index("walk") and "cut &lt;off&gt;" in page
+
+
+@storing
+def test_a_job_writes_its_report(tmp_path):
+    pytest.importorskip("plotly", reason="pip install plotly, of the extra report")
+    job = Job("walk", str(sample_path()), str(tmp_path), Settings(use=("depth",)), report=True)
+    row = do(job)
+    assert row.status == DONE, row.error
+    assert "one standard deviation" in (tmp_path / "reports" / "walk.html").read_text()
+    batch = Batch([str(sample_path())], str(tmp_path), job.settings, report=True)
+    batch.take(row)
+    batch.save()
+    assert "reports/walk.html" in (tmp_path / "index.html").read_text()
 
 
 def test_a_table_of_summaries_is_read_as_it_was_written():

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 import voodoo
@@ -94,8 +95,8 @@ def mot_columns(path: Path):
 RIGHT_OF = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # X forward, Y up, Z right from x forward, y left, z up
 
 
-def read_mot(path: Path, body):
-    columns, local = mot_columns(path), {}
+def read_mot(path: Path, body, *, turns=None):
+    columns, local = mot_columns(path), {} if turns is None else turns
     for limb in body.limb_names:
         angles = []
         for axis, name in enumerate(names_of(limb).angles):
@@ -107,7 +108,7 @@ def read_mot(path: Path, body):
     return placed(body, local, root)[1]
 
 
-def read_glb(path: Path, frame: int, person: str = "pose"):
+def read_glb(path: Path, frame: int, person: str = "pose", *, turns=None):
     """Heads of bones at a frame and the vertices of a skinned mesh there, z up, by pygltflib's reading."""
     gltflib = pytest.importorskip("pygltflib", reason="pip install pygltflib, of the extra test")
     scene = gltflib.GLTF2().load(str(path))
@@ -134,6 +135,8 @@ def read_glb(path: Path, frame: int, person: str = "pose"):
         pose[:3, 3] = moved.get((number, "translation"), node.translation or [0, 0, 0])
         world[number] = above @ pose
         names[node.name] = number
+        if turns is not None:
+            turns.setdefault(node.name, []).append(pose[:3, :3])
         for child in node.children or ():
             walk(child, world[number])
 
@@ -195,6 +198,70 @@ def test_every_format_puts_the_joints_in_the_same_place(tmp_path, person):
         across = parts[calf].head - parts[thigh].head
         knee = expected[f"{side}_thigh"] + posed.rotations[:, 0] @ turn @ across
         assert np.abs(knee - expected[f"{side}_calf"]).max() < 1e-4
+
+
+def human_angles(local, parents):
+    """The angles of human_description, by SciPy, from rotations (F, 3, 3) of limbs relative to their parents."""
+
+    def between(limb, above):
+        turn = np.eye(3)
+        while limb != above:
+            turn, limb = local[limb] @ turn, parents[limb]
+        return Rotation.from_matrix(turn)
+
+    def twist(turn):
+        return 2.0 * np.arctan2(turn.as_quat()[:, 1], turn.as_quat()[:, 3])
+
+    root = next(limb for limb, above in parents.items() if above is None)
+    trunk = "thorax" if "thorax" in local else root
+    roll, yaw, pitch = between("head", trunk).as_euler("XZY").T
+    found = {"r_head": roll, "y_head": yaw, "p_head": -pitch}
+    for side, s in (("l", 1.0), ("r", -1.0)):
+        a, b, c = between(f"{side}_thigh", root).as_euler("ZXY").T
+        found |= {f"{side}_y_hip": -a, f"{side}_p_hip": s * b, f"{side}_r_hip": -c}
+        found[f"{side}_elbow"] = -twist(between(f"{side}_forearm", f"{side}_upperarm"))
+        found[f"{side}_knee"] = -twist(between(f"{side}_calf", f"{side}_thigh"))
+        found[f"{side}_shoulder"] = between(f"{side}_upperarm", trunk)
+    return found
+
+
+def test_every_format_has_the_same_joint_angles(tmp_path, person):
+    track, body = person
+    for name in ("pose.bvh", "pose.mot", "pose.glb", "bag"):
+        save(track, tmp_path / name, body=body, root_frame="odom")
+    parts = bones(body)
+    parents = {bone.name: None if bone.parent is None else parts[bone.parent].name for bone in parts}
+    z_up = np.eye(3)[[2, 0, 1]]  # from X left, Y up, Z forward
+    read = {"bvh": {}, "mot": {}, "glb": {}}
+    read_bvh(tmp_path / "pose.bvh", turns=read["bvh"])
+    read_mot(tmp_path / "pose.mot", body, turns=read["mot"])
+    for frame in range(FRAMES):
+        read_glb(tmp_path / "pose.glb", frame, turns=read["glb"])
+    for name in ("bvh", "glb"):
+        read[name] = {limb: z_up @ np.array(read[name][limb]) @ z_up.T for limb in body.limb_names}
+    truth = dict(zip(body.limb_names, skeleton(track, body).local().swapaxes(0, 1), strict=True))
+    for name, local in read.items():
+        for limb in body.limb_names:
+            apart = Rotation.from_matrix(truth[limb].transpose(0, 2, 1) @ local[limb]).magnitude()
+            assert np.degrees(apart).max() < 0.002, (name, limb)
+    with AnyReader([tmp_path / "bag"]) as reader:
+        told = [
+            dict(zip(message.name, message.position, strict=True))
+            for connection, _, raw in reader.messages()
+            if connection.topic.endswith("joint_states")
+            for message in [reader.deserialize(raw, connection.msgtype)]
+        ]
+    states = {name.removesuffix("_p1"): np.array([one[name] for one in told]) for name in told[0]}
+    for name, local in read.items():
+        for joint, values in human_angles(local, parents).items():
+            if joint.endswith("shoulder"):  # R = Rz(-s y) Rx(s p) Rz(s r) has two solutions: compare the rotation
+                s = 1.0 if joint[0] == "l" else -1.0
+                y, p, r = (states[f"{joint[0]}_{axis}_shoulder"] for axis in "ypr")
+                turn = Rotation.from_euler("ZXZ", np.column_stack([-s * y, s * p, s * r]))
+                apart = (turn.inv() * values).magnitude()
+            else:
+                apart = (values - states[joint] + np.pi) % (2.0 * np.pi) - np.pi
+            assert np.degrees(np.abs(apart)).max() < 0.005, (name, joint)
 
 
 def test_glb_opens_in_trimesh_and_its_skin_follows_the_limbs(tmp_path, person):

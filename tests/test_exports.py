@@ -65,8 +65,8 @@ def tracked(request):
     return Track.of(estimates), body
 
 
-def read_bvh(path: Path):
-    """A minimal independent BVH reader with forward kinematics: joint name -> (F, 3)."""
+def read_bvh(path: Path, *, turns=None):
+    """A minimal independent BVH reader with forward kinematics: joint name -> (F, 3); `turns` gets the local rotations."""
     words = path.read_text().split()
     at, stack, joints, channels = 0, [], [], []
     while words[at] != "MOTION":
@@ -104,6 +104,8 @@ def read_bvh(path: Path):
                     turn = turn @ Rotation.from_euler(channel[0].lower(), value, degrees=True).as_matrix()
                 elif owner == number:
                     shift["XYZ".index(channel[0])] += value
+            if turns is not None:
+                turns.setdefault(name, []).append(turn)
             above = (np.eye(3), np.zeros(3)) if parent is None else world[parent]
             world.append((above[0] @ turn, above[1] + above[0] @ shift))
             places[name][frame] = world[-1][1]

@@ -1,9 +1,18 @@
 """What is published: names, metadata, and that nobody is sent to a stranger's package."""
 
+import json
+import os
 import re
+import shutil
 import subprocess
+import sys
+import threading
+import venv
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from importlib.metadata import metadata, version
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -76,3 +85,70 @@ def test_the_workflow_builds_for_every_platform():
     ):
         assert words in text, words
     assert "--compatibility manylinux_2_28" in (ROOT / "scripts" / "wheel").read_text(encoding="utf-8")
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *words):
+        pass
+
+
+@pytest.fixture
+def index(tmp_path):
+    """Address of a package index that holds the wheel of scripts/setup, and nothing else."""
+    wheels = sorted((ROOT / "target" / "wheels").glob("voodoo_tracker-*.whl"))
+    if not wheels:
+        pytest.skip("no wheel in target/wheels: scripts/setup builds it")
+    folder = tmp_path / "index" / "simple" / DISTRIBUTION
+    folder.mkdir(parents=True)
+    shutil.copy(wheels[-1], folder)
+    (folder / "index.html").write_text(f"<a href='{wheels[-1].name}'>{wheels[-1].name}</a>")
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(tmp_path / "index")))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/simple"
+    server.shutdown()
+
+
+@pytest.mark.long
+def test_a_stranger_installs_it_from_an_index_and_runs_the_demo(index, tmp_path):
+    """Its dependencies are those of the usual index; no compiler is found."""
+    venv.create(tmp_path / "env", with_pip=True)
+    programs = tmp_path / "env" / ("Scripts" if sys.platform == "win32" else "bin")
+    plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    plain |= {"CC": "/nowhere", "CARGO": "/nowhere"}
+    pip = [programs / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "--extra-index-url", index, DISTRIBUTION], check=True, cwd=tmp_path, env=plain)
+    done = subprocess.run([programs / "voodoo", "demo"], cwd=tmp_path, env=plain, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "voodoo-demo" / "pose.csv").is_file()
+    uvx = shutil.which("uvx")
+    if uvx is not None:
+        (tmp_path / "uvx").mkdir()
+        words = [uvx, "--index", index, "--python", sys.executable, DISTRIBUTION, "demo"]
+        done = subprocess.run(words, cwd=tmp_path / "uvx", env=plain, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert (tmp_path / "uvx" / "voodoo-demo" / "pose.csv").is_file()
+
+
+@pytest.mark.long
+def test_the_wheel_names_what_it_was_built_of(index, tmp_path):
+    (wheel,) = (tmp_path / "index").rglob("*.whl")
+    with ZipFile(wheel) as content:
+        (name,) = [name for name in content.namelist() if name.endswith(".cyclonedx.json")]
+        told = json.loads(content.read(name))
+    assert told["bomFormat"] == "CycloneDX" and "pyo3" in {one["name"] for one in told["components"]}
+
+
+def test_a_release_publishes_what_was_tested_without_a_token():
+    text = (ROOT / ".github" / "workflows" / "release.yml").read_text(encoding="utf-8")
+    for words in ("id-token: write", "attest-build-provenance@", "gh-action-pypi-publish@", "sboms", "needs: wheels"):
+        assert words in text, words
+    assert "password" not in text and "secrets" not in text
+    assert all(re.search(r"@[0-9a-f]{40} # v", line) for line in text.splitlines() if re.search(r"uses: \w+/", line))
+
+
+def test_recipes_name_the_dependencies():
+    recipe = (ROOT / "lab" / "packaging" / "recipe.yaml").read_text(encoding="utf-8")
+    for word in PROJECT["dependencies"]:
+        name = re.match(r"[\w.-]+", word)[0].removesuffix("-python-headless").replace("opencv", "py-opencv")
+        assert f"- {name}" in recipe, name
+    assert re.search(r"^voodoo-tracker:$", (ROOT / "lab" / "packaging" / "rosdep.yaml").read_text(), re.M)

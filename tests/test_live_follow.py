@@ -11,8 +11,8 @@ from test_live_ros import FakeNode
 from voodoo.export.ros2 import STORE, cdr
 from voodoo.live import Follower, Live, Step
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.ros2.publisher import FOLLOW, Ros2Output
 from voodoo.live.session import Output, Session
+from voodoo.live.sinks.ros2 import FOLLOW, Ros2Sink
 from voodoo.live.sources.played import PlayedSource
 from voodoo.measurements import DepthImage
 from voodoo.pipeline.search import nobody
@@ -87,7 +87,7 @@ def test_a_single_person_is_the_one_at_the_place(recording, frames, chosen):
 
 def test_a_message_chooses_the_person(recording, monkeypatch):
     node, asked = FakeNode(), []
-    output = Ros2Output(lambda: "base_link", node=node)
+    output = Ros2Sink(root_frame=lambda: "base_link", node=node)
     output.on_choice = lambda *choice: asked.append(choice)
     node.heard[FOLLOW] = [message("odom", (1.0, 2.0, 3.0))]
     step = Step(LiveFrame(2.0, (), 1, 0.0, 0.0, False), {1: nobody(2.0)}, {1: voodoo.Body.human()}, 0.0)

@@ -17,9 +17,9 @@ from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_in
 from voodoo.live.ros2.dds import Offer
 from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
 from voodoo.live.ros2.listing import listing
-from voodoo.live.ros2.publisher import RESET, Ros2Output
 from voodoo.live.ros2.types import dds_name, ros_name
 from voodoo.live.session import Output, Session
+from voodoo.live.sinks.ros2 import RESET, Ros2Sink
 from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source
@@ -240,7 +240,7 @@ class FakeNode:
 
 def test_what_is_published_has_the_stamps_of_the_data():
     node = FakeNode()
-    output = Ros2Output(lambda: "base_link", node=node)
+    output = Ros2Sink(root_frame=lambda: "base_link", node=node)
     recording = open_recording(sample_path(), use=("depth",))
     tracker = start_tracker(recording)
     step = next(track(recording, tracker))
@@ -331,7 +331,7 @@ def test_a_wrong_topic_says_which_there_are(monkeypatch):
 
 def test_a_message_lets_everybody_be_searched_for_again():
     node, asked = FakeNode(), []
-    output = Ros2Output(lambda: "base_link", node=node)
+    output = Ros2Sink(root_frame=lambda: "base_link", node=node)
     output.on_reset = lambda: asked.append(True)
     step = Step(LiveFrame(2.0, (), 1, 0.0, 0.0, False), {1: nobody(2.0)}, {1: voodoo.Body.human()}, 0.0)
     output.publish(step)
@@ -343,6 +343,8 @@ def test_a_message_lets_everybody_be_searched_for_again():
     messages, statuses = [], []
 
     class Asks(Output):
+        waiting = 1000
+
         def publish(self, step):
             statuses.append(str(step.estimates[1].status))
             if len(statuses) == 15:
@@ -370,7 +372,7 @@ def test_live_topics_stand_on_the_floor_that_is_seen_as_files_do(root, rate):
             turns.append(step.turn)
 
     with Live([PlayedSource(recording, rate=rate)], on_message=messages.append) as live:
-        outputs = [Ros2Output(lambda: live.root_frame, node=node), Turns()]
+        outputs = [Ros2Sink(root_frame=lambda: live.root_frame, node=node), Turns()]
         session = Session(live, lambda _: follower_of(root), outputs=outputs)
         while session.wait(0.05):
             pass

@@ -16,7 +16,7 @@ from voodoo.export.people_files import save_people
 from voodoo.export.ros2 import person_id, write_bag
 from voodoo.export.track import Track
 from voodoo.export.urdf import urdf
-from voodoo.live.ros2.publisher import FOLLOW
+from voodoo.live.sinks.ros2 import FOLLOW
 from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track as run_track
 from voodoo.pipeline.start import start_tracker

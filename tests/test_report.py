@@ -1,7 +1,9 @@
 """The page of a result, looked at in Chromium: nothing fails, nothing is fetched, and play turns the skeleton."""
 
+import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -11,6 +13,8 @@ from commands import refused, run
 from test_doors import track_of
 from test_exports import with_gaps
 from voodoo.export.people import PeopleTrack
+from voodoo.export.track import Track
+from voodoo.recordings import sample_path
 
 pytest.importorskip("plotly", reason="pip install plotly, of the extra report")
 PLAY = """<script>setTimeout(() => {
@@ -41,6 +45,32 @@ def test_a_page_plays_without_network(tmp_path):
     assert slider > 0 and moved and cursor > 0.0 and fetched == [] and console == []
     assert "<script>boom()" not in page
     assert "<h1>all &lt;b&gt;</h1>" in page and "12 tracking" in page and "13 searching" in page
+
+
+FILM = """<script>setTimeout(() => {
+  const film = document.getElementById("film"), plot = document.querySelector(".js-plotly-plot");
+  plot.querySelector(".updatemenu-button").dispatchEvent(new MouseEvent("click"));
+  setTimeout(() => fetch("/", {method: "POST", body: JSON.stringify([film.videoWidth, film.duration, film.currentTime,
+    plot._fullData.filter((one) => one.fill === "toself").length])}), 1500);
+}, 800)</script>"""
+
+
+@needs_chromium
+def test_the_film_goes_with_the_timeline_and_angles_have_deviations(tmp_path):
+    result, film = tmp_path / "pose.npz", tmp_path / "look.mp4"
+    assert run("track", sample_path(), "--use", "depth", "--out", result, "--overlay", film).exit_code == 0
+    track = Track.load(result)
+    assert track.angle_sigma.shape == track.angles.shape
+    known = track.angle_sigma[np.isfinite(track.angle_sigma)]
+    assert len(known) > 0.8 * track.angles.size and math.radians(0.1) < np.median(known) < math.radians(20.0)
+    done = run("report", result, "--film", film, "--out", tmp_path / "r.html")
+    assert done.exit_code == 0, done.stderr
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    (width, duration, at, bands), console = told_by(page + FILM, tmp_path)
+    assert width == cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_WIDTH) and console == []
+    assert duration == pytest.approx(len(track) / 30.0, abs=0.2) and 0.1 < at <= duration
+    assert bands == len(track.angle_names) and "Left out: nothing" in page
+    refused(run("report", result, "--film", result, "--out", tmp_path / "none.html"), "expected a film")
 
 
 def test_what_is_no_result_leaves_no_page(tmp_path):

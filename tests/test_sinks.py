@@ -15,12 +15,15 @@ from scipy.spatial.transform import Rotation
 import voodoo
 from browser import needs_chromium, told_by
 from commands import run
+from live_rig import ByHand
 from test_doors import track_of
 from voodoo.errors import VoodooError
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
+from voodoo.live import Live
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.follow import Step
+from voodoo.live.session import Output, Session
 from voodoo.live.sinks import register, sink_of
 from voodoo.recordings import sample_path
 
@@ -124,25 +127,110 @@ def test_vmc_tells_that_nobody_is_there_and_refuses_what_is_no_human(receiver):
     sink.close()
 
 
-def test_a_dead_receiver_of_vmc_is_named_once_and_receives_when_it_is_back(receiver, monkeypatch):
-    monkeypatch.setattr("voodoo.live.sinks.vmc._BACK_S", 0.1)
-    body, messages = voodoo.Body.human(), []
+class Paced:
+    """Live frames of one pose that a test hands to a session, which tracks nothing."""
+
+    def __init__(self, outputs, body):
+        self.messages, self.count, self.track, self.body = [], 0, posed(body, {}), body
+        self.live = Live([ByHand()], on_message=self.messages.append)
+        self.live.__enter__()
+        self.session = Session(self.live, lambda frame: self, outputs=outputs)
+
+    def step(self, frame):  # as of a Follower
+        return step_of(self.track, self.body, stamp=frame.stamp)
+
+    def send(self, count, every=0.01):
+        """Hand frames over; those the session tracked."""
+        for _ in range(count):
+            before, self.count = self.session.tracking.count, self.count + 1
+            self.live._frames.put(LiveFrame(float(self.count), (), self.count, time.time(), time.time(), False))
+            until(lambda before=before: self.session.tracking.count > before)
+            self.session.wait(every)
+
+    def finish(self):
+        self.session.finish()
+        self.live.close()
+
+
+def test_a_dead_receiver_of_vmc_is_named_once_and_receives_when_it_is_back(monkeypatch):
+    monkeypatch.setattr("voodoo.live.session._BACK_S", 0.1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as place:
         place.bind(("127.0.0.1", 0))
         port = place.getsockname()[1]
-    sink = opened(f"vmc://127.0.0.1:{port}", messages)
-    step = step_of(posed(body, {}), body)
-    for _ in range(10):
-        sink.publish(step)
-    assert messages == [f"vmc://127.0.0.1:{port}: nobody receives: Connection refused"]
+    rig = Paced([opened(f"vmc://127.0.0.1:{port}")], voodoo.Body.human())
+    rig.send(10)
+    assert rig.messages == [f"vmc://127.0.0.1:{port}: nobody receives: Connection refused"]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as place:
         place.bind(("127.0.0.1", port))
-        for _ in range(10):
-            sink.publish(step)
-            time.sleep(0.03)
+        rig.send(10, every=0.03)
         assert place.recv(65536).startswith(b"#bundle\0")
-    assert messages[1:] == [f"vmc://127.0.0.1:{port}: receives again"]
-    sink.close()
+    assert rig.messages[1:] == [f"vmc://127.0.0.1:{port}: receives again"]
+    rig.finish()
+
+
+class Fake(Output):
+    """A receiver that hangs while `free` is not set, and fails while `dead`."""
+
+    receiver = True
+
+    def __init__(self, name, *, prompt=False):
+        self.name, self.prompt = name, prompt
+        self.free, self.dead, self.stamps, self.closed = threading.Event(), False, [], False
+        self.free.set()
+
+    def publish(self, step):
+        self.free.wait()
+        if self.dead:
+            raise ConnectionResetError(104, "Connection reset by peer")
+        self.stamps.append(step.stamp)
+
+    def close(self):
+        self.closed = True
+
+
+def test_receivers_that_hang_die_and_return_hold_nobody_and_are_named_once(monkeypatch):
+    monkeypatch.setattr("voodoo.live.session._LATE_S", 0.1)
+    monkeypatch.setattr("voodoo.live.session._BACK_S", 0.05)
+    monkeypatch.setattr("voodoo.live.session._CLOSE_S", 0.2)
+    good, hangs, dies, prompt = Fake("good"), Fake("hangs"), Fake("dies"), Fake("prompt", prompt=True)
+    rig = Paced([good, hangs, dies, prompt], voodoo.Body.human())
+    rig.send(3)
+    hangs.free.clear()
+    prompt.free.clear()
+    dies.dead = True
+    rig.send(20)
+    until(lambda: good.stamps[-1] == 23.0)
+    assert rig.session.tracking.count == 23 and len(good.stamps) >= 20  # all were tracked, whoever hangs
+    assert sorted(rig.messages) == [
+        "dies: nobody receives: Connection reset by peer",
+        "hangs: takes nothing; it gets the newest pose when it does",
+        "prompt: takes nothing; it gets the newest pose when it does",
+    ]
+    dies.dead = False
+    hangs.free.set()
+    prompt.free.set()
+    until(lambda: hangs.stamps[-1] == prompt.stamps[-1] == 23.0)  # the newest; it had 4.0 in its hands
+    assert len([stamp for stamp in hangs.stamps if 4.0 < stamp < 23.0]) == 0
+    rig.send(10)
+    assert sorted(rig.messages[3:]) == [f"{name}: receives again" for name in ("dies", "hangs", "prompt")]
+    hangs.free.clear()
+    rig.send(1, every=0.0)
+    began = time.monotonic()
+    rig.finish()  # neither for ever nor with an error
+    assert time.monotonic() - began < 1.0 and good.closed and dies.closed and prompt.closed
+    assert rig.messages[6:] == ["hangs: did not take the last pose"]
+    hangs.free.set()
+
+
+def test_what_is_no_receiver_ends_the_session_with_its_error():
+    disk = Fake("disk")
+    disk.receiver, disk.dead = False, True
+    rig = Paced([disk], voodoo.Body.human())
+    with pytest.raises(ConnectionResetError):
+        rig.send(50)
+    with pytest.raises(ConnectionResetError):
+        rig.finish()
+    rig.live.close()
 
 
 def shape_of(value):

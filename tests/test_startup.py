@@ -58,6 +58,13 @@ def test_help_and_version_are_there_at_once(words):
     assert own < OF_TYPER * typer, f"{own:.2f} s at best, {typer:.2f} s of it Typer"
 
 
+def test_the_version_takes_less_than_a_tenth_of_a_second():
+    version = "import runpy, sys; sys.argv[1:] = ['--version']; runpy.run_module('voodoo', run_name='__main__')"
+    assert min(processor_seconds(version) for _ in range(8)) < 0.1
+    done = subprocess.run([sys.executable, "-m", "voodoo", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"voodoo {voodoo.__version__}\n"
+
+
 def test_the_package_imports_nothing_heavy():
     code = f"import sys, voodoo\nprint([name for name in {(*HEAVY, 'typer')!r} if name in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

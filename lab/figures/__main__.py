@@ -1,7 +1,7 @@
 """Write the figures into the pages: `python -m lab.figures [--check] [--pictures [--data D]]`.
 
 Numbers come from runs.json; change them there, after a run of the command that is named beside them. `--check` only compares,
-and names the pages that differ. `--pictures` draws docs/demo.png (the bundled recording), docs/joint-frames.png and
+and names the pages that differ. `--pictures` draws docs/demo.webp (the bundled recording), docs/joint-frames.png and
 docs/failures.png (a rendered recording of the data folder, by default ../shared/data) with this build.
 """
 

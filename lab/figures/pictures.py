@@ -17,17 +17,16 @@ from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording, sample_path
 from voodoo.visualization.overlay import Overlay
-from voodoo.visualization.sheet import contact_sheet
 
-PICTURED = (0, 18, 53, 71)
-"""Frames of the bundled recording in docs/demo.png."""
-WIDTH = 1068
-"""Of docs/demo.png [px]."""
+EVERY = 2
+"""Frames of the bundled recording for each of docs/demo.webp."""
+WIDTH, QUALITY = 800, 55
+"""Of docs/demo.webp [px, %]."""
 
 
 def draw(data: Path) -> None:
-    """Draw docs/demo.png, docs/joint-frames.png and docs/failures.png; `data` is the folder of the measurement data."""
-    _demo(ROOT / "docs" / "demo.png")
+    """Draw docs/demo.webp, docs/joint-frames.png and docs/failures.png; `data` is the folder of the measurement data."""
+    _demo(ROOT / "docs" / "demo.webp")
     _joint_frames(ROOT / "docs" / "joint-frames.png")
     recordings = sorted((data / "rendered").glob("dev_*"))
     if not recordings:
@@ -60,13 +59,17 @@ def _joint_frames(target: Path) -> None:
 
 
 def _demo(target: Path) -> None:
-    """The model over the images of the bundled recording."""
+    """The model over the images of the bundled recording, as a moving picture."""
     recording = open_recording(sample_path())
-    tracker, overlay, tiles = start_tracker(recording), Overlay(recording), []
+    tracker, overlay, moving = start_tracker(recording), Overlay(recording), cv2.Animation()
+    frames = []
     for frame in track(recording, tracker):
-        if frame.index in PICTURED:
+        if frame.index % EVERY == 0:
             displayed = overlay.draw(
                 frame.recorded, tracker.body, frame.estimate, index=frame.index, front_end=frame.front_end
             )
-            tiles.append(displayed.copy())
-    cv2.imwrite(str(target), contact_sheet(tiles, columns=2, width=WIDTH))
+            size = (WIDTH, round(displayed.shape[0] * WIDTH / displayed.shape[1]))
+            frames.append(cv2.resize(displayed, size, interpolation=cv2.INTER_AREA))
+    moving.frames, moving.durations = frames, [round(1000 * EVERY / recording.info().rate_hz)] * len(frames)
+    if not cv2.imwriteanimation(str(target), moving, [cv2.IMWRITE_WEBP_QUALITY, QUALITY]):
+        sys.exit(f"lab.figures: {target} cannot be written")

@@ -16,12 +16,12 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from voodoo.batch.storage import Store, named
-from voodoo.batch.summary import FAILED, Row, read_table, write_table
+from voodoo.batch.summary import FAILED, REPORTS, Row, read_table, write_index, write_table
 from voodoo.batch.task import Job, Settings, do, failed, stored_row
 from voodoo.children import children
 from voodoo.errors import VoodooError, reading
 
-SUMMARY, SETTINGS = "summary.csv", "settings.json"
+SUMMARY, SETTINGS, INDEX = "summary.csv", "settings.json", "index.html"
 _EVERY_S, _FRACTION = 2.0, 0.05
 """Shortest time between two writes of the table of summaries [s], and largest fraction of the time spent on it, because the table
 of a million recordings is large."""
@@ -40,6 +40,7 @@ class Batch:
         out: path or URL of the folder; results of an earlier run with the same settings are kept.
         settings: settings for all recordings.
         limit_s: longest time for a recording [s].
+        report: also write a page for each recording that is tracked, and an index of them.
 
     Attributes:
         rows: rows of the finished and failed recordings, by name.
@@ -50,9 +51,17 @@ class Batch:
         VoodooError: the folder cannot be used, or has results with other settings.
     """
 
-    def __init__(self, sources: Sequence[str], out: str, settings: Settings, *, limit_s: float | None = None) -> None:
+    def __init__(
+        self,
+        sources: Sequence[str],
+        out: str,
+        settings: Settings,
+        *,
+        limit_s: float | None = None,
+        report: bool = False,
+    ) -> None:
         """Determine which recordings are done: those whose tables are complete."""
-        self._store = Store(out)
+        self._store, self._report = Store(out), report
         self.notes: list[str] = []
         self._check_settings(settings)
         names = sorted(self._store.recordings())
@@ -63,7 +72,7 @@ class Batch:
         failed = {name: row for name, row in known.items() if row.status == FAILED}
         self.rows = {**failed, **done}
         pairs = named(sources, {name: row.source for name, row in {**known, **done}.items()})
-        self.jobs = [Job(name, source, out, settings, limit_s) for name, source in pairs if name not in done]
+        self.jobs = [Job(name, source, out, settings, limit_s, report) for name, source in pairs if name not in done]
         self._written, self._took = -_EVERY_S, 0.0
 
     def _check_settings(self, settings: Settings) -> None:
@@ -108,6 +117,9 @@ class Batch:
         """Write the table of summaries."""
         began = time.monotonic()
         self._store.write(SUMMARY, write_table(self.rows.values()).encode())
+        if self._report:
+            page = write_index(self.rows.values(), self._store.names(REPORTS))
+            self._store.write(INDEX, page.encode())
         self._written = time.monotonic()
         self._took = self._written - began
 

@@ -219,10 +219,14 @@ class Store:
         place = f"{top}/{self.place_of(recording)}"
         return files.open(place, "rb") if files.exists(place) else None
 
+    def names(self, folder: str) -> set[str]:
+        """Names of the files in a folder."""
+        files, top = self._at
+        if not files.isdir(f"{top}/{folder}"):
+            return set()
+        return {str(name).rstrip("/").rsplit("/", 1)[-1] for name in files.ls(f"{top}/{folder}", detail=False)}
+
     def recordings(self) -> set[str]:
         """Names of recordings with a folder of results."""
-        files, top = self._at
-        if not files.isdir(f"{top}/frames"):
-            return set()
-        folders = (str(name).rstrip("/").rsplit("/", 1)[-1] for name in files.ls(f"{top}/frames", detail=False))
-        return {unquote(name.removeprefix("recording=")) for name in folders if name.startswith("recording=")}
+        start = "recording="
+        return {unquote(name.removeprefix(start)) for name in self.names("frames") if name.startswith(start)}

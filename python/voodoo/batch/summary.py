@@ -5,13 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, fields
+from html import escape
 from typing import Any
+from urllib.parse import quote
 
 from voodoo.errors import VoodooError
 
 DONE, FAILED = "done", "failed"
+REPORTS = "reports"
+"""Folder of the pages of recordings."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,20 @@ def read_table(text: str, source: object) -> dict[str, Row]:
     if header[:5] != list(COLUMNS[:5]):
         raise VoodooError(f"{source}: expected the columns {', '.join(COLUMNS[:5])}, found {', '.join(header[:5])}")
     return {row.recording: row for row in found}
+
+
+def write_index(rows: Iterable[Row], pages: Container[str]) -> str:
+    """A web page with the table, and links to those `pages` (names of files in REPORTS) that there are."""
+    shown = COLUMNS[:-1]
+    lines = ["<!DOCTYPE html><html lang=en><meta charset=utf-8><title>recordings</title>"]
+    lines += ["<body style='font:15px sans-serif;margin:1.5em'><table cellpadding=4>"]
+    lines.append(f"<tr>{''.join(f'<th align=left>{name}' for name in shown)}")
+    for row in sorted(rows, key=lambda row: row.recording):
+        cells = [escape(cell) for cell in row.cells()[: len(shown)]]
+        if f"{row.recording}.html" in pages:
+            cells[0] = f"<a href='{REPORTS}/{quote(row.recording)}.html'>{cells[0]}</a>"
+        lines.append(f"<tr>{''.join(f'<td>{cell}' for cell in cells)}")
+    return "\n".join([*lines, "</table></body></html>", ""])
 
 
 def _cell(value: object) -> str:

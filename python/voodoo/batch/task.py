@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from voodoo.batch.storage import Store, on_disk
-from voodoo.batch.summary import DONE, FAILED, Row
+from voodoo.batch.summary import DONE, FAILED, REPORTS, Row
 from voodoo.batch.table import Columns, columns_of, encode, note_of, stacked
 from voodoo.config import Config
 from voodoo.errors import RecordingError
@@ -33,6 +33,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
+from voodoo.visualization.report_page import report_page
 
 T = TypeVar("T")
 _TOGETHER = 500
@@ -74,13 +75,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Job:
-    """A recording to track: name, source, target of its table, settings, and longest time [s]."""
+    """A recording to track: name, source, target of its table, settings, longest time [s], and whether a page shows it."""
 
     name: str
     source: str
     out: str
     settings: Settings
     limit_s: float | None = None
+    report: bool = False
 
 
 def do(job: Job) -> Row:
@@ -150,12 +152,18 @@ def _track(job: Job, path: Path) -> tuple[Row, Columns]:
     parts = (_one_person if one_only else _people)(job, recording, settings, config, left_out)
     columns: list[Columns] = []
     found: dict[int, list[Track]] = {}
+    whole: dict[int, list[Track]] = {}
     for part in parts:
         columns.append(columns_of(part))
         for one, own in part.items():
             found.setdefault(one, []).append(joined([own]))
+            if job.report:
+                whole.setdefault(one, []).append(replace(own, left_out={} if left_out is None else left_out.counts))
     if one_only and not columns:
         raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
+    if job.report:
+        shown = {f"person {one}": Track.joined(own) for one, own in whole.items()}
+        Store(job.out).write(f"{REPORTS}/{job.name}.html", report_page(job.name, shown).encode())
     tracks = {one: joined(own) for one, own in found.items()}
     error = _error(recording, tracks[1]) if one_only else float("nan")
     words = [word for one in tracks.values() for word in one.status]

@@ -55,6 +55,12 @@ def batch_command(
     option: LoaderNumberOption = None,
     layout: LayoutOption = None,
     strict: StrictOption = False,
+    pages: Annotated[
+        bool,
+        typer.Option(
+            "--pages", help="Also write a page for each recording that is tracked, and index.html with links."
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Track many recordings, on this machine or on a cluster, one task each.
@@ -62,6 +68,8 @@ def batch_command(
     Writes DIR/frames/recording=NAME/, a Parquet data set with a row for every frame and person, and DIR/summary.csv, a row for
     every recording: recording, frames, seconds, status (done, failed), error, and more. It needs
     pip install 'voodoo-tracker[batch]'.
+
+    --pages writes DIR/reports/NAME.html, the page of voodoo report, for each recording that is tracked now, and DIR/index.html.
 
     Run it again to resume: finished recordings are skipped, failed ones are repeated. The row of a failed recording has the
     reason, and the command ends with exit code 1. The task of a worker that dies is repeated once.
@@ -87,7 +95,7 @@ def batch_command(
     from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
-    with clear_errors(), reporting(as_json) as report:
+    with clear_errors(), reporting(as_json) as told:
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         _, limit = limit_of(people)
@@ -106,7 +114,13 @@ def batch_command(
         sources = find_sources(recordings, only=only or ())
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
-        batch = Batch(sources, out if "://" in out else str(local_path(out).absolute()), settings, limit_s=time_limit)
+        batch = Batch(
+            sources,
+            out if "://" in out else str(local_path(out).absolute()),
+            settings,
+            limit_s=time_limit,
+            report=pages,
+        )
         for note in batch.notes:
             print_message(note)
         batch.save()  # also of tables that it did not have
@@ -131,10 +145,10 @@ def batch_command(
         ours = [batch.rows[job.name] for job in batch.jobs if job.name in batch.rows]
         done = sum(row.status == DONE for row in ours)
         message = f"{done} of {len(batch.jobs)} recordings done, {before} before; wrote {out}"
-        if report is not None:
-            report |= {"out": out, "recordings": list(batch.rows.values())}
+        if told is not None:
+            told |= {"out": out, "recordings": list(batch.rows.values())}
         print_interrupted(interrupted, message)
-        if report is None:
+        if told is None:
             typer.echo(message)
         broken = [row for row in ours if row.status == FAILED]
         if broken:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -23,6 +23,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    KeypointsOption,
     LayoutOption,
     LoaderNumberOption,
     LoaderOption,
@@ -34,7 +35,7 @@ from voodoo.cli.options import (
     ViewOption,
 )
 from voodoo.cli.signals import INTERRUPTED
-from voodoo.errors import NoPoseError
+from voodoo.errors import NoPoseError, VoodooError
 
 
 def live_command(
@@ -70,8 +71,8 @@ def live_command(
         list[str] | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Send poses to vmc://HOST[:PORT], or serve them at ws://[HOST][:PORT]; repeatable "
-            "(pip install 'voodoo-tracker[stream]').",
+            help="Send poses to vmc://HOST[:PORT] or ros2://, or serve them at ws://[HOST][:PORT] or "
+            "foxglove://[HOST][:PORT]; repeatable (pip install 'voodoo-tracker[stream,foxglove]').",
         ),
     ] = None,
     publish: Annotated[
@@ -101,6 +102,7 @@ def live_command(
     topic: TopicOption = None,
     option: LoaderNumberOption = None,
     loader: LoaderOption = None,
+    keypoints: KeypointsOption = None,
     layout: LayoutOption = None,
 ) -> None:
     """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
@@ -127,6 +129,7 @@ def live_command(
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
     from voodoo.export.files import STDOUT, check_target
+    from voodoo.pipeline.inputs import keypoint_words
     from voodoo.pipeline.start import beginning_of
 
     with clear_errors():
@@ -159,12 +162,14 @@ def live_command(
             serve=serve,
             publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,
         )
-        options = loader_words(topic, option, layout=layout)
+        folders, network = keypoint_words(keypoints or (), layout)
+        if folders:
+            raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
+        options = loader_words(topic, option, layout=layout if network is None else None)
         if loader is not None:
             options["loader"] = loader
-        source = entered(
-            sources, calibration or (), rate=rate, loop=loop, root_frame=frame, options=options, several=several
-        )
+        how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": frame, "options": options}
+        source = entered(sources, calibration or (), several=several, network=network, **how)
         recover_before([*wishes.targets, *([record] if record is not None else [])])
         done = run(source, wishes, duration=duration, report=report)
         for path in done.written:

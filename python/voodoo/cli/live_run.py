@@ -39,6 +39,7 @@ from voodoo.people import People
 from voodoo.pipeline.people import check_inputs
 from voodoo.pipeline.start import Beginning, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.sensors.settings import Box, FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
@@ -51,6 +52,8 @@ _STANDING = {
     "l_hip": (2.4, 0.09, 0.93),
     "r_hip": (2.4, -0.09, 0.93),
 }
+ROS2 = "ros2://"
+"""Address of `--publish`."""
 _TICK_S = 0.05
 _LINE_S = 1.0
 _TOGETHER = 30
@@ -102,6 +105,7 @@ def entered(
     root_frame: str | None,
     options: Mapping[str, Any],
     several: bool = False,
+    network: KeypointNetwork | None = None,
 ) -> Live:
     """The sources of the command line.
 
@@ -119,7 +123,7 @@ def entered(
         )
         for word, place in zip(words, places, strict=True)
     ]
-    return Live(sources, on_message=print_message, eager=not several)
+    return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
 def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | None) -> Done:
@@ -195,12 +199,9 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
 
 def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | None]:
     # Addresses come first: one that is of no use leaves no file behind.
-    outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in wishes.to]
+    addresses = [*wishes.to, *([ROS2] if wishes.publish and ROS2 not in wishes.to else [])]
+    outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
-    if wishes.publish:
-        from voodoo.live.ros2.publisher import Ros2Output
-
-        outputs.append(Ros2Output(lambda: live.root_frame))
     if wishes.targets:
         files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
         outputs.append(files)

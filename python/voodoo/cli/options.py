@@ -122,6 +122,15 @@ LayoutOption = Annotated[
         help=f"Layout of all keypoints: {', '.join(LAYOUTS)}; by default told by their number and the shape of the persons.",
     ),
 ]
+KeypointsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--keypoints",
+        metavar="NETWORK|SENSOR=DIR",
+        help="A network to run on color images: mediapipe[:FILE.task], rtmpose[:MODE or :DETECTOR.onnx,POSE.onnx], or "
+        "MODULE:FUNCTION of yours; or OpenPose JSON files, one for each image of SENSOR; repeatable.",
+    ),
+]
 UseOption = Annotated[
     str | None,
     typer.Option(
@@ -150,8 +159,8 @@ UprightOption = Annotated[
     ),
 ]
 RESULTS = (
-    "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, a folder (ROS 2 bag), or - for CSV on stdout; "
-    "repeatable"
+    "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, .foxglove.mcap, a folder (ROS 2 bag), or - for CSV on "
+    "stdout; repeatable"
 )
 OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}.")]
 OutOrNameOption = Annotated[

@@ -14,15 +14,19 @@ from voodoo.errors import VoodooError
 def report_command(
     result: Annotated[Path, typer.Argument(metavar="FILE", help="A .csv or .npz of voodoo track.")],
     out: Annotated[Path, typer.Option(metavar="FILE.html", help="The page.")] = Path("report.html"),
+    film: Annotated[
+        Path | None, typer.Option(metavar="FILE.mp4", help="The film of voodoo track --overlay, shown in the page.")
+    ] = None,
 ) -> None:
-    """Write a result as one web page: the skeleton turning in 3-D with a timeline, status of limbs, joint angles, residual.
+    """Write a result as one web page: the skeleton turning in 3-D with a timeline, status of limbs, joint angles with standard
+    deviations, residual, and what was left out.
 
     The page needs no network, and holds each person of the result.
     Needs pip install 'voodoo-tracker[report]'.
 
     Example
 
-    voodoo report pose.npz --out report.html
+    voodoo report pose.npz --film look.mp4 --out report.html
     """
     from voodoo.export.people import PeopleTrack
     from voodoo.export.people_rows import is_people_file
@@ -40,7 +44,7 @@ def report_command(
             tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
         else:
             tracks = {"the person": Track.load(result)}
-        page = report_page(result.stem, tracks)
+        page = report_page(result.stem, tracks, film=film)
         with appearing_whole(out) as place:
             place.write_text(page, encoding="utf-8")
         typer.echo(f"wrote {out}")

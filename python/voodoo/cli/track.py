@@ -29,6 +29,7 @@ from voodoo.cli.options import (
     FrameOption,
     HeightOption,
     InitOption,
+    KeypointsOption,
     LayoutOption,
     LoaderNumberOption,
     LoaderOption,
@@ -86,10 +87,7 @@ def track_command(
         typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
     ] = None,
     offset: Annotated[float, typer.Option(metavar="S", help="Seconds to add to the stamps of --with.")] = 0.0,
-    keypoints: Annotated[
-        list[str] | None,
-        typer.Option(metavar="SENSOR=DIR", help="OpenPose JSON files, one for each image of SENSOR; repeatable."),
-    ] = None,
+    keypoints: KeypointsOption = None,
     layout: LayoutOption = None,
     marker_map: Annotated[
         Path | None,
@@ -142,6 +140,8 @@ def track_command(
 
     voodoo track four_videos/ --init start.json --background empty/ --out walk.csv
 
+    voodoo track walk_bag/ --keypoints mediapipe --out walk.csv
+
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
     from dataclasses import replace
@@ -169,7 +169,7 @@ def track_command(
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
     from voodoo.people import People
-    from voodoo.pipeline.inputs import join, keypoint_folders, loader_options
+    from voodoo.pipeline.inputs import join, keypoint_words, loader_options
     from voodoo.pipeline.people import track_people
     from voodoo.pipeline.run import track
     from voodoo.pipeline.start import AUTO, beginning_of, start_tracker, starts_of
@@ -196,11 +196,13 @@ def track_command(
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
         options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
+        folders, network = keypoint_words(keypoints or (), layout)
         source = join(
             opened(
                 recording, options.pop("loader", loader), frame, left_out=left_out, **options, **bare_for(beginning)
             ),
-            keypoints=keypoint_folders(keypoints or ()),
+            keypoints=folders,
+            network=network,
             layout=layout,
             others=others,
             offset=offset,

@@ -28,6 +28,19 @@ def angles_of_estimates(estimates: Sequence[Estimate], body: Body | None) -> tup
     return names, np.array(rows, dtype=np.float64)
 
 
+def angle_sigmas_of(estimates: Sequence[Estimate], names: Sequence[str]) -> FloatArray:
+    """Standard deviations (F, A) [rad] of the angles, of a joint with three angles the root mean square of all three; NaN where
+    unknown, and (F, 0) if unknown in all frames."""
+    joints = [name.rpartition("_")[0] for name in names]
+    free = np.array([joints.count(joint) for joint in joints], dtype=np.float64)
+    found = np.full((len(estimates), len(names)), np.nan)
+    for index, estimate in enumerate(estimates):
+        known = getattr(estimate, "angle_covariance", {})
+        variances = {joint: float(np.trace(known[joint])) for joint in {*joints} & known.keys()}
+        found[index] = [variances.get(joint, np.nan) for joint in joints]
+    return np.sqrt(found / free) if np.isfinite(found).any() else np.empty((len(estimates), 0))
+
+
 def covariances_of(
     estimates: Sequence[Estimate], joint_names: Sequence[str], limb_names: Sequence[str]
 ) -> tuple[FloatArray, FloatArray]:

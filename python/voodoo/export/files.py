@@ -13,6 +13,8 @@ from pathlib import Path
 from voodoo.errors import VoodooError, reason
 from voodoo.export.bvh import write_bvh
 from voodoo.export.c3d_file import write_c3d
+from voodoo.export.foxglove import SUFFIX as FOXGLOVE
+from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
 from voodoo.export.opensim import write_mot, write_sto
 from voodoo.export.result_file import SUFFIXES
@@ -32,7 +34,7 @@ ONE_PERSON: Mapping[str, Callable[[Path, Track, Body], None]] = {
 }
 """Writers of formats that hold one person with z up, by suffix."""
 FORMATS = (*SUFFIXES, *ONE_PERSON, ".glb", ".mcap")
-"""Suffixes; a path without one is a ROS 2 bag folder."""
+"""Suffixes; a path without one is a ROS 2 bag folder, and one in .foxglove.mcap has Foxglove's schemas."""
 STDOUT = Path("-")
 """The target that is CSV on standard output."""
 
@@ -69,7 +71,12 @@ def is_folder(path: Path) -> bool:
 
 def is_bag(path: Path) -> bool:
     """Whether a name is that of a bag: an .mcap file or a folder."""
-    return path.suffix == ".mcap" or (path != STDOUT and is_folder(path))
+    return (path.suffix == ".mcap" and not is_foxglove(path)) or (path != STDOUT and is_folder(path))
+
+
+def is_foxglove(path: Path) -> bool:
+    """Whether a name is that of an .mcap file with the schemas of Foxglove."""
+    return path.name.endswith(FOXGLOVE)
 
 
 def is_table(path: Path) -> bool:
@@ -151,6 +158,8 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | 
     with appearing_whole(path) as place:
         if path.suffix in ONE_PERSON:
             ONE_PERSON[path.suffix](place, upright(track, root_frame, turn)[0], body)
+        elif is_foxglove(path):
+            write_foxglove(place, {"p1": (track, body)}, root_frame=root_frame, turn=turn)
         elif path.suffix == ".glb":
             write_glb(place, {path.stem: (upright(track, root_frame, turn)[0], body)})
         else:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from voodoo.export.conventions import NAMES
 from voodoo.export.skeleton import FloatArray, Skeleton
 from voodoo.export.track import Track
+from voodoo.model.rotations import quaternions
 
 FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
@@ -39,6 +42,18 @@ def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[
             if bone.name.endswith(limb) and side + end not in track.limb_names and side + site in sites:
                 frames[f"{side}{site}_{person}"] = (limb_frames[number], _pose(turn, sites[side + site]))
     return frames
+
+
+def on_parents(
+    frames: Mapping[str, tuple[str | None, FloatArray]],
+) -> list[tuple[str, str | None, list[float], list[float]]]:
+    """Of each frame: name, parent, and place (3) [m] and rotation (x, y, z, w) on it."""
+    poses = np.array([pose for _, pose in frames.values()])
+    above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
+    relative = np.linalg.inv(above) @ poses
+    turns, places = quaternions(relative[:, :3, :3]).tolist(), relative[:, :3, 3].tolist()
+    parents = [parent for parent, _ in frames.values()]
+    return list(zip(frames, parents, places, turns, strict=True))
 
 
 def _pose(turn: FloatArray, place: FloatArray) -> FloatArray:

@@ -113,6 +113,7 @@ class PeopleTrack:
             angles=spread(track.angles),
             covariance=spread(track.covariance),
             root_covariance=spread(track.root_covariance),
+            angle_sigma=spread(track.angle_sigma),
         )
 
     def save(self, path: str | Path) -> None:

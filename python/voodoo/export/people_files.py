@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag, on_stdout
+from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag, is_foxglove, on_stdout
+from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import person_id, write_people_bag
@@ -43,10 +44,14 @@ def save_people(
                 ONE_PERSON[path.suffix](place, track, bodies[one])
             written.append(own)
         return written
-    if is_bag(path):
+    if is_bag(path) or is_foxglove(path):
         people = {person_id(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
-        with appearing_whole(path) as place, bag_folder(place) as folder:
-            write_people_bag(folder, people, root_frame=root_frame, turn=turn)
+        with appearing_whole(path) as place:
+            if is_foxglove(path):
+                write_foxglove(place, people, root_frame=root_frame, turn=turn)
+            else:
+                with bag_folder(place) as folder:
+                    write_people_bag(folder, people, root_frame=root_frame, turn=turn)
     elif path.suffix == ".glb":
         shown = {one: upright(result.unbroken(one, to_the_end=True), root_frame, turn)[0] for one in result.tracks}
         with appearing_whole(path) as place:

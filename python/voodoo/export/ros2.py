@@ -9,6 +9,7 @@ left, z up when the person stands at rest (REP-103). The parent of `body_<id>` i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.human_frames import frame_poses
+from voodoo.export.human_frames import frame_poses, on_parents
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
 from voodoo.export.track import Track
@@ -125,17 +126,26 @@ def write_people_bag(
 class _Human:
     """The messages of one person."""
 
-    def __init__(self, track: Track, body: Body, person: str, root_frame: str, turn: Turn | None = None) -> None:
+    def __init__(
+        self,
+        track: Track,
+        body: Body,
+        person: str,
+        root_frame: str,
+        turn: Turn | None = None,
+        posed: Skeleton | None = None,
+    ) -> None:
         if not root_frame:
             raise VoodooError("root_frame: expected a name, found none")
         self._given_root = root_frame
-        track, self.root = upright(track, root_frame, turn)
+        standing, self.root = upright(track, root_frame, turn)
+        track = standing if posed is None else track
         pose = (by_axes(root_frame) if turn is None else turn).pose
         self._above = (quaternions(pose[:3, :3].T).tolist(), (-pose[:3, :3].T @ pose[:3, 3]).tolist())
         self.track, self.body, self.person, self.topic = track, body, person, f"{BODIES}/{person}"
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
-        self._posed, self._displayed = skeleton(track, body), track.found
+        self._posed, self._displayed = posed or skeleton(track, body), track.found
         displayed = self._displayed
         self._names, angles = (
             joint_angles(self._posed.of_frames(displayed)) if displayed.any() else ((), np.empty((0, 0)))
@@ -154,7 +164,11 @@ class _Human:
         header = _header(nanoseconds, self.root)
         messages: dict[str, Any] = {}
         if self._displayed[index]:
-            transforms = _transforms(self.track, self._posed, index, self.root, self.person, nanoseconds)
+            frames = frame_poses(self.track, self._posed, index, self.person)
+            transforms = [
+                _transform(_header(nanoseconds, parent or self.root), name, turn, place)
+                for name, parent, place, turn in on_parents(frames)
+            ]
             if self.root != self._given_root:
                 above = _header(nanoseconds, self._given_root)
                 transforms.insert(0, _transform(above, self.root, *self._above))
@@ -168,7 +182,7 @@ class _Human:
                 effort=np.empty(0),
             )
             if np.isfinite(self.track.root_covariance[index]).all():
-                pose = _body_pose(self.track, self._posed, index, self.person)
+                pose = _body_pose(self.track, index, frames[f"body_{self.person}"][1])
                 messages[f"{self.topic}/pose"] = _new(_POSE, header=header, pose=pose)
         if markers:
             drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
@@ -207,19 +221,6 @@ def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None
                 writer.write(connect[name], round(stamp * 1e9), STORE.serialize_cdr(message, message.__msgtype__))
 
 
-def _transforms(track: Track, posed: Skeleton, index: int, root_frame: str, person: str, nanoseconds: int) -> list[Any]:
-    frames = frame_poses(track, posed, index, person)
-    poses = np.array([pose for _, pose in frames.values()])
-    above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
-    relative = np.linalg.inv(above) @ poses
-    turns = quaternions(relative[:, :3, :3]).tolist()
-    places = relative[:, :3, 3].tolist()
-    result = []
-    for (name, (parent, _)), place, turn in zip(frames.items(), places, turns, strict=True):
-        result.append(_transform(_header(nanoseconds, parent or root_frame), name, turn, place))
-    return result
-
-
 def _transform(header: Any, child: str, turn: Sequence[float], place: Sequence[float]) -> Any:  # noqa: ANN401
     (x, y, z), (qx, qy, qz, qw) = place, turn
     return _new(
@@ -234,9 +235,8 @@ def _transform(header: Any, child: str, turn: Sequence[float], place: Sequence[f
     )
 
 
-def _body_pose(track: Track, posed: Skeleton, index: int, person: str) -> Any:  # noqa: ANN401
+def _body_pose(track: Track, index: int, pose: FloatArray) -> Any:  # noqa: ANN401
     """The pose of the body's frame with its covariance, moved there from the origin of the first limb's frame."""
-    _, pose = frame_poses(track, posed, index, person)[f"body_{person}"]
     x, y, z = pose[:3, 3] - track.world_from_limb[index, 0, :3, 3]
     moved = np.eye(6)
     moved[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
@@ -264,14 +264,13 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
     points = [_point(position) for position in track.joints[index]]
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
-    for number, covariance in enumerate(track.covariance[index]):
-        if np.isfinite(covariance).all():
-            variances, axes = np.linalg.eigh(covariance)
-            axes[:, 0] *= np.sign(np.linalg.det(axes))
-            turn, radii = quaternions(axes), np.sqrt(np.maximum(variances, 0.0))
-            size = (2.0 * radii[0], 2.0 * radii[1], 2.0 * radii[2])
-            place = track.joints[index, number]
-            result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))
+    known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
+    variances, axes = np.linalg.eigh(track.covariance[index][known])
+    axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
+    sizes = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
+    for number, turn, size in zip(known.tolist(), quaternions(axes), sizes, strict=True):
+        place = track.joints[index, number]
+        result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))
     return result
 
 
@@ -290,15 +289,13 @@ def _marker(
     kind: int,
     place: FloatArray,
     turn: FloatArray,
-    size: tuple[float, float, float],
+    size: Sequence[float],
     rgb: tuple[float, float, float],
     points: list[Any],
     opacity: float = 0.6,
 ) -> Any:  # noqa: ANN401
-    x, y, z, w = (float(value) for value in turn)
-    no_image = _new(
-        "sensor_msgs/msg/CompressedImage", header=_header(0, ""), format="", data=np.empty(0, dtype=np.uint8)
-    )
+    x, y, z, w = turn.tolist()
+    no_image, for_ever, no_file = _nothing()
     return _new(
         "visualization_msgs/msg/Marker",
         header=header,
@@ -313,7 +310,7 @@ def _marker(
         ),
         scale=_new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
         color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
-        lifetime=_new("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+        lifetime=for_ever,
         frame_locked=False,
         points=points,
         colors=[],
@@ -322,9 +319,18 @@ def _marker(
         uv_coordinates=[],
         text="",
         mesh_resource="",
-        mesh_file=_new("visualization_msgs/msg/MeshFile", filename="", data=np.empty(0, dtype=np.uint8)),
+        mesh_file=no_file,
         mesh_use_embedded_materials=False,
     )
+
+
+@cache
+def _nothing() -> tuple[Any, Any, Any]:
+    """Fields of markers that are not used: an image, a lifetime and a mesh."""
+    no_bytes = np.empty(0, dtype=np.uint8)
+    image = _new("sensor_msgs/msg/CompressedImage", header=_header(0, ""), format="", data=no_bytes)
+    for_ever = _new("builtin_interfaces/msg/Duration", sec=0, nanosec=0)
+    return image, for_ever, _new("visualization_msgs/msg/MeshFile", filename="", data=no_bytes)
 
 
 def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
@@ -341,12 +347,19 @@ def _header(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
 
 
 def _point(position: FloatArray) -> Any:  # noqa: ANN401
-    x, y, z = (float(value) for value in position)
+    x, y, z = position.tolist()
     return _new("geometry_msgs/msg/Point", x=x, y=y, z=z)
 
 
 def instant(
-    estimate: Estimate, body: Body, *, root_frame: str, person: str, markers: bool = True, turn: Turn | None = None
+    estimate: Estimate,
+    body: Body,
+    *,
+    root_frame: str,
+    person: str,
+    markers: bool = True,
+    turn: Turn | None = None,
+    posed: tuple[Track, Skeleton] | None = None,
 ) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
 
@@ -357,12 +370,14 @@ def instant(
         person: REP-155 id.
         markers: also make the markers.
         turn: see `write_bag`.
+        posed: track and skeleton of the frame, already upright, if they are known.
 
     Raises:
         VoodooError: a stamp before zero.
     """
     # Angles are not needed; if nobody was found, the names come from the body.
-    human = _Human(Track.of([estimate], body=None if estimate.joints else body), body, person, root_frame, turn)
+    track, bones = posed or (Track.of([estimate], body=None if estimate.joints else body), None)
+    human = _Human(track, body, person, root_frame, turn, bones)
     return human.messages(0, markers=markers)
 
 

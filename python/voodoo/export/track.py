@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError, a_path, columns_in, reading
-from voodoo.export.collected import angles_of_estimates, covariances_of
+from voodoo.export.collected import angle_sigmas_of, angles_of_estimates, covariances_of
 from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
 from voodoo.export.result_file import check_suffix
 from voodoo.model.body import Body
@@ -34,7 +34,9 @@ _STATUS = "_status"
 """Suffix of the name of a limb's column in .csv."""
 _SIGMA = "_sigma_m"
 """Suffix of the name of a joint's column in .csv."""
-_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", "covariance", "root_covariance")
+_UNKNOWN = ("angle_sigma", "covariance", "root_covariance")
+"""Arrays that may be unknown in frames with a pose."""
+_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,6 +61,8 @@ class Track:
             NAME_sigma_m each: the root mean square of the standard deviations of x, y and z; they are not read again.
         root_covariance: (F, 6, 6) of the pose of the first limb: x, y, z [m], then rotations about the axes of the root frame
             [rad]; NaN where unknown. Not in .csv.
+        angle_sigma: (F, A) standard deviations of the joint angles [rad]; of a joint with three angles the root mean square of
+            all three; NaN where unknown, (F, 0) when there is none. Not in .csv.
 
     Positions, poses, angles and residual of a searching frame are NaN: there is no body (empty cells in .csv).
     """
@@ -76,6 +80,7 @@ class Track:
     left_out: Mapping[str, int] = field(default_factory=dict)
     covariance: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3, 3)))
     root_covariance: FloatArray = field(default_factory=lambda: np.empty((0, 6, 6)))
+    angle_sigma: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     def __post_init__(self) -> None:
         """Check that the arrays are consistent, and that all frames with a pose status have a pose."""
@@ -84,6 +89,8 @@ class Track:
             object.__setattr__(self, "angles", np.empty((frames, 0)))
         if not self.covariance.size:
             object.__setattr__(self, "covariance", np.empty((frames, 0, 3, 3)))
+        if not self.angle_sigma.size:
+            object.__setattr__(self, "angle_sigma", np.empty((frames, 0)))
         if not self.root_covariance.size:
             object.__setattr__(self, "root_covariance", np.full((frames, 6, 6), np.nan))
         if len(self.status) != frames:
@@ -99,6 +106,7 @@ class Track:
             "world_from_limb": (frames, limbs, 4, 4),
             "covariance": (frames, joints if self.covariance.size else 0, 3, 3),
             "root_covariance": (frames, 6, 6),
+            "angle_sigma": (frames, len(self.angle_names) if self.angle_sigma.size else 0),
         }
         for name, shape in expected.items():
             array = getattr(self, name)
@@ -111,8 +119,7 @@ class Track:
 
     def _check_numbers(self, name: str, array: FloatArray) -> None:
         """Reject poses that are NaN, and poses in searching frames."""
-        if name in ("covariance", "root_covariance"):
-            # Covariances may be unknown.
+        if name in _UNKNOWN:
             return
         searching = ~self.found.reshape(-1, *[1] * (array.ndim - 1))
         finite = np.isfinite(array)
@@ -191,6 +198,7 @@ class Track:
         return cls(
             covariance=covariance,
             root_covariance=root_covariance,
+            angle_sigma=angle_sigmas_of(estimates, angle_names),
             angle_names=angle_names,
             angles=angles,
             stamps=np.array([estimate.stamp for estimate in estimates], dtype=np.float64),
@@ -399,6 +407,7 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         angles=content["angles"] if "angles" in content else np.empty((0, 0)),
         covariance=content.get("covariance", np.empty((0, 0, 3, 3))),
         root_covariance=content.get("root_covariance", np.empty((0, 6, 6))),
+        angle_sigma=content.get("angle_sigma", np.empty((0, 0))),
         **_optional_fields(content),
     )
 

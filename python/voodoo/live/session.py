@@ -23,6 +23,13 @@ from voodoo.measurements import FloatArray
 
 _TICK_S = 0.05
 _RATE_S = 2.0
+_LATE_S = 1.0
+"""A receiver that holds a pose up for this long is named."""
+_BACK_S = 1.0
+"""A receiver that takes every pose for this long is back."""
+_HANGS = "takes nothing; it gets the newest pose when it does"
+_CLOSE_S = 3.0
+"""How long the end waits for receivers."""
 
 
 class Output(ABC):
@@ -32,6 +39,8 @@ class Output(ABC):
         name: name in messages.
         prompt: latency is measured until it has taken the pose; other outputs may lag behind.
         waiting: queue capacity in steps; when it is exceeded, the oldest is dropped and counted.
+        receiver: it sends to programs that may be slow, hang or be gone: the session names that once, neither waits for it nor
+            ends with it, and goes on when it takes poses again.
         on_reset: lets everybody be searched for again; set by the session.
         on_choice: lets only the person at a place be followed, see `Session.choose`; set by the session.
     """
@@ -39,6 +48,7 @@ class Output(ABC):
     name: str
     prompt: bool = False
     waiting: int = 1
+    receiver: bool = False
     on_reset: Callable[[], None] | None = None
     on_choice: Callable[[str, FloatArray], None] | None = None
 
@@ -47,7 +57,7 @@ class Output(ABC):
         """Receive a step.
 
         Raises:
-            VoodooError, OSError: it failed; the session ends.
+            VoodooError, OSError: it failed; the session ends, except with an OSError of a receiver.
         """
 
     def close(self) -> None:  # noqa: B027 - most have nothing to finish
@@ -57,11 +67,20 @@ class Output(ABC):
 class _Lane:
     """Outputs with a queue and a thread."""
 
-    def __init__(self, outputs: Sequence[Output], done: Callable[[Step], None] | None = None) -> None:
+    def __init__(
+        self,
+        outputs: Sequence[Output],
+        done: Callable[[Step], None] | None = None,
+        *,
+        on_message: Callable[[str], None] = print,
+    ) -> None:
         self.outputs = outputs
         self.box: Mailbox[Step] = Mailbox(max((output.waiting for output in outputs), default=1))
         self.error: BaseException | None = None
-        self._done = done
+        self._done, self._on_message = done, on_message
+        self._busy: tuple[Output, float] | None = None
+        self._named: dict[Output, float] = {}
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -72,21 +91,55 @@ class _Lane:
                 if step is None:
                     continue
                 for output in self.outputs:
-                    output.publish(step)
+                    self._publish(output, step)
                 if self._done is not None:
                     self._done(step)
         except BaseException as error:
             self.error = error
-
-    def finish(self) -> None:
-        """Process the waiting steps and close the outputs."""
-        self.box.close()
-        self._thread.join()
+        self._ended.wait()
         for output in self.outputs:
             try:
                 output.close()
             except Exception as error:
                 self.error = _together([self.error, error])
+
+    def _publish(self, output: Output, step: Step) -> None:
+        began = time.monotonic()
+        self._busy = output, began
+        try:
+            output.publish(step)
+        except OSError as error:
+            if not output.receiver:
+                raise
+            self._name(output, f"nobody receives: {error.strerror or error}")
+        finally:
+            self._busy = None
+        now = time.monotonic()
+        if output.receiver and now - began > _LATE_S:
+            self._name(output, _HANGS)
+        if output in self._named and now - self._named[output] > _BACK_S:
+            del self._named[output]
+            self._on_message(f"{output.name}: receives again")
+
+    def _name(self, output: Output, problem: str) -> None:
+        if output not in self._named:
+            self._on_message(f"{output.name}: {problem}")
+        self._named[output] = time.monotonic()
+
+    def watch(self) -> None:
+        """Name a receiver that holds a pose up."""
+        output, began = self._busy or (None, 0.0)
+        if output is not None and output.receiver and time.monotonic() - began > _LATE_S:
+            self._name(output, _HANGS)
+
+    def finish(self) -> None:
+        """Process the waiting steps and close the outputs."""
+        self.box.close()
+        self._ended.set()
+        patient = not self.outputs or not all(output.receiver for output in self.outputs)
+        self._thread.join(None if patient else _CLOSE_S)
+        if self._thread.is_alive():
+            self._on_message(f"{', '.join(output.name for output in self.outputs)}: did not take the last pose")
 
 
 class Session:
@@ -123,8 +176,9 @@ class Session:
         self._end = self._began
         self._error: BaseException | None = None
         prompt = [output for output in outputs if output.prompt]
-        self._prompt = _Lane(prompt, self._count)
-        self._lanes = [self._prompt, *(_Lane([output]) for output in outputs if not output.prompt)]
+        log = live.faults.log
+        self._prompt = _Lane(prompt, self._count, on_message=log)
+        self._lanes = [self._prompt, *(_Lane([output], on_message=log) for output in outputs if not output.prompt)]
         self._thread = threading.Thread(target=self._track, daemon=True)
         self._thread.start()
 
@@ -209,6 +263,8 @@ class Session:
             VoodooError, OSError: a source or an output that failed.
         """
         self._thread.join(seconds)
+        for lane in self._lanes:
+            lane.watch()
         self._raise()
         return self.running
 

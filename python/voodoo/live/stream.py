@@ -8,7 +8,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any, Literal, TypeAlias
 
-from voodoo.errors import VoodooError
+from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.assembly import WAIT_S, Assembler, LiveFrame
 from voodoo.live.clock import Clock, HostClock
 from voodoo.live.faults import Faults
@@ -16,6 +16,7 @@ from voodoo.live.inbox import Inbox
 from voodoo.live.mailbox import Mailbox
 from voodoo.live.source import Arrival, Source, SourceEnded, SourceGone
 from voodoo.measurements import FloatArray
+from voodoo.sensors.keypoints.networks import KeypointNetwork
 
 Status: TypeAlias = Literal["waiting", "running", "lost", "ended"]
 
@@ -40,6 +41,7 @@ class Live:
         tell: called with a readable line for every fault.
         wait: how long a frame waits for the images and transforms that belong to it [s].
         eager: decode color images at once, in parallel to the tracker; False: at first access.
+        network: finds keypoints in color images, in parallel to the tracker; frames wait for it.
 
     Attributes:
         faults: faults by name.
@@ -53,6 +55,7 @@ class Live:
         on_message: Callable[[str], None] | None = None,
         wait: float = WAIT_S,
         eager: bool = True,
+        network: KeypointNetwork | None = None,
     ) -> None:
         """Nothing is opened yet; entering the `with` block does that."""
         if not sources:
@@ -62,6 +65,7 @@ class Live:
         self.clock: Clock = clock if clock is not None else HostClock()
         self.faults = Faults(on_message)
         self._delivered = 0
+        self._network = network
         self._assembler = Assembler(self.faults, wait=wait, eager=eager)
         self._inbox = Inbox()
         self._frames: Mailbox[LiveFrame] = Mailbox()
@@ -160,8 +164,11 @@ class Live:
 
     @property
     def kinds(self) -> dict[str, str]:
-        """Sensor -> kind, for all arrivals."""
-        return dict(self._assembler.kinds)
+        """Sensor -> kind, for all arrivals, and the keypoints that the network adds."""
+        kinds = dict(self._assembler.kinds)
+        if self._network is not None:
+            kinds |= {f"{name}/keypoints": "keypoints" for name, kind in kinds.items() if kind == "color"}
+        return kinds
 
     @property
     def received(self) -> int:
@@ -277,6 +284,8 @@ class Live:
     def _hand_on(self, frame: LiveFrame | None) -> None:
         if frame is None:
             return
+        if self._network is not None:
+            frame = replace(frame, measurements=self._network.added_to(frame, refused=self._refused))
         now = self.clock.now()
         if self._stamp is None:
             self._check_roots()
@@ -287,6 +296,9 @@ class Live:
             self.faults.log(f"data again after {now - (self._good or now):.1f} s")
         self._good, self._lost = now, False
         self._frames.put(frame)
+
+    def _refused(self, error: RecordingError) -> None:
+        self.faults.add_error(error, self.clock.now(), "damaged picture")
 
     def _check_roots(self) -> None:
         roots = {source.name: source.root_frame for source in self.sources if source.root_frame}

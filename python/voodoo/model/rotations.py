@@ -110,12 +110,16 @@ def euler_angles(rotations: FloatArray, order: str) -> FloatArray:
 
     If the first and third axes are parallel, only their sum is determined; the third angle is then zero.
     """
+    return euler_angles_of_quaternions(quaternions(rotations), order)
+
+
+def euler_angles_of_quaternions(q: FloatArray, order: str) -> FloatArray:
+    """As `euler_angles`, of unit quaternions (N, 4)."""
     i, j, k = ("XYZ".index(axis) for axis in reversed(order))
     proper = i == k
     if proper:
         k = 3 - i - j
     sign = (i - j) * (j - k) * (k - i) // 2
-    q = quaternions(rotations)
     if proper:
         a, b, c, d = q[:, 3], q[:, i], q[:, j], q[:, k] * sign
     else:

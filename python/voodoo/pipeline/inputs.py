@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from voodoo.errors import VoodooError
+from voodoo.pipeline.detected import Detected
 from voodoo.recordings.joined import Joined, WithKeypoints
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
@@ -15,6 +16,7 @@ from voodoo.recordings.loaders import LOADERS, guess_loader, open_recording, opt
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.videos import picture_sources
+from voodoo.sensors.keypoints.networks import KeypointNetwork, network_of
 
 
 def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
@@ -25,8 +27,8 @@ def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
     """
     folders = {}
     for word in words:
-        sensor, equals, folder = word.partition("=")
-        if not (sensor and equals and folder):
+        sensor, _, folder = word.partition("=")
+        if not (sensor and folder):
             raise VoodooError(f"keypoints: expected SENSOR=FOLDER, found {word!r}")
         if not Path(folder).is_dir():
             raise VoodooError(f"{folder}: expected a folder of OpenPose JSON files, found none")
@@ -34,10 +36,28 @@ def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
     return folders
 
 
+def keypoint_words(words: Sequence[str], layout: str | None) -> tuple[dict[str, Path], KeypointNetwork | None]:
+    """Folders by sensor, and the network to run on all other color images.
+
+    Args:
+        words: "SENSOR=FOLDER" (see keypoint_folders), and at most one network (see network_of).
+        layout: of the keypoints; None: told by them, or by the network.
+
+    Raises:
+        VoodooError: an argument of another form, several networks, or one that cannot be loaded.
+    """
+    networks = [word for word in words if "=" not in word]
+    if len(networks) > 1:
+        raise VoodooError(f"keypoints: expected one network, found {', '.join(networks)}")
+    folders = keypoint_folders([word for word in words if "=" in word])
+    return folders, network_of(networks[0], layout=layout) if networks else None
+
+
 def join(
     recording: Recording,
     *,
     keypoints: Mapping[str, Path] | None = None,
+    network: KeypointNetwork | None = None,
     layout: str | None = None,
     others: Sequence[Path] = (),
     offset: float = 0.0,
@@ -51,6 +71,7 @@ def join(
     Args:
         recording: provides the frames.
         keypoints: sensor -> folder of OpenPose JSON files, one file for each image of the sensor.
+        network: finds keypoints in the other color images, also of `others`.
         layout: layout of those keypoints; None: told by their number and the shape of the persons.
         others: further recordings of the scene, marker files among them.
         offset: [s] added to their stamps.
@@ -70,7 +91,7 @@ def join(
         how: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers}
         opened = [_open(path, recording, bare=bare, left_out=left_out, **how) for path in others]
         recording = Joined(recording, opened, offset=offset)
-    return recording
+    return recording if network is None else Detected(recording, network, left_out=left_out)
 
 
 def loader_options(

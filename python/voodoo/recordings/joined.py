@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
@@ -108,7 +108,40 @@ class _Ahead:
             found = tuple(item for item in found if item.sensor not in latest) + moved
 
 
-class WithKeypoints(Recording):
+class Around(Recording):
+    """A recording with something added to its frames."""
+
+    def __init__(self, recording: Recording) -> None:
+        """As the recording is."""
+        self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
+        self.start, self.reference, self.assumed = recording.start, recording.reference, recording.assumed
+        self.people, self.complete = recording.people, recording.complete
+        self._recording = recording
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self._recording)
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        return self._recording.root_from(frame, stamp)
+
+    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+        """See Recording."""
+        return self._recording.empty_scene()
+
+    def _info(self, cameras: Container[str], detail: str, notes: tuple[str, ...] = ()) -> RecordingInfo:
+        """The summary of the recording, with keypoints of some cameras."""
+        about = self._recording.info()
+        sensors = tuple(
+            replace(sensor, name=f"{sensor.name}/keypoints", kind="keypoints", detail=detail)
+            for sensor in about.sensors
+            if sensor.name in cameras
+        )
+        return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, *notes))
+
+
+class WithKeypoints(Around):
     """A recording whose images have the keypoints that a network detected in them.
 
     Args:
@@ -133,10 +166,8 @@ class WithKeypoints(Recording):
     ) -> None:
         """List the files."""
         layout_of(layout or "body25b")
+        super().__init__(recording)
         self._left_out = left_out
-        self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
-        self.start, self.reference, self.assumed = recording.start, recording.reference, recording.assumed
-        self._recording, self.complete = recording, recording.complete
         self._files: dict[str, list[Path | None]] = {}
         sensors = {item.name: item for item in recording.info().sensors if item.kind in ("color", "depth")}
         for name, folder in folders.items():
@@ -180,10 +211,6 @@ class WithKeypoints(Recording):
         check_on_depth("keypoints", pairs)
         return check_keypoints("keypoints", instants)
 
-    def __len__(self) -> int:
-        """Number of frames."""
-        return len(self._recording)
-
     def __iter__(self) -> Iterator[RecordedFrame]:
         """The frames, with a KeypointImage before each image that has one."""
         count = dict.fromkeys(self._files, 0)
@@ -210,23 +237,9 @@ class WithKeypoints(Recording):
             root_from_sensor=item.root_from_sensor,
         )
 
-    def root_from(self, frame: str, stamp: float) -> FloatArray:
-        """See Recording."""
-        return self._recording.root_from(frame, stamp)
-
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
-        """See Recording."""
-        return self._recording.empty_scene()
-
     def info(self) -> RecordingInfo:
         """The summary of the recording, with the keypoints."""
-        about = self._recording.info()
-        sensors = tuple(
-            replace(sensor, name=f"{sensor.name}/keypoints", kind="keypoints", detail=f"{self._layout} keypoints")
-            for sensor in about.sensors
-            if sensor.name in self._files
-        )
-        return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, *self._said))
+        return self._info(self._files, f"{self._layout} keypoints", self._said)
 
 
 def _read(

@@ -5,11 +5,15 @@ Plotly is an optional extra: `pip install 'voodoo-tracker[report]'`.
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping
 from html import escape
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import cv2
 import numpy as np
 
 from voodoo.errors import VoodooError
@@ -24,18 +28,26 @@ _LINES = (
 """Joints of the default humans that are drawn as lines; a body with other joints is drawn as points."""
 _MOST_SHOWN = 300
 """Frames of the animation; more make the page slow."""
+_TOGETHER = """<script>
+const film = document.getElementById("film");
+for (const plot of document.querySelectorAll(".js-plotly-plot"))
+  plot.on("plotly_animatingframe", (shown) => { if (film.paused) film.currentTime = parseFloat(shown.name); });
+</script>"""
+"""The film goes with the timeline of the last person that is moved."""
+_COLORS = ("#636efa", "#ef553b", "#00a878", "#ab63fa", "#e07b1f", "#0f9bb8", "#d6408b", "#6a8f1f")
 _LIMB_COLORS = {"measured": "#2a9d4e", "inferred": "#f2b134", "lost": "#c0392b", "": "#eeeeee"}
 
 
-def report_page(name: str, tracks: Mapping[str, Track]) -> str:
+def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = None) -> str:
     """The page, with a section for each person.
 
     Args:
         name: title.
         tracks: name of the person -> track.
+        film: of the same frames, as `--overlay` writes it; it is part of the page, and goes with the timeline.
 
     Raises:
-        VoodooError: Plotly is not installed, or stamps that do not increase.
+        VoodooError: Plotly is not installed, stamps that do not increase, or a film that cannot be read.
     """
     try:
         import plotly  # noqa: F401
@@ -45,12 +57,38 @@ def report_page(name: str, tracks: Mapping[str, Track]) -> str:
         ) from None
     parts = [f"<!DOCTYPE html><html lang=en><meta charset=utf-8><title>{escape(name)}</title>"]
     parts += [f"<body style='font:15px sans-serif;margin:1.5em'><h1>{escape(name)}</h1>"]
+    if film is not None:
+        data = b64encode(playable(film)).decode("ascii")
+        style = "display:block;max-width:100%;max-height:45vh"
+        parts.append(f"<video id=film controls muted style='{style}' src='data:video/webm;base64,{data}'></video>")
     for number, (person, track) in enumerate(tracks.items()):
         figure = _figure(track).to_html(
             full_html=False, include_plotlyjs=number == 0, auto_play=False, config={"displaylogo": False}
         )
         parts.append(f"<h2>{escape(person)}</h2><p>{escape(_words(track))}</p>{figure}")
-    return "\n".join([*parts, "</body></html>", ""])
+    return "\n".join([*parts, _TOGETHER if film is not None else "", "</body></html>", ""])
+
+
+def playable(film: Path) -> bytes:
+    """A film as a WebM, which browsers play.
+
+    Raises:
+        VoodooError: it cannot be read.
+    """
+    source = cv2.VideoCapture(str(film))
+    readable, picture = source.read()
+    if not readable:
+        raise VoodooError(f"{film}: expected a film, found none that can be read")
+    with TemporaryDirectory() as folder:
+        place = Path(folder) / "film.webm"
+        rate, size = source.get(cv2.CAP_PROP_FPS) or 30.0, picture.shape[1::-1]
+        writer = cv2.VideoWriter(str(place), cv2.VideoWriter.fourcc(*"VP80"), rate, size)
+        while readable:
+            writer.write(picture)
+            readable, picture = source.read()
+        writer.release()
+        source.release()
+        return place.read_bytes()
 
 
 def _words(track: Track) -> str:
@@ -66,7 +104,13 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
     from plotly.subplots import make_subplots
 
     limbs = "limbs: measured (green), inferred (yellow), lost (red)"
-    titles = ("", limbs, "joint angles [deg]", "standard deviation of joints [m]", "residual [m]")
+    titles = (
+        "",
+        limbs,
+        "joint angles with one standard deviation [deg]",
+        "standard deviation of joints [m]",
+        "residual [m]",
+    )
     figure = make_subplots(
         rows=4, cols=2, column_widths=[0.45, 0.55], row_heights=[0.34, 0.26, 0.2, 0.2], vertical_spacing=0.06,
         subplot_titles=titles, specs=[[{"type": "scene", "rowspan": 4}, {}], *[[None, {}]] * 3],
@@ -83,9 +127,21 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
         figure.add_trace(go.Heatmap(x=times, y=names, z=codes, text=text, hoverinfo="x+y+text", **look), row=1, col=2)
     sigma = np.sqrt(np.trace(track.covariance, axis1=2, axis2=3) / 3.0)
     joints = track.joint_names[: sigma.shape[1]]
-    for row, labels, values in ((2, track.angle_names, np.degrees(track.angles)), (3, joints, sigma)):
-        for name, column in zip(labels, values.T, strict=True):
-            figure.add_trace(go.Scatter(x=times, y=column, name=name, mode="lines", showlegend=False), row=row, col=2)
+    angles, unsure = np.degrees(track.angles), np.degrees(track.angle_sigma)
+    for number, (name, column) in enumerate(zip(track.angle_names, angles.T, strict=True)):
+        color = _COLORS[number % len(_COLORS)]
+        how: dict[str, Any] = {"mode": "lines", "showlegend": False, "line": {"color": color}}
+        if unsure.size:
+            around = unsure[:, number]
+            known = np.isfinite(column) & np.isfinite(around)
+            edge = np.concatenate([(column - around)[known], (column + around)[known][::-1]])
+            there = np.concatenate([times[known], times[known][::-1]])
+            band: dict[str, Any] = {"fill": "toself", "fillcolor": color, "opacity": 0.12, "line": {"width": 0}}
+            figure.add_trace(go.Scatter(x=there, y=edge, hoverinfo="skip", showlegend=False, **band), row=2, col=2)
+            how |= {"customdata": around, "hovertemplate": "%{y:.1f} ± %{customdata:.1f}"}
+        figure.add_trace(go.Scatter(x=times, y=column, name=name, **how), row=2, col=2)
+    for name, column in zip(joints, sigma.T, strict=True):
+        figure.add_trace(go.Scatter(x=times, y=column, name=name, mode="lines", showlegend=False), row=3, col=2)
     figure.add_trace(go.Scatter(x=times, y=track.residual, mode="lines", showlegend=False), row=4, col=2)
     shown = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_SHOWN)).round().astype(int))
     figure.frames = [

@@ -63,6 +63,9 @@ class Server:
 
     def close(self) -> None:
         """Stop the server and its child processes."""
+        if sys.platform == "win32":  # which has no groups of processes
+            self._process.kill()
+            return
         for number in (signal.SIGTERM, signal.SIGKILL):
             try:
                 os.killpg(self._process.pid, number)

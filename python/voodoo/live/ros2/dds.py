@@ -182,8 +182,17 @@ class Publication:
         return str(self._writer.guid)
 
     def write(self, message: bytes) -> None:
-        """Publish a message (CDR with its header)."""
-        self._writer.write(message_of(self._type, message))
+        """Publish a message (CDR with its header).
+
+        Raises:
+            OSError: a subscriber holds it up, or the network is gone.
+        """
+        from cyclonedds.core import DDSException
+
+        try:
+            self._writer.write(message_of(self._type, message))
+        except DDSException as error:
+            raise OSError(str(error)) from error
 
     @property
     def subscribers(self) -> int:

@@ -16,14 +16,14 @@ class Sink(Protocol):
     Args:
         address: as it was given, e.g. "vmc://host:39539".
         root_frame: returns the frame of the poses, once a frame has arrived.
-        on_message: called with a readable line when a receiver is late, gone, or back; from any thread.
+        on_message: called with a readable line when one of several receivers is late, gone, or back; from any thread.
 
     Raises:
         VoodooError: the address is of no use, or a library is missing; names both.
     """
 
     def __call__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> Output:
-        """Open the output. `Output.publish` must neither wait for a receiver nor raise an error if there is none."""
+        """Open the output. It is a `receiver`: what holds `Output.publish` up, or an OSError of it, is named once."""
 
 
 def parts_of(address: str, *, host: str | None, port: int) -> tuple[str, int, SplitResult]:

@@ -21,7 +21,19 @@ def _websocket() -> Sink:
     return WebSocketSink
 
 
-_sinks: dict[str, Callable[[], Sink]] = {"vmc": _vmc, "ws": _websocket}
+def _ros2() -> Sink:
+    from voodoo.live.sinks.ros2 import Ros2Sink
+
+    return Ros2Sink
+
+
+def _foxglove() -> Sink:
+    from voodoo.live.sinks.foxglove import FoxgloveSink
+
+    return FoxgloveSink
+
+
+_sinks: dict[str, Callable[[], Sink]] = {"foxglove": _foxglove, "ros2": _ros2, "vmc": _vmc, "ws": _websocket}
 
 
 def register(scheme: str, find: Callable[[], Sink]) -> None:

@@ -7,8 +7,8 @@ axes of Unity (X right, Y up, Z forward, left-handed).
 from __future__ import annotations
 
 import socket
-import time
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
@@ -30,8 +30,6 @@ _ARM = ("upperarm", "forearm", "hand")
 _NEEDED = ("Hips", "Head", *(f"{side}Upper{limb}" for side in ("Left", "Right") for limb in ("Arm", "Leg")))
 _TOGETHER = 15
 """Messages a datagram: it fits into one packet of Ethernet."""
-_BACK_S = 1.0
-"""A receiver that refused nothing for this long is back."""
 
 
 class VmcSink(Output):
@@ -56,8 +54,8 @@ class VmcSink(Output):
             advice = "pip install 'voodoo-tracker[stream]'"
             raise VoodooError(f"{address}: expected python-osc, found none; {advice}") from None
         self._bundle_of, self._message_of = osc_bundle_builder.OscBundleBuilder, osc_message_builder.OscMessageBuilder
-        self.name = address
-        self._root, self._on_message = root_frame, on_message
+        self.name, self.receiver = address, True
+        self._root = root_frame
         host, port, _ = parts_of(address, host=None, port=PORT)
         try:
             family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
@@ -67,13 +65,13 @@ class VmcSink(Output):
         except OSError as error:
             raise VoodooError(f"{address}: expected the name or address of a host, found: {error.strerror}") from error
         self._start: float | None = None
-        self._refused: float | None = None
 
     def publish(self, step: Step) -> None:
         """See Output.
 
         Raises:
             VoodooError: a body without the bones of an avatar.
+            OSError: nobody receives.
         """
         self._start = step.stamp if self._start is None else self._start
         shown = sorted(number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost")
@@ -95,19 +93,8 @@ class VmcSink(Output):
         return bytes(bundle.build().dgram)
 
     def _send(self, datagram: bytes) -> None:
-        now = time.monotonic()
-        try:
+        with suppress(BlockingIOError):
             self._socket.send(datagram)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            if self._refused is None:
-                self._on_message(f"{self.name}: nobody receives: {error.strerror}")
-            self._refused = now
-            return
-        if self._refused is not None and now - self._refused > _BACK_S:
-            self._refused = None
-            self._on_message(f"{self.name}: receives again")
 
     def close(self) -> None:
         """See Output."""

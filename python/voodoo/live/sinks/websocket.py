@@ -59,7 +59,7 @@ class WebSocketSink(Output):
             raise VoodooError(
                 f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
             ) from None
-        self.name = address
+        self.name, self.receiver = address, True
         self._root, self._on_message, self._left = root_frame, on_message, ConnectionClosed
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
         origins = [None, _OWN_PAGES, *parse_qs(parts.query).get("origin", ())]

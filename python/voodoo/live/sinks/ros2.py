@@ -8,21 +8,26 @@ from typing import Any
 import numpy as np
 
 from voodoo._core import Estimate
+from voodoo.errors import VoodooError
 from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
+from voodoo.export.skeleton import Skeleton
+from voodoo.export.track import Track
 from voodoo.export.upright import Turn
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
+from voodoo.live.sinks.people import upright_person
 from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
+ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
 
-class Ros2Output(Output):
+class Ros2Sink(Output):
     """`/tf`, `/humans/bodies/<id>/joint_states`, `.../pose`, `.../markers`, `/human_description_<id>` (URDF), and
     `/humans/bodies/tracked` (hri_msgs/IdsList).
 
@@ -31,15 +36,31 @@ class Ros2Output(Output):
     FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
 
     Args:
-        root_frame: returns the frame of the poses, once a frame has arrived.
+        address: ros2://; the network is that of the environment.
+        root_frame: see `Sink`.
+        on_message: see `Sink`.
         node: None: one of its own.
+
+    Raises:
+        VoodooError: another address, no network, or cyclonedds is not installed.
     """
 
     name = "ros2"
-    prompt = True
+    prompt = receiver = True
 
-    def __init__(self, root_frame: Callable[[], str], *, node: Node | None = None) -> None:
+    def __init__(
+        self,
+        address: str = ADDRESS,
+        *,
+        root_frame: Callable[[], str],
+        on_message: Callable[[str], None] = print,
+        node: Node | None = None,
+    ) -> None:
         """Join the network."""
+        if address != ADDRESS:
+            raise VoodooError(
+                f"{address}: expected {ADDRESS} without a host, found one; ROS_DOMAIN_ID chooses the network"
+            )
         self._root = root_frame
         self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
@@ -65,7 +86,8 @@ class Ros2Output(Output):
                 self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
         observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
         for number in sorted(observed):
-            self._write_person(number, step.estimates[number], step.bodies[number], step.turn)
+            posed = upright_person(step, number, self._root())
+            self._write_person(number, step.estimates[number], step.bodies[number], step.turn, posed)
         for number in sorted(self._displayed - observed):
             # Markers of persons who left are deleted once.
             body = step.bodies.get(number, self._bodies[number])
@@ -74,14 +96,22 @@ class Ros2Output(Output):
         self._bodies = {number: step.bodies[number] for number in observed}
         self._write(tracked(step.stamp, [person_id(number) for number in sorted(observed)], root_frame=self._root()))
 
-    def _write_person(self, number: int, estimate: Estimate, body: Body, turn: Turn | None) -> None:
+    def _write_person(
+        self,
+        number: int,
+        estimate: Estimate,
+        body: Body,
+        turn: Turn | None,
+        posed: tuple[Track, Skeleton] | None = None,
+    ) -> None:
         person, size = person_id(number), sum(limb.shape.length for limb in body.limbs)
         if estimate.joints and abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
             self._write(description(body, person))
             self._described[number] = size
         # Markers take as long as all other messages together.
         seen = self._publish_on(f"{BODIES}/{person}/markers", _MARKERS, 10).subscribers > 0
-        self._write(instant(estimate, body, root_frame=self._root(), person=person, markers=seen, turn=turn))
+        how: dict[str, Any] = {"root_frame": self._root(), "person": person, "markers": seen}
+        self._write(instant(estimate, body, **how, turn=turn, posed=posed))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
