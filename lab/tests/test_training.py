@@ -55,7 +55,7 @@ def test_people_stand_where_their_joints_are(scenes):
         for person in frame.people:
             trunk = person.joints[JOINTS.index("humanoid_root")]
             u, v = round(fx * trunk[0] / trunk[2] + cx), round(fy * trunk[1] / trunk[2] + cy)
-            if person.seen.all() and frame.labels[v, u] == person.label:
+            if person.observed.all() and frame.labels[v, u] == person.label:
                 near.append(trunk[2] - frame.depth[v, u])
     assert 0.03 < np.median(near) < 0.25  # the pelvis' middle lies behind the surface
     again = scenes.frame(np.random.default_rng(4))

@@ -15,7 +15,6 @@ from torch import nn
 
 from lab.training.loader import Store
 from lab.training.net import Block, Net, Output, Residual
-from lab.training.train import Training
 
 WEIGHTS_LINE, CHECK_LINE = "voodoo person 1", "voodoo person check 1"
 KINDS = {WEIGHTS_LINE: "<f2", CHECK_LINE: "<f4"}  # of the numbers
@@ -135,6 +134,8 @@ def main() -> None:
     parser.add_argument("--check", type=Path, help="also write check vectors")
     parser.add_argument("--data", type=Path, help="held-out pictures, for --check")
     a = parser.parse_args()
+    from lab.training.train import Training  # which begins with weights that are read here
+
     training = Training.new(0, 1e-3)
     training.load(a.state / "state.pt")
     write(a.out, tensors(training.mean.eval()))
