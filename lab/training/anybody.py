@@ -34,7 +34,7 @@ CHILD = {
     "head": (1.62, 1.52, 1.30, 1.14, 1.0), "trunk": (1.10, 1.08, 1.04, 1.01, 1.0), "arm": (0.90, 0.94, 0.97, 0.99, 1.0),
     "leg": (0.83, 0.87, 0.95, 0.98, 1.0), "girth": (1.12, 1.09, 1.0, 0.96, 1.0),
 }  # fmt: skip
-PARTS = {"upper": "arm", "fore": "arm", "thigh": "leg", "shank": "leg", "head": "head", "trunk": "trunk", "foot": "trunk"}
+PARTS = {"upper": "arm", "fore": "arm", "thigh": "leg", "shank": "leg", "head": "head"}  # others go with the trunk
 
 
 def traits(rng: Rng, group: str) -> frozenset[str]:
@@ -56,8 +56,8 @@ def resized(body: Body, length: Mapping[str, float], girth: float, stature: floa
     scale = np.tile(np.eye(3) * length["trunk"], (len(heads), 1, 1))
     for region, names in REGIONS.items():
         for bone in (bones.bone[name] for name in names):
-            factor = length[PARTS[region]]
-            if PARTS[region] in ("arm", "leg"):
+            factor = length[PARTS.get(region, "trunk")]
+            if PARTS.get(region) in ("arm", "leg"):
                 end = next(i for i, parent in enumerate(bones.parent) if parent == bone)
                 along = unit(heads[end] - heads[bone])
                 scale[bone] = girth * np.eye(3) + (factor - girth) * np.outer(along, along)
@@ -151,7 +151,8 @@ def holding(rng: Rng, pose: Pose, what: str) -> Pose:
     if what == "bag" or pose.lying:
         return pose
     side = int(rng.integers(2))
-    flex, elbow = {"box": (u(0.0, 0.7), u(1.1, 1.8)), "frame": (u(0.2, 0.6), u(0.3, 0.9))}.get(what, (u(0, 0.4), u(0.1, 0.6)))
+    bent = {"box": (u(0.0, 0.7), u(1.1, 1.8)), "frame": (u(0.2, 0.6), u(0.3, 0.9))}
+    flex, elbow = bent.get(what, (u(0, 0.4), u(0.1, 0.6)))
     arms = np.stack([arm(k, flex + rng.normal(0, 0.08), u(-0.05, 0.15), u(0, 0.5), elbow) for k in range(2)])
     return with_arms(pose, arms, (side,) if what == "cane" else (0, 1))
 
@@ -159,7 +160,10 @@ def holding(rng: Rng, pose: Pose, what: str) -> Pose:
 # --- what people wear, hold and sit in -----------------------------------------------------------
 
 
-def garments(rng: Rng, points: Array, joints: Joints, pose: Pose, body: Body) -> tuple[list[shapes.Mesh], list[shapes.Mesh]]:
+Meshes = list[shapes.Mesh]
+
+
+def garments(rng: Rng, points: Array, joints: Joints, pose: Pose, body: Body) -> tuple[Meshes, Meshes]:
     """A long skirt, a coat, a hat; and a bag on the back. The first are the person's surface, the others its things."""
     size, worn, things = body.stature / 1.7, [], []
     upright = (pose.limbs[:, THIGH, 2] < -0.75).all() and pose.pelvis[2, 2] > 0.85 and not pose.lying
@@ -205,7 +209,7 @@ def _hung(points: Array, top: float, hem: float, off: float, flare: float) -> sh
     return shapes.sheet(np.concatenate([grid, grid[:, :1]], 1))
 
 
-def held(rng: Rng, joints: Joints, pose: Pose, what: str, body: Body) -> list[shapes.Mesh]:
+def held(rng: Rng, joints: Joints, pose: Pose, what: str, body: Body) -> Meshes:
     """What is held by arms that `holding` has placed: on the floor z = 0."""
     left, right = joints["l_hand"], joints["r_hand"]
     ahead = unit(pose.chest[:, 0] * [1, 1, 0])

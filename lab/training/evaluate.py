@@ -105,7 +105,7 @@ def measure(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, Any
 
 
 def by_group(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, dict[str, float]]:
-    """Of each group: people found at log odds of 0 and 2, joints (cm), sides, stature (cm, percent), and what is taken for one."""
+    """Of each group: people found at log odds of 0 and 2, joints (cm), sides, stature (cm, %), what is taken for one."""
     out = {}
     for k in np.unique(true["group"]).astype(int):
         of = true["group"] == k

@@ -16,7 +16,8 @@ from lab.training.net import WIDTH
 
 DEPTH = 1.2  # m, the picture's unit of depth
 SWAP = [0, 1, 2] + [i + 1 if i % 2 else i - 1 for i in range(3, 17)]  # left and right joints exchanged
-KEYS = ("middle", "person", "joints", "weight", "observed", "facing", "lengths", "up_known", "fraction", "cover", "group")
+KEYS = ("middle", "person", "joints", "weight", "observed", "facing", "lengths", "up_known", "fraction", "cover",
+        "group")  # fmt: skip
 Batch = dict[str, Tensor]
 
 

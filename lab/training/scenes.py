@@ -125,7 +125,8 @@ class Scenes:
         if pose.lying:
             lift += rng.choice([0.0, 0.05, 0.45])
         if which and pose.seat:  # feet on the plates of a wheelchair, or above the floor
-            lift += rng.uniform(0.08, 0.16) if "wheelchair" in which else rng.choice([0.0, rng.uniform(0, 0.5 - 0.25 * size)])
+            high = 0.5 - 0.25 * size
+            lift += rng.uniform(0.08, 0.16) if "wheelchair" in which else rng.choice([0.0, rng.uniform(0, high)])
         shift = np.array([at[0], at[1], lift]) - [*points[:, :2].mean(0), 0]
         joints = {n: v + shift for n, v in joints.items()}
         world.meshes.append(((points + shift, self.bodies.faces, True), label))
@@ -168,8 +169,8 @@ class Scenes:
             world.add(shapes.moved(shapes.bed(rng, root[2] - 0.09 * size), (edge[0], edge[1]), yaw + np.pi / 2))
         if "desk" in which:
             height = root[2] + rng.uniform(0.1, 0.3) * size if pose.seat else rng.uniform(0.9, 1.15) * min(size, 1.0)
-            front = float(((points[:, :2] - root[:2]) @ ahead)[np.abs(points[:, 2] - root[2] - 0.15) < 0.1].max(initial=0.1))
-            gap = min(front, 0.35) + rng.uniform(0.2, 0.55)
+            belly = points[np.abs(points[:, 2] - root[2] - 0.15) < 0.1, :2]
+            gap = min(float(((belly - root[:2]) @ ahead).max(initial=0.1)), 0.35) + rng.uniform(0.2, 0.55)
             world.add(shapes.moved(shapes.desk(rng, height), (root[0] + gap * ahead[0], root[1] + gap * ahead[1]), yaw))
         if pose.lying and (low := float(points[:, 2].min())) > 0.3:
             axis = unit(joints["head_center"] - root)
@@ -262,9 +263,7 @@ def _camera(
     return r, -r @ np.array([0, 0, height])
 
 
-def _furnish(
-    rng: Rng, world: _World, at: list[Array], away: float, people: int, bare: bool, *, more: bool
-) -> None:
+def _furnish(rng: Rng, world: _World, at: list[Array], away: float, people: int, bare: bool, *, more: bool) -> None:
     walls = rng.random() < 0.85
     back, left, right = away + rng.exponential(1.0) + 0.25, rng.uniform(1, 3.5), rng.uniform(1, 3.5)
     if walls:

@@ -242,7 +242,8 @@ def balls(rng: Rng) -> list[Mesh]:
 
 def bed(rng: Rng, height: float | None = None) -> list[Mesh]:
     """A bed along x with its middle at the origin; the mattress at a height."""
-    h, y, x = height or rng.uniform(0.35, 0.65), rng.choice([0.9, 1.4, 1.8]) + rng.uniform(-0.1, 0.1), rng.uniform(1.9, 2.1)
+    h, y = height or rng.uniform(0.35, 0.65), rng.choice([0.9, 1.4, 1.8]) + rng.uniform(-0.1, 0.1)
+    x = rng.uniform(1.9, 2.1)
     parts = [box((x, y, h if rng.random() < 0.5 else 0.25), (0, 0, 0)), box((x, y, 0.2), (0, 0, h - 0.2))]
     return [*parts, box((0.06, y, h + rng.uniform(0.1, 0.6)), (x / 2, 0, 0)), ball((0.8, 0, h), (0.2, 0.35, 0.08))]
 
@@ -254,20 +255,24 @@ def desk(rng: Rng, height: float | None = None) -> list[Mesh]:
     if rng.random() < 0.65:  # closed at the front, or a solid counter
         parts.append(box((x if rng.random() < 0.3 else 0.03, y, h - 0.04), (x / 2 - 0.03, 0, 0)))
     if rng.random() < 0.35:
-        parts.append(box((0.04, rng.uniform(0.35, 0.65), rng.uniform(0.25, 0.5)), (0.0, rng.uniform(-0.5, 0.5), h + 0.02)))
+        wide, high = rng.uniform(0.35, 0.65), rng.uniform(0.25, 0.5)
+        parts.append(box((0.04, wide, high), (0.0, rng.uniform(-0.5, 0.5), h + 0.02)))
     for _ in range(rng.integers(0, 4)):
         size = rng.uniform(0.05, 0.3, 3)
         parts.append(box(tuple(size), (rng.uniform(-x, x) / 2.5, rng.uniform(-y, y) / 2.2, h), rng.uniform(0, 3)))
     return parts
 
 
-def _wheel(at: tuple[float, float, float], radius: float, solid: bool) -> list[Mesh]:
+def _wheel(middle: tuple[float, float, float], radius: float, solid: bool) -> list[Mesh]:
     """A wheel that rolls along x."""
-    a = np.linspace(0, 2 * np.pi, 21)
+    at, a = np.array(middle), np.linspace(0, 2 * np.pi, 21)
     grid = np.stack([np.stack([r * np.cos(a), y + 0 * a, r * np.sin(a)], 1) for r, y in
                      ((radius - 0.05, 0.02), (radius, 0.02), (radius, -0.02), (radius - 0.05, -0.02))])  # fmt: skip
-    spokes = [tube(-d + at, d + at, (0.008, 0.008), n=4) for d in radius * np.stack([np.cos(a), 0 * a, np.sin(a)], 1)[:10:3]]
-    return [sheet(grid + at), *([tube((at[0], at[1] - 0.01, at[2]), (at[0], at[1] + 0.01, at[2]), (radius,) * 2)] if solid else spokes)]
+    rim, side = sheet(grid + at), np.array([0, 0.01, 0])
+    if solid:
+        return [rim, tube(at - side, at + side, (radius,) * 2)]
+    ends = radius * np.stack([np.cos(a), 0 * a, np.sin(a)], 1)[:10:3]
+    return [rim, *(tube(at - d, at + d, (0.008, 0.008), n=4) for d in ends)]
 
 
 def wheelchair(rng: Rng, height: float | None = None, size: float = 1.0) -> list[Mesh]:
@@ -294,12 +299,12 @@ def wheelchair(rng: Rng, height: float | None = None, size: float = 1.0) -> list
 
 def walking_frame(rng: Rng, height: float | None = None, size: float = 1.0) -> list[Mesh]:
     """A walking frame, open towards -x, or one with wheels and a seat; its handles at a height."""
-    h, w, deep, thick = height or rng.uniform(0.75, 0.95), 0.28 * size, rng.uniform(0.25, 0.45) * size, rng.uniform(0.012, 0.022)
-    parts = [tube((deep, -w, 0.8 * h), (deep, w, 0.8 * h), (thick, thick)), tube((deep, -w, 0.4 * h), (deep, w, 0.4 * h), (thick, thick))]
-    for s in (-1, 1):
-        parts += [tube((-0.1, s * w, h), (deep, s * w, 0.95 * h), (thick * 1.3, thick * 1.3)),
-                  tube((deep, s * w, 0.95 * h), (deep + 0.06, s * w * 1.1, 0), (thick, thick)),
-                  tube((0, s * w, h), (-0.06, s * w * 1.1, 0), (thick, thick))]  # fmt: skip
+    h, w, deep = height or rng.uniform(0.75, 0.95), 0.28 * size, rng.uniform(0.25, 0.45) * size
+    thick = (rng.uniform(0.012, 0.022),) * 2
+    parts = [tube((deep, -w, z * h), (deep, w, z * h), thick) for z in (0.8, 0.4)]
+    for y in (-w, w):
+        parts += [tube((-0.1, y, h), (deep, y, 0.95 * h), thick), tube((0, y, h), (-0.06, y * 1.1, 0), thick)]
+        parts.append(tube((deep, y, 0.95 * h), (deep + 0.06, y * 1.1, 0), thick))
     if rng.random() < 0.4:
         parts.append(box((0.3 * size, 2 * w, 0.04), (deep / 2, 0, 0.62 * h)))
         parts += [p for x in (0.0, deep) for s in (-1, 1) for p in _wheel((x, s * w * 1.1, 0.1), 0.1, True)]
@@ -311,8 +316,10 @@ def robot(rng: Rng) -> list[Mesh]:
     h, w = rng.uniform(0.7, 1.7), rng.uniform(0.15, 0.26)
     waist, base, head = rng.uniform(0.35, 0.5) * h, rng.uniform(0.8, 1.5) * w, rng.uniform(0.1, 0.17)
     foot = (base, base * 0.95, base * 0.8) if rng.random() < 0.6 else (base, 0.08, 0.08)
-    parts = [tube((0, 0, 0), (0, 0, waist), foot), ball((0.0, 0, h - head), (head * rng.uniform(0.9, 1.2), head, head * 0.9))]
-    parts.append(tube((0, 0, waist), (0, 0, h - 1.9 * head), (w * 0.8, w, w * 0.95, w * 0.5), flat=rng.uniform(0.6, 1.1)))
+    parts = [tube((0, 0, 0), (0, 0, waist), foot)]
+    parts.append(ball((0.0, 0, h - head), (head * rng.uniform(0.9, 1.2), head, head * 0.9)))
+    trunk = (w * 0.8, w, w * 0.95, w * 0.5)
+    parts.append(tube((0, 0, waist), (0, 0, h - 1.9 * head), trunk, flat=rng.uniform(0.6, 1.1)))
     for s in (-1, 1):
         if rng.random() < 0.85:
             elbow = np.array([rng.uniform(-0.05, 0.1), s * (w + 0.08), 0.5 * (waist + h) - 0.1])

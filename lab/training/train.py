@@ -225,9 +225,7 @@ def _keep(training: Training, held: Store | None, state: Path, done: float) -> N
     print("held out", figures, flush=True)
 
 
-def work(
-    rank: int, place: Path, state: Path, plan: Plan, seed: int, device: str, weights: Path | None = None
-) -> None:
+def work(rank: int, place: Path, state: Path, plan: Plan, seed: int, device: str, weights: Path | None = None) -> None:
     """One process of a training."""
     torch.set_num_threads(1)
     torch.backends.cudnn.benchmark = True  # pictures and batches are of one size
