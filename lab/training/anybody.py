@@ -24,9 +24,7 @@ GROUPS = (
 """What a scene is about, for measurement; `adult` is the distribution without any of the others."""
 ALSO = {"child": 0.15, "heavy": 0.08, "clothes": 0.2, "carrying": 0.1, "seated": 0.08, "cut": 0.1, "coarse": 0.12}
 """How often a scene of a group has another group's trait, too."""
-THINGS = 100
-"""Added to a person's label: what the person holds, carries or sits in and moves with."""
-
+THINGS = 100  # added to a person's label: what the person holds, carries or sits in and moves with
 # Proportions by stature, relative to an adult's at the same stature: head and trunk, lengths of arms and legs, girth of limbs.
 # After the tables of Snyder et al. (1977), Anthropometry of infants, children, and youths: head, sitting height, crotch height.
 STATURES = (0.80, 0.92, 1.16, 1.39, 1.62)
@@ -42,9 +40,6 @@ def traits(rng: Rng, group: str) -> frozenset[str]:
     if group == "adult":
         return frozenset()
     return frozenset({group} | {name for name, often in ALSO.items() if rng.random() < often})
-
-
-# --- bodies --------------------------------------------------------------------------------------
 
 
 def resized(body: Body, length: Mapping[str, float], girth: float, stature: float) -> Body:
@@ -104,9 +99,6 @@ def shaped(rng: Rng, body: Body, which: frozenset[str]) -> Body:
     return heavy(rng, body) if "heavy" in which else body
 
 
-# --- poses ---------------------------------------------------------------------------------------
-
-
 def pose(rng: Rng, poses: list[Pose], which: frozenset[str]) -> Pose:
     """A pose that the traits need."""
     if "lying" in which:
@@ -155,9 +147,6 @@ def holding(rng: Rng, pose: Pose, what: str) -> Pose:
     flex, elbow = bent.get(what, (u(0, 0.4), u(0.1, 0.6)))
     arms = np.stack([arm(k, flex + rng.normal(0, 0.08), u(-0.05, 0.15), u(0, 0.5), elbow) for k in range(2)])
     return with_arms(pose, arms, (side,) if what == "cane" else (0, 1))
-
-
-# --- what people wear, hold and sit in -----------------------------------------------------------
 
 
 Meshes = list[shapes.Mesh]

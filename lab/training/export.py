@@ -131,6 +131,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--state", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--begun", type=Path, help="weights that the training began with, for --part")
+    parser.add_argument("--part", type=float, default=1.0, help="of the way from them to the trained ones (default 1)")
     parser.add_argument("--check", type=Path, help="also write check vectors")
     parser.add_argument("--data", type=Path, help="held-out pictures, for --check")
     a = parser.parse_args()
@@ -138,7 +140,11 @@ def main() -> None:
 
     training = Training.new(0, 1e-3)
     training.load(a.state / "state.pt")
-    write(a.out, tensors(training.mean.eval()))
+    named = tensors(training.mean.eval())
+    if a.begun:
+        begun = read(a.begun)
+        named = [(name, begun[name] + a.part * (value - begun[name])) for name, value in named]
+    write(a.out, named)
     if a.check:
         if a.data is None:
             parser.error("--check needs --data: held-out pictures")

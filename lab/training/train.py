@@ -125,10 +125,7 @@ class Training:
     def new(
         cls, seed: int, rate: float, *, small: bool = False, device: str = "cpu", weights: Path | None = None
     ) -> Training:
-        """A network that knows nothing, or one that begins with the weights of a file.
-
-        In such a file norms are folded into convolutions: they stay as they are, in evaluation mode, while all else learns.
-        """
+        """A network that knows nothing, or that begins with a file's weights, whose folded norms stay as they are."""
         torch.manual_seed(seed)
         net = (Net(small) if weights is None else restored(read(weights))).to(device, memory_format=torch.channels_last)
         plain = [p for p in net.parameters() if p.ndim <= 1]
