@@ -133,6 +133,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--begun", type=Path, help="weights that the training began with, for --part")
     parser.add_argument("--part", type=float, default=1.0, help="of the way from them to the trained ones (default 1)")
+    parser.add_argument("--odds", type=float, default=0.0, help="added to a person's log odds, to calibrate them")
     parser.add_argument("--check", type=Path, help="also write check vectors")
     parser.add_argument("--data", type=Path, help="held-out pictures, for --check")
     a = parser.parse_args()
@@ -144,6 +145,7 @@ def main() -> None:
     if a.begun:
         begun = read(a.begun)
         named = [(name, begun[name] + a.part * (value - begun[name])) for name, value in named]
+    named = [(name, value + a.odds if name == "person.bias" else value) for name, value in named]
     write(a.out, named)
     if a.check:
         if a.data is None:
