@@ -145,8 +145,7 @@ def main() -> None:
     if a.begun:
         begun = read(a.begun)
         named = [(name, begun[name] + a.part * (value - begun[name])) for name, value in named]
-    named = [(name, value + a.odds if name == "person.bias" else value) for name, value in named]
-    write(a.out, named)
+    write(a.out, [(name, value + a.odds if name == "person.bias" else value) for name, value in named])
     if a.check:
         if a.data is None:
             parser.error("--check needs --data: held-out pictures")
