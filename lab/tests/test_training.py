@@ -8,7 +8,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="the extra `training` is not installed")
 pytest.importorskip("numba", reason="the extra `training` is not installed")
 
-from lab.training import crops, data, export, train, unseen  # noqa: E402
+from lab.training import anybody, crops, data, export, train, unseen  # noqa: E402
 from lab.training.bodies import JOINTS, Bodies  # noqa: E402
 from lab.training.loader import SWAP, Store, augment  # noqa: E402
 from lab.training.poses import load, standing  # noqa: E402
@@ -47,6 +47,36 @@ def test_a_mirrored_pose_has_mirrored_joints(scenes):
     assert error.max() < 0.02 and np.abs(a[3:, 1]).max() > 0.1
 
 
+@pytest.mark.parametrize("change", [anybody.child, anybody.heavy])
+def test_the_lengths_of_a_changed_body_are_the_distances_of_its_posed_joints(scenes, change):
+    rng, adult = np.random.default_rng(6), scenes.bodies[1]
+    body = change(rng, adult)
+    joints = body.posed(standing(rng), rng, dressed=False)[1]
+    pairs = [
+        (f"l_{a}", f"l_{b}") for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+    ]
+    distances = [np.linalg.norm(joints[a] - joints[b]) for a, b in [*pairs, ("l_hip", "r_hip"), ("vc7", "head_center")]]
+    np.testing.assert_allclose(distances[:5], body.lengths[[0, 1, 2, 3, 5]], atol=1e-9)
+    assert body.vertices[:, 2].min() == pytest.approx(0, abs=1e-9)
+    if change is anybody.child:
+        legs, head = (lambda b: (b.lengths[2] + b.lengths[3]) / b.stature), (lambda b: b.lengths[7] / b.stature)
+        assert 0.8 <= body.stature <= 1.5 and legs(body) < legs(adult) and head(body) > head(adult)
+    else:
+        assert body.stature == pytest.approx(adult.stature)
+        wide = [np.ptp(b.vertices[b.set.region["trunk"] > 0.7], axis=0)[0] for b in (body, adult)]
+        assert wide[0] > wide[1] + 0.03
+
+
+@pytest.mark.parametrize("group", anybody.GROUPS)
+def test_every_group_gives_pictures_of_people(scenes, group):
+    rng, people = np.random.default_rng(8), []
+    for _ in range(20):
+        people += [s for s in crops.samples(scenes.frame(rng, group), rng) if s.person]
+        if people:
+            break
+    assert people and all(anybody.GROUPS[s.group] == group and np.isfinite(s.joints).all() for s in people)
+
+
 def test_people_stand_where_their_joints_are(scenes):
     rng, near = np.random.default_rng(4), []
     while len(near) < 12:
@@ -55,7 +85,7 @@ def test_people_stand_where_their_joints_are(scenes):
         for person in frame.people:
             trunk = person.joints[JOINTS.index("humanoid_root")]
             u, v = round(fx * trunk[0] / trunk[2] + cx), round(fy * trunk[1] / trunk[2] + cy)
-            if person.seen.all() and frame.labels[v, u] == person.label:
+            if person.observed.all() and frame.labels[v, u] == person.label:
                 near.append(trunk[2] - frame.depth[v, u])
     assert 0.03 < np.median(near) < 0.25  # the pelvis' middle lies behind the surface
     again = scenes.frame(np.random.default_rng(4))
@@ -79,6 +109,9 @@ def test_a_toy_learns_and_its_weights_come_back(store, tmp_path):
     assert last < 0.8 * first, f"{first:.0f} cm, then {last:.0f} cm"
     export.write(tmp_path / "toy.weights", export.tensors(training.net.eval()))
     again = export.restored(export.read(tmp_path / "toy.weights"))
+    begun = train.Training.new(0, 1e-3, weights=tmp_path / "toy.weights")
+    begun.update(augment(store.draw(rng, 24, 8)), 1e-3)
+    assert float(begun.net.s2.conv.norm.running_mean.abs().max()) == 0.0  # folded norms stay as they are
     x = store.batch(store.people[:4])["x"]
     with torch.no_grad():
         a, b = training.net(x), again(x)

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.training.anybody import GROUPS, THINGS
 from lab.training.scenes import Frame, Person
 from voodoo import Camera, _core
 
 Array = NDArray[np.float64]
 PERSON_FRACTION = (0.1, 0.45)  # of a candidate's pixels: below the first it is nobody, above the second somebody
 PERSON_COVER = 0.5  # of the person's pixels that a candidate must hold
+CLEAR = 1.3  # times the pixels of anybody else in the candidate
 LEAST_JOINTS = 5  # seen, for a person to be worth learning from
 NEAREST = 0.3  # m; joints nearer to the camera's plane have no place in the picture
 
@@ -33,6 +35,7 @@ class Sample:
     fraction: float
     cover: float
     up_known: bool
+    group: int
 
 
 def place(points: Array, middle: Array, roll: float) -> Array:
@@ -60,6 +63,7 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
     height, width = frame.depth.shape
     found = _core.person_candidates(frame.depth, camera=Camera(width, height, *frame.intrinsics), up=up, floor=floor)
     counts = {p.label: int((frame.labels == p.label).sum()) for p in frame.people}
+    group = GROUPS.index(frame.group)
     yes: list[Sample] = []
     no: list[Sample] = []
     for i in rng.permutation(len(found)):
@@ -67,31 +71,39 @@ def samples(frame: Frame, rng: np.random.Generator, most: int = 2) -> list[Sampl
         inside = frame.labels[candidate.mask]
         total = max(len(inside), 1)
         held = {label: int((inside == label).sum()) for label in counts}
-        if sum(held.values()) < PERSON_FRACTION[0] * total:
+        if (inside > 0).sum() < PERSON_FRACTION[0] * total:
             if len(no) < (1 if frame.people else most) and (not frame.people or rng.random() < 0.5):
-                no.append(_sample(candidate, None, 0.0, 0.0, up is not None))
+                no.append(_sample(candidate, None, 0.0, 0.0, up is not None, group))
             continue
-        for person in frame.people:
-            fraction, cover = held[person.label] / total, held[person.label] / max(counts[person.label], 1)
-            fits = fraction > PERSON_FRACTION[1] and cover > PERSON_COVER and person.seen.sum() >= LEAST_JOINTS
+        largest = sorted(held.values())[-2:]
+        if len(largest) == 2 and largest[1] < CLEAR * largest[0]:
+            continue  # of two people nobody can tell which is meant
+        for person in sorted(frame.people, key=lambda p: -held[p.label]):
+            fraction = float((inside % THINGS == person.label).sum()) / total
+            cover = held[person.label] / max(counts[person.label], 1)
+            fits = fraction > PERSON_FRACTION[1] and cover > PERSON_COVER and person.observed.sum() >= LEAST_JOINTS
             if fits and len(yes) < most:
-                yes.append(_sample(candidate, person, fraction, cover, up is not None))
+                yes.append(_sample(candidate, person, fraction, cover, up is not None, group))
                 break
     return yes + no
 
 
-def _sample(candidate: _core.PersonCandidate, person: Person | None, fraction: float, cover: float, up: bool) -> Sample:
+def _sample(
+    candidate: _core.PersonCandidate, person: Person | None, fraction: float, cover: float, up: bool, group: int
+) -> Sample:
     crop, middle = candidate.crop, np.array(candidate.middle)
     picture, mask = crop[0].astype(np.float16), np.packbits(crop[1] > 0.5, axis=-1)
     if person is None:
         nothing = np.zeros(17)
         return Sample(
-            picture, mask, middle, False, np.zeros((17, 3)), nothing, nothing > 0, 0.0, np.ones(9), 0.0, 0.0, up
+            picture, mask, middle, False, np.zeros((17, 3)), nothing, nothing > 0, 0.0, np.ones(9), 0.0, 0.0, up, group
         )
     joints = place(person.joints, middle, candidate.roll)
-    weight = np.where(person.seen, 1.0, np.where(person.inside, 0.4, 0.15))
+    weight = np.where(person.observed, 1.0, np.where(person.inside, 0.4, 0.15))
     weight[(person.joints[:, 2] < NEAREST) | (np.abs(joints) > 2.0).any(1)] = 0.0
     towards = -person.joints[2] / np.linalg.norm(person.joints[2])
     facing = float(person.forward @ towards)
     joints = np.clip(joints, -2.0, 2.0)
-    return Sample(picture, mask, middle, True, joints, weight, person.seen, facing, person.lengths, fraction, cover, up)
+    return Sample(
+        picture, mask, middle, True, joints, weight, person.observed, facing, person.lengths, fraction, cover, up, group
+    )

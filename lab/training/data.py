@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lab.training.anybody import GROUPS
 from lab.training.bodies import Bodies
 from lab.training.crops import Sample, samples
 from lab.training.poses import load
@@ -30,7 +31,7 @@ def save(path: Path, batch: list[Sample]) -> None:
     part.rename(path)
 
 
-def make(out: Path, data: Path, *, seed: int, worker: int, count: int, held_out: bool) -> None:
+def make(out: Path, data: Path, *, seed: int, worker: int, count: int, held_out: bool, others: float) -> None:
     """One process' share: files `NAME_worker_number.npz` with `count` pictures in all."""
     os.nice(5)
     scenes = Scenes(Bodies(data / "bodies", held_out=held_out), load(data / "mocap", held_out))
@@ -42,7 +43,8 @@ def make(out: Path, data: Path, *, seed: int, worker: int, count: int, held_out:
         size = min(SHARD, count - made)
         start = time.monotonic()
         while len(batch) < size and not path.exists():
-            batch += samples(scenes.frame(rng), rng)
+            group = GROUPS[int(rng.integers(1, len(GROUPS)))] if others and rng.random() < others else GROUPS[0]
+            batch += samples(scenes.frame(rng, group), rng)
         if batch:
             save(path, batch[:size])
             people = sum(s.person for s in batch[:size])
@@ -59,12 +61,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--held-out", action="store_true", help="bodies and motions that training does not see")
+    parser.add_argument("--others", type=float, default=0.5, help="share of scenes of other groups than `adult`")
     a = parser.parse_args()
     a.out.mkdir(parents=True, exist_ok=True)
     fraction = -(-a.count // a.processes)
     workers = []
     for i in range(a.processes):
-        options = {"seed": a.seed, "worker": i, "count": fraction, "held_out": a.held_out}
+        options = {"seed": a.seed, "worker": i, "count": fraction, "held_out": a.held_out, "others": a.others}
         workers.append(multiprocessing.get_context("spawn").Process(target=make, args=(a.out, a.data), kwargs=options))
         workers[-1].start()
     for w in workers:

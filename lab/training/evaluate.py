@@ -12,6 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from lab.training.anybody import GROUPS
 from lab.training.bodies import BONES, JOINTS
 from lab.training.crops import lifted
 from lab.training.export import read, restored
@@ -51,7 +52,7 @@ def yardstick(path: Path, store: Store, which: Tensor) -> dict[str, Array]:
 
 def truth(store: Store, which: Tensor) -> dict[str, Array]:
     """The truths of these pictures."""
-    keys = ("middle", "person", "joints", "weight", "facing", "lengths", "seen")
+    keys = ("middle", "person", "joints", "weight", "facing", "lengths", "observed", "group")
     return {k: store.columns[k][which].numpy().astype(float) for k in keys}
 
 
@@ -103,6 +104,26 @@ def measure(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, Any
     return out
 
 
+def by_group(reported: dict[str, Array], true: dict[str, Array]) -> dict[str, dict[str, float]]:
+    """Of each group: people found at log odds of 0 and 2, joints (cm), sides, stature (cm, %), what is taken for one."""
+    out = {}
+    for k in np.unique(true["group"]).astype(int):
+        of = true["group"] == k
+        mine = measure({n: v[of] for n, v in reported.items()}, {n: v[of] for n, v in true.items()})
+        people = of & (true["person"] > 0.5)
+        stature = true["lengths"][people, -1]
+        off = np.abs(np.exp(reported["length"][people, -1]) - stature)
+        out[GROUPS[k]] = {
+            "people": mine["people"], "others": mine["others"], "found": mine["person"]["+0"][0],
+            "found_2": mine["person"]["+2"][0], "mean_cm": mine["mean_cm"], "median_cm": mine["median_cm"],
+            "hidden_cm": mine["hidden_cm"], "sides_exchanged": mine["sides_exchanged"],
+            "facing_wrong": mine["facing_wrong"], "stature_cm": 100 * off.mean(),
+            "stature_percent": 100 * (off / stature).mean(), "false": mine["person"]["+0"][2],
+            "false_2": mine["person"]["+2"][2],
+        }  # fmt: skip
+    return out
+
+
 def _within(error: Array, scale: Array) -> dict[str, float]:
     """Shares of errors within 1, 2 and 3 scales (of a Laplace distribution: 0.63, 0.86, 0.95), and their mean by the scale."""
     return {str(k): (error < k * scale).mean() for k in (1, 2, 3)} | {"mean": (error / scale).mean()}
@@ -122,11 +143,11 @@ def main() -> None:
     parser.add_argument("--yardstick", type=Path, help="another network, ONNX, for comparison")
     parser.add_argument("--out", type=Path, help="write the figures there, too (JSON)")
     a = parser.parse_args()
-    torch.set_num_threads(2)
     store = Store(a.data, "held")
     which = torch.cat([store.people, store.others])
     true = truth(store, which)
-    figures = {"weights": _rounded(measure(answers(a.weights, store, which), true))}
+    reported = answers(a.weights, store, which)
+    figures = {"weights": _rounded(measure(reported, true)), "groups": _rounded(by_group(reported, true))}
     if a.yardstick:
         figures["yardstick"] = _rounded(measure(yardstick(a.yardstick, store, which), true))
     text = json.dumps(figures, indent=1)

@@ -15,7 +15,6 @@ from torch import nn
 
 from lab.training.loader import Store
 from lab.training.net import Block, Net, Output, Residual
-from lab.training.train import Training
 
 WEIGHTS_LINE, CHECK_LINE = "voodoo person 1", "voodoo person check 1"
 KINDS = {WEIGHTS_LINE: "<f2", CHECK_LINE: "<f4"}  # of the numbers
@@ -132,12 +131,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--state", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--begun", type=Path, help="weights that the training began with, for --part")
+    parser.add_argument("--part", type=float, default=1.0, help="of the way from them to the trained ones (default 1)")
+    parser.add_argument("--odds", type=float, default=0.0, help="added to a person's log odds, to calibrate them")
     parser.add_argument("--check", type=Path, help="also write check vectors")
     parser.add_argument("--data", type=Path, help="held-out pictures, for --check")
     a = parser.parse_args()
+    from lab.training.train import Training  # which begins with weights that are read here
+
     training = Training.new(0, 1e-3)
     training.load(a.state / "state.pt")
-    write(a.out, tensors(training.mean.eval()))
+    named = tensors(training.mean.eval())
+    if a.begun:
+        begun = read(a.begun)
+        named = [(name, begun[name] + a.part * (value - begun[name])) for name, value in named]
+    write(a.out, [(name, value + a.odds if name == "person.bias" else value) for name, value in named])
     if a.check:
         if a.data is None:
             parser.error("--check needs --data: held-out pictures")

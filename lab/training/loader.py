@@ -16,7 +16,8 @@ from lab.training.net import WIDTH
 
 DEPTH = 1.2  # m, the picture's unit of depth
 SWAP = [0, 1, 2] + [i + 1 if i % 2 else i - 1 for i in range(3, 17)]  # left and right joints exchanged
-KEYS = ("middle", "person", "joints", "weight", "seen", "facing", "lengths", "up_known", "share", "cover")
+KEYS = ("middle", "person", "joints", "weight", "observed", "facing", "lengths", "up_known", "fraction", "cover",
+        "group")  # fmt: skip
 Batch = dict[str, Tensor]
 
 
@@ -83,7 +84,7 @@ def augment(batch: Batch) -> Batch:
     xy = torch.einsum("nij,nkj->nki", turn, batch["joints"][..., :2]) - shift[:, None]
     z = batch["joints"][..., 2] * size[:, None] - closer[:, None]
     joints = torch.cat([xy, z[..., None]], -1)
-    for key, value in (("joints", joints), ("weight", batch["weight"]), ("seen", batch["seen"])):
+    for key, value in (("joints", joints), ("weight", batch["weight"]), ("observed", batch["observed"])):
         across = mirrored.view(-1, *[1] * (value.ndim - 1))
         out[key] = torch.where(across, value[:, SWAP], value)
     out["lengths"] = batch["lengths"] * size[:, None]

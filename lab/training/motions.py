@@ -91,7 +91,7 @@ def story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
         elif kind == "captured":
             keys.append(still[int(rng.integers(len(still)))])
         else:
-            keys.append(poses._crouch(rng, kind))
+            keys.append(poses.crouch(rng, kind))
     if sits:  # one seat, of which the arms and the trunk move
         keys = [keys[1], *(_legs_of(keys[1], key) for key in keys[2:])]
     keys = [key.turned(about("z", float(angle))) for key, angle in zip(keys, turn, strict=False)]

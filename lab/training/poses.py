@@ -196,7 +196,8 @@ def standing(rng: np.random.Generator) -> Pose:
     return _build(rng, lean, rng.normal(0, 0.05), np.stack(legs), _arms(rng, str(kind)))
 
 
-def _crouch(rng: np.random.Generator, kind: str) -> Pose:
+def crouch(rng: np.random.Generator, kind: str) -> Pose:
+    """A pose by rule: sit, squat, bend, kneel, lunge, kick."""
     n, u = rng.normal, rng.uniform
     arms = _arms(rng, str(rng.choice(["rest", "front", "thighs", "up", "hips"])))
     if rng.random() < 0.4:
@@ -240,7 +241,7 @@ def sample(rng: np.random.Generator, poses: list[Pose]) -> Pose:
     if x < 0.22:
         pose = standing(rng)
     elif x < 0.42:
-        pose = _crouch(rng, str(rng.choice(["sit", "sit", "squat", "bend", "bend", "kneel", "lunge", "kick"])))
+        pose = crouch(rng, str(rng.choice(["sit", "sit", "squat", "bend", "bend", "kneel", "lunge", "kick"])))
     else:
         pose = poses[rng.integers(len(poses))]
         for k in range(2):
@@ -270,11 +271,17 @@ def _with(pose: Pose, side: int, directions: Array) -> Pose:
     return replace(pose, limbs=limbs, clavicle=clavicle)
 
 
+def with_arms(pose: Pose, arms: Array, sides: tuple[int, ...] = (0, 1)) -> Pose:
+    """The pose with arms (2, 3, 3) relative to the chest, on these sides."""
+    for k in sides:
+        pose = _with(pose, k, arms[k] @ pose.chest.T)
+    return pose
+
+
 def _tumbled(rng: np.random.Generator, pose: Pose) -> Pose:
     """A handstand, a cartwheel or a fall: turned far about a level axis, arms mostly overhead."""
     if rng.random() < 0.7:
-        arms = _arms(rng, "up")
-        pose = _with(_with(pose, 0, arms[0] @ pose.chest.T), 1, arms[1] @ pose.chest.T)
+        pose = with_arms(pose, _arms(rng, "up"))
     a = rng.uniform(0, np.pi)
     axis = np.array([np.cos(a), np.sin(a), 0])
     angle = np.pi + rng.normal(0, 0.4) if rng.random() < 0.5 else rng.uniform(0.6, 2.6) * rng.choice([-1, 1])

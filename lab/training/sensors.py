@@ -145,6 +145,15 @@ def sense(
     return depth, labels
 
 
+def speckled(rng: np.random.Generator, depth: Array, floor: NDArray[np.bool_]) -> Array:
+    """A depth image whose floor comes back in specks, some at wrong depths."""
+    out, grain = depth.copy(), _smooth(rng, depth.shape, int(rng.integers(1, 5)))
+    out[floor & (grain > rng.uniform(-0.8, 1.0))] = 0
+    wrong = floor & (out > 0) & (rng.random(depth.shape) < rng.uniform(0, 0.5))
+    out[wrong] *= 1 + rng.normal(0, rng.uniform(0.01, 0.05), int(wrong.sum()))
+    return out
+
+
 def user_mask(rng: np.random.Generator, depth: Array, labels: NDArray[np.uint8], height: Array) -> Array:
     """A depth image cut to the person by a sensor's own mask, with its mistakes; `height` above the floor, m."""
     keep = labels > 0

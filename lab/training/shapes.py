@@ -240,11 +240,101 @@ def balls(rng: Rng) -> list[Mesh]:
     return parts + [tube((x, y, 0), (x, y, h), (0.03, 0.04)) for x, y in legs]
 
 
+def bed(rng: Rng, height: float | None = None) -> list[Mesh]:
+    """A bed along x with its middle at the origin; the mattress at a height."""
+    h, y = height or rng.uniform(0.35, 0.65), rng.choice([0.9, 1.4, 1.8]) + rng.uniform(-0.1, 0.1)
+    x = rng.uniform(1.9, 2.1)
+    parts = [box((x, y, h if rng.random() < 0.5 else 0.25), (0, 0, 0)), box((x, y, 0.2), (0, 0, h - 0.2))]
+    return [*parts, box((0.06, y, h + rng.uniform(0.1, 0.6)), (x / 2, 0, 0)), ball((0.8, 0, h), (0.2, 0.35, 0.08))]
+
+
+def desk(rng: Rng, height: float | None = None) -> list[Mesh]:
+    """A desk or a counter before a person who faces x and sits or stands at the origin; some with a screen and things."""
+    h, x, y = height or rng.choice([0.74, 1.05]) + rng.uniform(-0.05, 0.1), rng.uniform(0.4, 0.9), rng.uniform(0.9, 2.4)
+    parts = [box((x, y, 0.04), (0, 0, h - 0.04)), *_legs(rng, x, y, h - 0.04)]
+    if rng.random() < 0.65:  # closed at the front, or a solid counter
+        parts.append(box((x if rng.random() < 0.3 else 0.03, y, h - 0.04), (x / 2 - 0.03, 0, 0)))
+    if rng.random() < 0.35:
+        wide, high = rng.uniform(0.35, 0.65), rng.uniform(0.25, 0.5)
+        parts.append(box((0.04, wide, high), (0.0, rng.uniform(-0.5, 0.5), h + 0.02)))
+    for _ in range(rng.integers(0, 4)):
+        size = rng.uniform(0.05, 0.3, 3)
+        parts.append(box(tuple(size), (rng.uniform(-x, x) / 2.5, rng.uniform(-y, y) / 2.2, h), rng.uniform(0, 3)))
+    return parts
+
+
+def _wheel(middle: tuple[float, float, float], radius: float, solid: bool) -> list[Mesh]:
+    """A wheel that rolls along x."""
+    at, a = np.array(middle), np.linspace(0, 2 * np.pi, 21)
+    grid = np.stack([np.stack([r * np.cos(a), y + 0 * a, r * np.sin(a)], 1) for r, y in
+                     ((radius - 0.05, 0.02), (radius, 0.02), (radius, -0.02), (radius - 0.05, -0.02))])  # fmt: skip
+    rim, side = sheet(grid + at), np.array([0, 0.01, 0])
+    if solid:
+        return [rim, tube(at - side, at + side, (radius,) * 2)]
+    ends = radius * np.stack([np.cos(a), 0 * a, np.sin(a)], 1)[:10:3]
+    return [rim, *(tube(at - d, at + d, (0.008, 0.008), n=4) for d in ends)]
+
+
+def wheelchair(rng: Rng, height: float | None = None, size: float = 1.0) -> list[Mesh]:
+    """A wheelchair that faces x; the seat at a height above the middle; some of them electric."""
+    h, w, r, solid = height or rng.uniform(0.45, 0.55), rng.uniform(0.4, 0.56) * size, 0.3 * size, rng.random() < 0.3
+    deep, back, grip = 0.42 * size, rng.uniform(0.3, 0.6) * size, rng.uniform(0.16, 0.26) * size
+    parts = [box((deep, w, 0.05), (0.05, 0, h - 0.05)), box((0.04, w, back), (0.05 - deep / 2, 0, h))]
+    electric = rng.random() < 0.25
+    if electric:
+        parts.append(box((deep * 1.3, w * 0.8, h - 0.2), (0, 0, 0.12)))
+    for s in (-1, 1):
+        y, foot = s * (w / 2 + 0.03), deep / 2 + rng.uniform(0.1, 0.3) * size
+        parts += _wheel((-0.08 * size, y, 0.18 if electric else r), 0.18 if electric else r, solid)
+        parts.append(tube((deep / 2, y - 0.03 * s, 0.09), (deep / 2, y + 0.01 * s, 0.09), (0.09, 0.09)))  # a caster
+        parts.append(tube((deep / 2, y - 0.04 * s, h), (foot, y - 0.08 * s, 0.14), (0.015, 0.015)))
+        parts.append(box((0.18 * size, 0.15 * size, 0.02), (foot + 0.04, s * w / 4, rng.uniform(0.08, 0.14))))
+        if rng.random() < 0.7:
+            parts.append(box((deep * 0.8, 0.05, 0.04), (0, y, h + grip)))
+            parts.append(box((deep * 0.8, 0.02, grip if rng.random() < 0.5 else 0.02), (0, y, h)))
+        if rng.random() < 0.6:
+            parts.append(tube((-deep / 2, y, h + back), (-deep / 2 - 0.13, y, h + back), (0.02, 0.02)))
+    return parts
+
+
+def walking_frame(rng: Rng, height: float | None = None, size: float = 1.0) -> list[Mesh]:
+    """A walking frame, open towards -x, or one with wheels and a seat; its handles at a height."""
+    h, w, deep = height or rng.uniform(0.75, 0.95), 0.28 * size, rng.uniform(0.25, 0.45) * size
+    thick = (rng.uniform(0.012, 0.022),) * 2
+    parts = [tube((deep, -w, z * h), (deep, w, z * h), thick) for z in (0.8, 0.4)]
+    for y in (-w, w):
+        parts += [tube((-0.1, y, h), (deep, y, 0.95 * h), thick), tube((0, y, h), (-0.06, y * 1.1, 0), thick)]
+        parts.append(tube((deep, y, 0.95 * h), (deep + 0.06, y * 1.1, 0), thick))
+    if rng.random() < 0.4:
+        parts.append(box((0.3 * size, 2 * w, 0.04), (deep / 2, 0, 0.62 * h)))
+        parts += [p for x in (0.0, deep) for s in (-1, 1) for p in _wheel((x, s * w * 1.1, 0.1), 0.1, True)]
+    return parts
+
+
+def robot(rng: Rng) -> list[Mesh]:
+    """A robot with a head, arms and a skirt or a column instead of legs, or a child-sized one."""
+    h, w = rng.uniform(0.7, 1.7), rng.uniform(0.15, 0.26)
+    waist, base, head = rng.uniform(0.35, 0.5) * h, rng.uniform(0.8, 1.5) * w, rng.uniform(0.1, 0.17)
+    foot = (base, base * 0.95, base * 0.8) if rng.random() < 0.6 else (base, 0.08, 0.08)
+    parts = [tube((0, 0, 0), (0, 0, waist), foot)]
+    parts.append(ball((0.0, 0, h - head), (head * rng.uniform(0.9, 1.2), head, head * 0.9)))
+    trunk = (w * 0.8, w, w * 0.95, w * 0.5)
+    parts.append(tube((0, 0, waist), (0, 0, h - 1.9 * head), trunk, flat=rng.uniform(0.6, 1.1)))
+    for s in (-1, 1):
+        if rng.random() < 0.85:
+            elbow = np.array([rng.uniform(-0.05, 0.1), s * (w + 0.08), 0.5 * (waist + h) - 0.1])
+            parts += [tube((0, s * w, h - 2.3 * head), elbow, (0.06, 0.05))]
+            parts += [tube(elbow, elbow + [rng.uniform(0, 0.25), 0, rng.uniform(-0.3, 0.05)], (0.05, 0.06))]
+    return parts
+
+
 Maker = Callable[[Rng], list[Mesh]]
 ANY: tuple[Maker, ...] = (
     chair, sofa, table, boxes, cupboard, shelf, coat_stand, lamp, plant, robot_arm, mannequin, curtain, balls,
 )  # fmt: skip
 LIKE_PEOPLE: tuple[Maker, ...] = (coat_stand, mannequin, cupboard, shelf, lamp, plant, robot_arm, curtain, chair, boxes)
+MORE: tuple[Maker, ...] = (*ANY, bed, desk, wheelchair, walking_frame, robot)
+MORE_LIKE: tuple[Maker, ...] = (*LIKE_PEOPLE, robot, robot, robot, wheelchair)
 IN_FRONT: tuple[Maker, ...] = (table, table, boxes, chair, cupboard, plant, robot_arm, balls, sofa)
 
 

@@ -23,6 +23,7 @@ import torch.multiprocessing
 from torch import Tensor
 from torch.nn import functional
 
+from lab.training.export import read, restored
 from lab.training.loader import Batch, Store, augment
 from lab.training.net import Net, Output
 
@@ -61,7 +62,7 @@ def loss_of(out: Output, batch: Batch) -> tuple[Tensor, dict[str, Tensor]]:
     joints = (weight[..., None] * functional.smooth_l1_loss(out.joints, target, beta=BETA, reduction="none")).sum() / 3
     anchors = functional.smooth_l1_loss(out.anchors, target[..., :2], beta=BETA, reduction="none")
     anchors = (weight[..., None] * anchors).sum() / 2
-    observed = functional.binary_cross_entropy_with_logits(out.visible[people], batch["seen"][people].float())
+    observed = functional.binary_cross_entropy_with_logits(out.visible[people], batch["observed"][people].float())
     sure = person * (batch["facing"].abs() / 0.3).clamp(max=1)
     facing = functional.binary_cross_entropy_with_logits(out.facing, (batch["facing"] > 0).float(), reduction="none")
     facing = (facing * sure).sum() / sure.sum().clamp(min=1)
@@ -121,10 +122,12 @@ class Training:
     views: int = 0
 
     @classmethod
-    def new(cls, seed: int, rate: float, *, small: bool = False, device: str = "cpu") -> Training:
-        """A network that knows nothing."""
+    def new(
+        cls, seed: int, rate: float, *, small: bool = False, device: str = "cpu", weights: Path | None = None
+    ) -> Training:
+        """A network that knows nothing, or that begins with a file's weights, whose folded norms stay as they are."""
         torch.manual_seed(seed)
-        net = Net(small).to(device, memory_format=torch.channels_last)
+        net = (Net(small) if weights is None else restored(read(weights))).to(device, memory_format=torch.channels_last)
         plain = [p for p in net.parameters() if p.ndim <= 1]
         groups = [{"params": [p for p in net.parameters() if p.ndim > 1], "weight_decay": 0.02}]
         optimizer = torch.optim.AdamW([*groups, {"params": plain, "weight_decay": 0.0}], lr=rate)
@@ -188,7 +191,7 @@ def run(training: Training, data: Store, held: Store | None, plan: Plan, state: 
     while done < 1:
         rate = plan.rate * (0.5 + 0.5 * math.cos(math.pi * done)) + 1e-6
         rate *= min(1.0, (training.step - first + 1) / plan.warm)
-        batch = augment(data.draw(rng, *plan.share))
+        batch = augment(data.draw(rng, *plan.fraction))
         now = time.monotonic()
         reached = (now - start) / (60 * plan.minutes) if plan.minutes else (training.step + 1 - first) / plan.steps
         parts, done = training.update(batch, rate, reached)
@@ -219,7 +222,7 @@ def _keep(training: Training, held: Store | None, state: Path, done: float) -> N
     print("held out", figures, flush=True)
 
 
-def work(rank: int, place: Path, state: Path, plan: Plan, seed: int, device: str) -> None:
+def work(rank: int, place: Path, state: Path, plan: Plan, seed: int, device: str, weights: Path | None = None) -> None:
     """One process of a training."""
     torch.set_num_threads(1)
     torch.backends.cudnn.benchmark = True  # pictures and batches are of one size
@@ -227,7 +230,7 @@ def work(rank: int, place: Path, state: Path, plan: Plan, seed: int, device: str
     if plan.processes > 1:
         meet = f"file://{state.resolve()}/meeting"
         dist.init_process_group("gloo", init_method=meet, rank=rank, world_size=plan.processes)
-    training = Training.new(seed, plan.rate, device=device)
+    training = Training.new(seed, plan.rate, device=device, weights=weights)
     if (state / "state.pt").exists():
         training.load(state / "state.pt")
     held = Store(place, "held", device) if rank == 0 else None
@@ -240,6 +243,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--state", type=Path, required=True, help="folder; a training that lies there goes on")
     parser.add_argument("--steps", type=int, default=Plan.steps)
+    parser.add_argument("--weights", type=Path, help="begin with these, at a smaller rate; also when going on")
     parser.add_argument("--minutes", type=float, default=0.0, help="instead of steps")
     parser.add_argument("--batch", type=int, default=Plan.batch, help="pictures of a step")
     parser.add_argument("--rate", type=float, default=Plan.rate)
@@ -251,7 +255,7 @@ def main() -> None:
     (a.state / "meeting").unlink(missing_ok=True)
     processes = a.processes or (os.cpu_count() or 1 if a.device == "cpu" else 1)
     plan = Plan(a.steps, a.minutes, a.batch, processes, a.rate)
-    torch.multiprocessing.spawn(work, (a.data, a.state, plan, a.seed, a.device), nprocs=processes)
+    torch.multiprocessing.spawn(work, (a.data, a.state, plan, a.seed, a.device, a.weights), nprocs=processes)
 
 
 if __name__ == "__main__":
