@@ -26,7 +26,7 @@ use branch::Branch;
 use history::History;
 use leg_swap::LegSwap;
 use proposals::{ColorDirections, DetectedBody, DetectedEnd, LastGoodEnd, Pool, Propose, UnexplainedCluster};
-use refined::{Refined, is_apart, is_elsewhere};
+use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
 
@@ -131,18 +131,14 @@ impl Hypotheses {
         steps
     }
 
-    /// Forgets the motion of what a hypothesis has moved in this frame, the body or an arm or leg: it did not move there since the
-    /// last frame.
+    /// Forgets the motion of the arms and legs that a hypothesis has moved in this frame: they did not move there since the last
+    /// frame.
     pub(crate) fn forget_motion(&self, model: &Model, motion: &mut Motion) {
-        let Self { before, .. } = self;
-        if before.len() != motion.poses.len() {
+        if self.before.len() != motion.poses.len() {
             return;
         }
-        if is_apart(before[0].translation, motion.poses[0].translation) {
-            motion.previous.clone_from(&motion.poses);
-        }
         for chain in &model.extremities {
-            if is_elsewhere(chain, before, &motion.poses) {
+            if is_elsewhere(chain, &self.before, &motion.poses) {
                 motion.forget_joints(&model.body, chain.limbs());
             }
         }

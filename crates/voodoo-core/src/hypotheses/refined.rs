@@ -172,11 +172,6 @@ fn is_another(context: Context, one: &[Pose], other: &[Pose]) -> bool {
 
 /// Whether this arm or leg is at another place in one pose than in the other.
 pub(super) fn is_elsewhere(chain: &TwoBone, one: &[Pose], other: &[Pose]) -> bool {
-    is_apart(one[chain.lower].translation, other[chain.lower].translation) || is_apart(chain.end(one), chain.end(other))
+    let apart = |one: Vec3, other: Vec3| one.distance(other) > SAME_POSE;
+    apart(one[chain.lower].translation, other[chain.lower].translation) || apart(chain.end(one), chain.end(other))
 }
-
-/// Whether two positions are of different poses.
-pub(super) fn is_apart(one: Vec3, other: Vec3) -> bool {
-    one.distance(other) > SAME_POSE
-}
-
