@@ -161,7 +161,9 @@ PAIRS = [
 
 
 def test_there_are_pairs_of_all_commands_that_write():
-    assert {command for command, *_ in PAIRS} == {"track", "live", "ik", "init", "eval", "batch", "report"} and len(PAIRS) > 45
+    assert {command for command, *_ in PAIRS} == {"track", "live", "ik", "init", "eval", "batch", "report"} and len(
+        PAIRS
+    ) > 45
     assert ("track", "--out", "--background") in PAIRS and ("live", "--report", "--calibration") in PAIRS
 
 

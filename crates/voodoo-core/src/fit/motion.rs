@@ -191,6 +191,28 @@ mod tests {
     }
 
     #[test]
+    fn an_arm_whose_motion_is_forgotten_goes_on_with_the_trunk_alone() {
+        let (body, mut motion) = walking();
+        let arm = ["l_upperarm", "l_forearm", "l_hand"].map(|name| body.limb_index(name).unwrap());
+        motion.advance(&body, 3.0 / 30.0, 1.0, false);
+        motion.poses.iter_mut().for_each(|pose| pose.translation += STEP);
+        for limb in arm {
+            let (parent, joint) = body.limbs()[limb].parent.as_ref().unwrap();
+            let turned = Quat::from_rotation_x(0.8) * joint_turn(joint, &motion.poses[*parent], &motion.poses[limb]);
+            motion.poses[limb] = place(joint, &motion.poses[*parent], turned);
+        }
+        motion.forget_joints(&body, arm.into_iter());
+        motion.commit(3.0 / 30.0);
+        let now: Vec<Pose> = motion.world_from_limb().collect();
+        motion.advance(&body, 4.0 / 30.0, 1.0, true);
+        for limb in arm {
+            let expected = motion.world_from_limb().nth(limb).unwrap();
+            assert!((expected.translation - now[limb].translation - STEP).length() < 1e-6);
+            assert!(expected.rotation.angle_between(now[limb].rotation) < 1e-5);
+        }
+    }
+
+    #[test]
     fn the_working_frame_follows_the_body() {
         let (body, mut motion) = walking();
         motion.advance(&body, 0.1, 0.0, true);
