@@ -43,7 +43,8 @@ fn lost_at_once_and_found_at_once_elsewhere() {
     let (body, found) = cover_and_move(Config::default());
     assert!(found[1..10].iter().all(|estimate| estimate.status == Status::Tracking));
     assert!(found[10..20].iter().all(|estimate| estimate.status == Status::Lost));
-    assert!(found[22..].iter().all(|estimate| estimate.status == Status::Tracking));
+    assert!(found[20..].iter().all(|estimate| estimate.status != Status::Lost));
+    assert!(found[23..].iter().all(|estimate| estimate.status == Status::Tracking));
     let truth = moved(&body, Vec3::Y * 0.9, 0.3);
     for name in ["l_shoulder", "r_shoulder", "l_wrist", "r_wrist", "l_knee", "r_ankle"] {
         let site = body.site_index(name).unwrap();
