@@ -278,11 +278,14 @@ impl Tracker {
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
         if schedule.whole_body && known {
-            let lost = interrupted || assessor.status() == Status::Lost;
+            let lost = assessor.status() == Status::Lost;
             let (root, limb_suspect) =
                 (poses[0].translation + *origin, assessor.has_suspect_limb() || sizes.is_uncertain());
             match ownership {
-                None => relocalizer.detect(&model.body, frame, root, limb_suspect, assessor.is_uncertain(), lost),
+                None => {
+                    let (uncertain, anywhere) = (assessor.is_uncertain(), lost || interrupted);
+                    relocalizer.detect(&model.body, frame, root, limb_suspect, uncertain, anywhere);
+                }
                 Some(ownership) => relocalizer.detect_owned(&model.body, frame, ownership, root, lost),
             }
         }
