@@ -194,11 +194,12 @@ pub use observation::frame::{
     Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };
 pub use observation::picture::{ColorImage, ColorPixels};
+pub use people::one::Tracker;
 pub use people::{People, PeopleOptions};
 pub use regions::RegionLine;
 pub use shape::ray::RayHit;
 pub use shape::{Region, ShapeError, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};
-pub use tracker::Tracker;
+pub use tracker::BodyTracker;
 pub use tracker::estimate::{Estimate, LimbStatus, SourceReport, Status};
 pub use tracker::expected::LimbMotion;
 pub use uncertainty::Covariances;

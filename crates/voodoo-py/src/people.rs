@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::PeopleOptions;
 use voodoo_core::math::{Aabb, Vec3};
-use voodoo_core::{Frame, People, Tracker};
+use voodoo_core::{BodyTracker, Frame, People};
 
 use crate::body::PyBody;
 use crate::borrowed::Parts;
@@ -35,7 +35,7 @@ pub(crate) enum TrackedBody<'py> {
 
 impl TrackedBody<'_> {
     /// The tracker of the body.
-    pub(crate) fn tracker(&self) -> PyResult<&Tracker> {
+    pub(crate) fn tracker(&self) -> PyResult<&BodyTracker> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
             Self::Person(people, id) => {

@@ -1,9 +1,9 @@
 //! Extrapolates points that were measured before the frame to its time: each moves with the limb that it lies on.
 
 use crate::body_view::Matrix;
+use voodoo_core::BodyTracker;
 use voodoo_core::PointSlice;
 use voodoo_core::TrackError;
-use voodoo_core::Tracker;
 use voodoo_core::math::matrix;
 
 /// Points farther than this from every limb belong to the scene and are not moved, meters.
@@ -25,7 +25,7 @@ const LONGEST_LIMB: f64 = 1.0;
 /// [`TrackError`] when points near the body are not finite.
 pub fn carried(
     points: PointSlice,
-    tracker: &Tracker,
+    tracker: &BodyTracker,
     elapsed: f64,
     world_from_sensor: Option<&Matrix>,
 ) -> Result<Option<Vec<[f64; 3]>>, TrackError> {

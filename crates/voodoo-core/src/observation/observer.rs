@@ -1,13 +1,12 @@
 //! Turns a frame into an observation of the tracked body: background, candidates for the body, and which images were segmented.
 
 use super::background::{Backgrounds, OTHERS};
-use super::candidates::{Candidates, body_box};
+use super::candidates::Candidates;
 use super::depth_view::{DepthViews, find_segmented};
 use super::frame::{Frame, Ground};
 use super::ownership::OwnershipMask;
-use crate::body::Body;
 use crate::config::Config;
-use crate::math::{Aabb, Pose, Vec3};
+use crate::math::{Aabb, Vec3};
 
 /// What a frame shows of the body. Cheap to copy; everything is in the working frame.
 #[derive(Clone, Copy, Debug)]
@@ -40,23 +39,6 @@ impl<'a> Observation<'a> {
     }
 }
 
-/// Where the body is expected when a frame arrives.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Expectation<'a> {
-    /// The body.
-    pub body: &'a Body,
-    /// Its expected poses, working frame.
-    pub poses: &'a [Pose],
-    /// The working frame's origin in the world.
-    pub origin: Vec3,
-    /// Whether this is the first frame after the pose was set.
-    pub first: bool,
-    /// Number of frames for which the body has been searched; `None` while it is not lost.
-    pub searched: Option<usize>,
-    /// Pixels that are known to show the body.
-    pub own: Own<'a>,
-}
-
 /// Pixels of one depth image that show the body: the index of the image in the frame, and the indices of the pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Own<'a> {
@@ -81,38 +63,38 @@ impl Observer {
         self.backgrounds.clear();
     }
 
-    /// Finds which images of a frame are segmented; the background is not updated.
+    /// Step 1 (K06 IV-B.1): keeps the points in the enlarged box of the whole body, without the scene and the pixels that other
+    /// persons explain.
+    pub(crate) fn observe(
+        &mut self,
+        frame: &Frame,
+        bounds: &Aabb,
+        origin: Vec3,
+        ownership: OwnershipMask,
+        config: &Config,
+    ) {
+        self.adopt(frame, ownership);
+        self.gather(frame, origin, bounds, config);
+    }
+
+    /// Finds which images of a frame are segmented; the scene is not adopted.
     pub(crate) fn find_segmented(&mut self, frame: &Frame) {
         find_segmented(frame, &mut self.segmented);
     }
 
-    /// Step 1 (K06 IV-B.1): updates the background, and keeps the points in the enlarged box of the whole body.
-    pub(crate) fn observe(&mut self, frame: &Frame, expected: Expectation, config: &Config) {
+    /// Adopts the scene, and what other persons explain.
+    fn adopt(&mut self, frame: &Frame, ownership: OwnershipMask) {
         find_segmented(frame, &mut self.segmented);
-        let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
-        if config.background {
-            self.backgrounds.learn_around(frame, expected, &bounds);
+        self.backgrounds.mark_others_points(ownership.cloud_owners, |owner| ownership.is_others(owner));
+        // A frame without images keeps what is known of the cameras.
+        if frame.images.is_empty() {
+            return;
         }
-        self.gather(frame, expected.origin, &bounds, config);
-    }
-
-    /// Step 1 for one of several persons: the scene is given, and pixels that other persons explain are left out.
-    pub(crate) fn observe_owned(
-        &mut self,
-        frame: &Frame,
-        expected: Expectation,
-        ownership: OwnershipMask,
-        config: &Config,
-    ) {
-        find_segmented(frame, &mut self.segmented);
-        let bounds = body_box(expected.body, expected.poses, config.body_box_margin);
         self.backgrounds.adopt(frame, ownership.scene, |image, depth| {
             for (depth, owner) in depth.iter_mut().zip(ownership.owners(image)) {
                 *depth = if ownership.is_others(*owner) { OTHERS } else { *depth };
             }
         });
-        self.backgrounds.mark_others_points(ownership.cloud_owners, |owner| ownership.is_others(owner));
-        self.gather(frame, expected.origin, &bounds, config);
     }
 
     /// Treats background pixels as possibly showing the body. Returns the depths learned there, for `restore`.

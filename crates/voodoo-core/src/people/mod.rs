@@ -6,6 +6,7 @@
 
 mod assign;
 mod clothes;
+pub(crate) mod one;
 mod options;
 mod person;
 mod pixel_assignment;
@@ -20,18 +21,17 @@ use crate::math::Vec3;
 use crate::observation::background::Background;
 use crate::observation::frame::Frame;
 use crate::observation::ownership::NO_OWNER;
-use crate::relocalize::SAME_PERSON;
 use crate::threads::Threads;
-use crate::tracker::Tracker;
+use crate::tracker::BodyTracker;
 use clothes::Clothes;
 pub use options::PeopleOptions;
 use person::Person;
 use pixel_assignment::{PixelAssignment, PredictedBody};
 use rayon::prelude::*;
 use scene_model::SceneModel;
-use tentative_tracks::{TentativeTrack, TentativeTracks};
+use tentative_tracks::{SAME_PERSON, TentativeTrack, TentativeTracks};
 
-/// Shortest time between two detections in pixels that no person explains, seconds.
+/// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
 const DETECT_EVERY: f64 = 0.06;
 /// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.3;
@@ -79,17 +79,17 @@ impl People {
         let threads = Threads::new(&config)?;
         Ok(Self {
             prototype,
-            config: Config { threads: 1, ..config },
             options,
             persons: Vec::new(),
             next_id: 1,
             assignment: PixelAssignment::default(),
-            scene: SceneModel::default(),
+            scene: SceneModel::new(config.background),
             tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
             last_detection: None,
             stamp: None,
             threads,
+            config: Config { threads: 1, ..config },
         })
     }
 
@@ -111,7 +111,7 @@ impl People {
     }
 
     /// Returns number and tracker of every present person, in the order in which they were created.
-    pub fn present(&self) -> impl Iterator<Item = (usize, &Tracker)> {
+    pub fn present(&self) -> impl Iterator<Item = (usize, &BodyTracker)> {
         self.persons.iter().filter(|person| person.present).map(|person| (person.id, &person.tracker))
     }
 
@@ -148,6 +148,13 @@ impl People {
         Ok(self.next_id - 1)
     }
 
+    /// Forgets everybody but the first person, and the scene. The next frame may have any stamp.
+    fn forget_others(&mut self) {
+        self.persons.truncate(1);
+        (self.scene, self.tentative) = (SceneModel::new(self.config.background), TentativeTracks::default());
+        (self.last_detection, self.stamp) = (None, None);
+    }
+
     /// Returns a person with the next number, who is not present yet.
     fn nobody_yet(&self, stamp: f64) -> Result<Person, TrackError> {
         let (body, config) = (self.prototype.clone(), self.config.clone());
@@ -159,16 +166,29 @@ impl People {
     pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
         frame.check(&self.prototype, self.stamp)?;
         own.iter().try_for_each(|(_, frame)| frame.check(&self.prototype, self.stamp))?;
+        self.advance(frame, own);
+        Ok(())
+    }
+
+    /// Updates all persons with a frame that was checked.
+    fn advance(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         self.stamp = Some(frame.stamp);
         self.detector.clear_error();
         self.scene.register(frame);
         self.assign_pixels(frame);
         self.follow(frame, own);
-        self.scene.learn(frame, self.assignment.owners());
+        for person in &self.persons {
+            if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
+                self.scene.release(frame, image, pixels);
+            }
+        }
+        // A lost person owns no pixels, and must not become part of the scene.
+        if !self.persons.iter().any(|person| person.present && !person.is_tracked()) {
+            self.scene.learn(frame, self.assignment.owners());
+        }
         self.prune_tracks();
         self.detect_new(frame);
         self.delete_expired(frame.stamp);
-        Ok(())
     }
 
     /// Assigns every pixel and free point to the person whose surface explains it.
@@ -187,11 +207,13 @@ impl People {
     /// Steps every tracker with its own pixels and points.
     fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         let (assignment, scene) = (&self.assignment, self.scene.known());
+        // With several persons, color pictures only serve to identify them.
+        let shared = &Frame { colors: &[], ..*frame };
         let work = |(number, person): (usize, &mut Person)| {
             if person.present {
                 let ownership = assignment.ownership(number, scene);
-                let of = own.iter().find(|(id, _)| *id == person.id).map_or(frame, |(_, frame)| frame);
-                person.tracker.step_owned(of, ownership);
+                let of = own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
+                person.tracker.step(of, ownership);
                 person.update(frame, ownership);
             }
         };
@@ -211,7 +233,8 @@ impl People {
                 let [a, b] = [older, newer].map(|number| &self.persons[number]);
                 if a.is_tracked() && b.is_tracked() && a.place.distance(place) < ONE_BODY {
                     let more = self.assignment.count(newer) > self.assignment.count(older);
-                    self.persons[if more { older } else { newer }].present = false;
+                    let fewer = if more && !a.followed { older } else { newer };
+                    self.persons[fewer].present = false;
                 }
             }
             let is_followed = self.options.allows(place) && self.options.includes(self.persons[newer].id);
@@ -225,8 +248,10 @@ impl People {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
         });
         if everybody_there
+            || !self.finds_new(frame.stamp)
             || !self.detector.knows()
             || self.last_detection.is_some_and(|last| frame.stamp - last < DETECT_EVERY)
+                && self.persons.iter().any(Person::is_tracked)
         {
             return;
         }
@@ -237,6 +262,13 @@ impl People {
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);
         }
+    }
+
+    /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
+    fn finds_new(&self, stamp: f64) -> bool {
+        let unconfirmed = |person: &Person| person.is_tracked() && !person.tracker.is_confirmed(stamp);
+        let relocalizes = self.config.relocalization || !self.persons.iter().any(|person| person.present);
+        relocalizes && !self.persons.iter().any(unconfirmed)
     }
 
     fn detect(&mut self, frame: &Frame, query: DetectionQuery) {
@@ -359,9 +391,10 @@ impl People {
         let known = person.created < frame.stamp;
         let ownership = self.assignment.ownership(number, self.scene.known());
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
-        let came = person.tracker.start_at_detection(frame, ownership, detected, known);
+        let came = person.tracker.start_at_detection(&Frame { colors: &[], ..*frame }, ownership, detected, known);
         if came {
             person.present = true;
+            person.created = person.created.min(frame.stamp);
             person.update_stature(detected);
         }
         person.update(frame, ownership);
@@ -378,7 +411,7 @@ impl People {
         self.persons.retain(|person| {
             let remembered =
                 person.last_tracked - person.created >= KNOWN_AFTER && stamp - person.last_tracked < forget_after;
-            person.present || remembered
+            person.present || person.followed || remembered
         });
     }
 }

@@ -1,14 +1,15 @@
 //! One of several persons: their tracker, and what is stored while they are absent.
 
 use super::clothes::Clothes;
+use crate::Body;
 use crate::config::Config;
 use crate::detect::{Detect, Detected};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
 use crate::observation::ownership::OwnershipMask;
+use crate::tracker::BodyTracker;
 use crate::tracker::estimate::Status;
-use crate::{Body, Tracker};
 
 /// A lost person whose position is in view and not hidden becomes absent after this, seconds.
 const LEAVES: f64 = 0.3;
@@ -25,8 +26,12 @@ const HIDES: f64 = 0.08;
 #[derive(Debug)]
 pub(super) struct Person {
     pub(super) id: usize,
-    pub(super) tracker: Tracker,
+    pub(super) tracker: BodyTracker,
     pub(super) present: bool,
+    /// Whether the person is the one of a [`crate::Tracker`], who is never deleted.
+    pub(super) followed: bool,
+    /// Whether the person stays present while lost, because the user said where they are.
+    pub(super) stays: bool,
     /// Stamps of the first and of the last tracked frame, seconds.
     pub(super) created: f64,
     pub(super) last_tracked: f64,
@@ -49,12 +54,14 @@ impl Person {
         detector: Option<Box<dyn Detect>>,
         stamp: f64,
     ) -> Result<Self, TrackError> {
-        let mut tracker = Tracker::new(body, config)?;
+        let mut tracker = BodyTracker::new(body, config)?;
         tracker.set_detector(detector);
         Ok(Self {
             id,
             tracker,
             present: false,
+            followed: false,
+            stays: false,
             created: stamp,
             last_tracked: stamp,
             place: Vec3::ZERO,
@@ -105,6 +112,9 @@ impl Person {
                     self.clothes.observe(frame, self.tracker.body(), &estimate.world_from_limb, own);
                 }
             }
+            return;
+        }
+        if self.stays || !self.tracker.can_search() {
             return;
         }
         let patience = match self.presence(frame, ownership) {

@@ -8,7 +8,7 @@ use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
 use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// Distance from its expected position within which a surface explains a measurement, meters: the reach of the candidate search.
-const REACH: f32 = 0.20;
+const REACH: f32 = 0.12;
 
 /// Limit for the number of sampled pixels in a row: neighboring pixels on one surface are merged.
 const COLUMNS: usize = 106;

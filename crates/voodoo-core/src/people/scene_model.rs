@@ -25,6 +25,8 @@ pub(super) struct SceneModel {
     known: Backgrounds,
     images: Vec<PendingDepth>,
     row: usize,
+    /// Whether nothing is learned.
+    off: bool,
 }
 
 /// Recent depth of each pixel where the scene is not known, and the number of consecutive observations.
@@ -39,6 +41,11 @@ struct PendingDepth {
 }
 
 impl SceneModel {
+    /// Returns a scene of which nothing is known yet; with `learns` false, nothing ever is.
+    pub(super) fn new(learns: bool) -> Self {
+        Self { off: !learns, ..Self::default() }
+    }
+
     /// Returns the learned scene.
     pub(super) fn known(&self) -> &Backgrounds {
         &self.known
@@ -46,6 +53,9 @@ impl SceneModel {
 
     /// Registers the images of a frame. For a new camera, or one that moved far, the scene is unknown.
     pub(super) fn register(&mut self, frame: &Frame) {
+        if self.off {
+            return;
+        }
         self.images.resize_with(frame.images.len(), PendingDepth::default);
         for (image, tentative) in frame.images.iter().zip(&mut self.images) {
             tentative.depth.resize(image.pixels.len(), 0.0);

@@ -2,8 +2,13 @@
 
 use crate::detect::{Detection, PlacedDetection};
 use crate::math::Vec3;
-use crate::relocalize::{DETECTION_COST, ENOUGH_ODDS, SAME_PERSON};
+use crate::relocalize::ENOUGH_ODDS;
 
+/// Amount subtracted from the log odds of every detection, because the errors of successive detections of a static object are
+/// correlated.
+const DETECTION_COST: f64 = 1.0;
+/// Detections within this distance of the last position are of the same person, meters; farther ones are of another.
+pub(super) const SAME_PERSON: f64 = 0.5;
 /// Cost of a detection of something that has stood there from the start, subtracted from its log odds in place of
 /// `DETECTION_COST`. Plants reach log odds of up to 4; persons of whom more than half is visible reach 8.
 const STILL_COSTS: f64 = 5.0;

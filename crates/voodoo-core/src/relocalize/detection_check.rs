@@ -1,6 +1,5 @@
 //! Decides when the detector runs for a tracked person, and whether it finds the person elsewhere or facing the other way.
 
-use super::tentative_detection::ENOUGH_ODDS;
 use crate::body::Body;
 use crate::detect::Detected;
 use crate::hypotheses::APART;
@@ -20,6 +19,9 @@ pub(super) const ELSEWHERE: f64 = 0.15;
 pub(super) const SIGMAS: f64 = 3.5;
 /// Sum of log odds from which on a track is not a person.
 const FALSE_TRACK_ODDS: f64 = 12.0;
+/// Sum of log odds from which on a detection is confirmed as a person, or as being elsewhere than the track. No single detection
+/// of a tracked person contributes more.
+pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 
 /// Result of comparing a detection with the tracked pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +62,8 @@ pub(super) struct DetectionCheck {
     compares: bool,
     /// Whether the last detection agreed with a start that was given by the user.
     agreed: bool,
+    /// Whether any detection did.
+    confirmed: bool,
     /// Log odds that the person is elsewhere, and that the tracked object is not a person.
     elsewhere: f64,
     false_track: f64,
@@ -86,6 +90,11 @@ impl DetectionCheck {
     /// Whether the track was started less than a second ago.
     pub(super) fn is_new(&self, stamp: f64) -> bool {
         self.since.is_none_or(|since| stamp - since < NEW_TRACK_AGE)
+    }
+
+    /// Whether a detection or a second of tracking confirmed the track.
+    pub(super) fn is_confirmed(&self, stamp: f64) -> bool {
+        self.auto_initialized || self.confirmed || !self.is_new(stamp)
     }
 
     /// Whether the detection of this frame is compared with the pose. For a new track only some detections are, because a
@@ -117,24 +126,20 @@ impl DetectionCheck {
         due
     }
 
-    /// Compares a detection with the pose, world frame: by the trunk, and for a new track (`new_track`) or one `among` several
-    /// also by legs and arms.
+    /// Compares a detection with the pose, world frame: by the trunk, and for a new track (`new_track`) also by legs and arms.
     pub(super) fn compare(
         &mut self,
         detected: Detected,
         body: &Body,
         world_from_limb: &[Pose],
         new_track: bool,
-        among: bool,
     ) -> DetectionVerdict {
-        let sigmas = if among { 0.0 } else { SIGMAS };
         let elsewhere = |joints: &[usize], least: f64| {
             let [apart, spread] = joint_distance(detected, body, world_from_limb, joints);
-            apart > least && apart > sigmas * spread
+            apart > least && apart > SIGMAS * spread
         };
-        let limbs = new_track || among;
         let Detected { detection, map } = detected;
-        let limbs_are = limbs && (elsewhere(map.legs(), ELSEWHERE) || elsewhere(map.arms(), APART));
+        let limbs_are = new_track && (elsewhere(map.legs(), ELSEWHERE) || elsewhere(map.arms(), APART));
         if elsewhere(map.trunk(), ELSEWHERE) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
             self.agreed = false;
@@ -145,7 +150,8 @@ impl DetectionCheck {
             };
         }
         self.elsewhere = 0.0;
-        self.agreed = !self.auto_initialized && !among;
+        self.agreed = !self.auto_initialized;
+        self.confirmed = true;
         DetectionVerdict::Consistent
     }
 

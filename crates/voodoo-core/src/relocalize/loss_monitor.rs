@@ -2,7 +2,6 @@
 
 use super::PATIENCE;
 use super::detection_check::NEW_TRACK_AGE;
-use super::occlusion::Occlusion;
 
 /// Outcome of a frame for the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +23,6 @@ pub(super) struct LossMonitor {
     lost: usize,
     /// Stamp until which a recovered body is monitored, seconds.
     until: Option<f64>,
-    /// What occludes the body.
-    pub(super) occlusion: Occlusion,
 }
 
 impl LossMonitor {

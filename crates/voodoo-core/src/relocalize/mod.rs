@@ -5,10 +5,8 @@
 
 mod detection_check;
 mod loss_monitor;
-mod occlusion;
 mod person_detector;
 mod segment_search;
-mod tentative_detection;
 mod trials;
 
 use crate::association::correspondence::Correspondences;
@@ -17,18 +15,16 @@ use crate::detect::{Detect, DetectError, Detected, DetectionQuery, JointMap, fit
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
-use crate::observation::depth_view::DepthViews;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 pub(crate) use detection_check::DetectionVerdict;
+pub(crate) use detection_check::ENOUGH_ODDS;
 use detection_check::{DetectionCheck, SIGMAS};
 pub(crate) use loss_monitor::FrameOutcome;
 use loss_monitor::LossMonitor;
 use person_detector::PersonDetector;
 use segment_search::SegmentSearch;
-use tentative_detection::TentativeDetection;
-pub(crate) use tentative_detection::{DETECTION_COST, ENOUGH_ODDS, SAME_PERSON};
 use trials::Trials;
 
 /// Number of consecutive frames after which a visible body counts as visible and a lost one as lost.
@@ -44,7 +40,6 @@ pub(crate) struct Relocalizer {
     search: SegmentSearch,
     people: PersonDetector,
     check: DetectionCheck,
-    tentative: TentativeDetection,
 }
 
 impl Relocalizer {
@@ -77,7 +72,6 @@ impl Relocalizer {
     pub(crate) fn restart(&mut self, model: &Model, poses: &[Pose]) {
         self.loss.restart();
         self.check.restart();
-        self.tentative = TentativeDetection::default();
         self.people.bind(&model.body);
         self.people.keep_floor(false);
         self.search.remember(poses);
@@ -91,17 +85,6 @@ impl Relocalizer {
     /// Returns a body and its poses, world frame, for a detection: in the detected sizes, or with `known` in those of the model.
     pub(crate) fn place_body(&self, model: &Model, detected: Detected, known: bool) -> Option<(Body, Vec<Pose>)> {
         if known { Some((model.body.clone(), fit_pose(&model.body, detected)?)) } else { fit_body(model, detected) }
-    }
-
-    /// Returns body and poses of the person with the highest log odds in a frame, once detections at one position confirm them.
-    pub(crate) fn first_person(&mut self, frame: &Frame, model: &Model) -> Option<(Body, Vec<Pose>)> {
-        self.people.detect(&model.body, frame, None, DetectionQuery::Any);
-        let place = self.people.place()?;
-        if !self.tentative.observe(Some(place)) {
-            return None;
-        }
-        self.tentative = TentativeDetection::default();
-        fit_body(model, self.people.detection()?)
     }
 
     /// Records how the track was started: `auto_initialized` by the detector, or by the user.
@@ -119,6 +102,11 @@ impl Relocalizer {
     /// Whether the track was auto-initialized by the detector.
     pub(crate) fn is_auto_initialized(&self) -> bool {
         self.check.is_auto_initialized()
+    }
+
+    /// Whether a detection or a second of tracking confirmed the track.
+    pub(crate) fn is_confirmed(&self, stamp: f64) -> bool {
+        self.check.is_confirmed(stamp)
     }
 
     /// Whether the track was started less than a second ago.
@@ -146,43 +134,25 @@ impl Relocalizer {
         self.loss.interrupt(stamp);
     }
 
-    /// Runs the detector on a frame where that is due. `root` is the expected position of the body, world frame. `limb_suspect`:
-    /// in the frame before, a limb was not supported in its pose; `pose_uncertain`: it was uncertain whether one was; `lost`: the
-    /// body was lost.
+    /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
+    /// `limb_suspect`: in the frame before, a limb was not supported in its pose; `pose_uncertain`: it was uncertain whether one
+    /// was; `anywhere`: the body may be anywhere.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn detect(
-        &mut self,
-        body: &Body,
-        frame: &Frame,
-        root: Vec3,
-        limb_suspect: bool,
-        pose_uncertain: bool,
-        lost: bool,
-    ) {
-        // A body that was just found may face the other way, so it is monitored closely.
-        let often = lost || self.loss.recently_recovered();
-        if self.check.is_due(frame.stamp, limb_suspect, pose_uncertain, often) && self.people.detects() {
-            let query = if lost { DetectionQuery::Any } else { DetectionQuery::Near(root) };
-            self.people.detect(body, frame, None, query);
-            // A detection in front of a hidden body is another person.
-            self.people.discard(|place| self.loss.occlusion.is_occluder(frame, place));
-        } else {
-            self.people.forget();
-        }
-    }
-
-    /// Runs the detector for one of several persons where that is due. Good tracks are checked, too; lost persons are not
-    /// searched for here.
-    pub(crate) fn detect_owned(
         &mut self,
         body: &Body,
         frame: &Frame,
         ownership: OwnershipMask,
         root: Vec3,
-        lost: bool,
+        limb_suspect: bool,
+        pose_uncertain: bool,
+        anywhere: bool,
     ) {
-        if self.check.is_due(frame.stamp, true, false, false) && !lost && self.people.detects() {
-            self.people.detect(body, frame, Some(ownership), DetectionQuery::Near(root));
-            self.people.discard(|place| place.distance(root) > SAME_PERSON);
+        // A body that was just found may face the other way, so it is monitored closely.
+        let often = anywhere || self.loss.recently_recovered();
+        if self.check.is_due(frame.stamp, limb_suspect, pose_uncertain, often) && self.people.detects() {
+            let query = if anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
+            self.people.detect(body, frame, ownership, query);
         } else {
             self.people.forget();
         }
@@ -203,38 +173,17 @@ impl Relocalizer {
         self.people.own_pixels()
     }
 
-    /// Updates the occlusion state with a frame and the positions of the body's joints, the root's first, world frame. An object
-    /// that hides the body is treated as another person.
-    pub(crate) fn observe_occlusion(
-        &mut self,
-        views: DepthViews,
-        joints: impl Iterator<Item = Vec3>,
-        tracked: bool,
-        lost: bool,
-    ) {
-        self.loss.occlusion.observe(views, joints, tracked, !lost);
-    }
-
-    /// Compares the detection of this frame with a body at these poses, world frame. For a new track (`new_track`) and for one
-    /// `among` several persons, arms and legs are compared, too.
+    /// Compares the detection of this frame with a body at these poses, world frame. For a new track (`new_track`), arms and legs
+    /// are compared, too.
     pub(crate) fn compare(
         &mut self,
         body: &Body,
         world_from_limb: &[Pose],
-        lost: bool,
         new_track: bool,
-        among: bool,
     ) -> Option<DetectionVerdict> {
-        let detected = self.people.detection().filter(|_| lost || self.check.compares())?;
-        // A lost body is elsewhere once a detection is confirmed.
-        Some(match lost {
-            true if self.tentative.observe(self.people.place()) => DetectionVerdict::Elsewhere,
-            true => DetectionVerdict::Inconsistent,
-            false => {
-                let new_track = new_track || self.loss.recently_recovered();
-                self.check.compare(detected, body, world_from_limb, new_track, among)
-            }
-        })
+        let detected = self.people.detection().filter(|_| self.check.compares())?;
+        let new_track = new_track || self.loss.recently_recovered();
+        Some(self.check.compare(detected, body, world_from_limb, new_track))
     }
 
     /// Whether the person is gone, by the frames up to this one: the body has been `lost` for long, or the track is not a person.
@@ -263,7 +212,6 @@ impl Relocalizer {
         let bounds = Aabb::new(there.mins.min(here.mins), there.maxs.max(here.maxs));
         // The detection is tried now, so another trial needs new evidence.
         self.check.reset_elsewhere();
-        self.tentative = TentativeDetection::default();
         fit.swap_matches(&mut self.matched);
         self.candidates.gather(
             context.observation.frame(),
@@ -307,9 +255,7 @@ impl Relocalizer {
         let mut index = 0;
         while let Some(segment) = self.search.segment(index).filter(|_| !found) {
             index += 1;
-            // A segment in front of a hidden body is another body.
-            let other = self.loss.occlusion.is_occluder(frame, segment.center + origin);
-            if other || !self.search.is_body_sized(&context.model.body, segment) {
+            if !self.search.is_body_sized(&context.model.body, segment) {
                 continue;
             }
             let margin = Vec3::splat(context.config.body_box_margin);

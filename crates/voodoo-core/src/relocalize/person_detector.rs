@@ -6,7 +6,6 @@ use crate::body::Body;
 use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings,
 };
-use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
@@ -60,11 +59,6 @@ impl PersonDetector {
         self.detection.as_ref().map(|detection| Detected { detection: &detection.detection, map: self.detector.map() })
     }
 
-    /// Returns the root position of the detection of this frame, and the log odds that it is a person.
-    pub(super) fn place(&self) -> Option<(Vec3, f64)> {
-        self.detection.as_ref().map(|detection| (detection.root, detection.detection.person))
-    }
-
     /// Stores the floor under the detection if the track was `found` by the detector; clears it otherwise.
     pub(super) fn keep_floor(&mut self, found: bool) {
         self.floor = self.detection().filter(|_| found).and_then(floor_under);
@@ -86,24 +80,12 @@ impl PersonDetector {
         (self.detection, self.person_odds) = (None, None);
     }
 
-    /// Drops the detection if `not_there` holds for its root position, world frame.
-    pub(super) fn discard(&mut self, not_there: impl Fn(Vec3) -> bool) {
-        self.detection = self.detection.take().filter(|detection| !not_there(detection.root));
-    }
-
-    /// Runs the detector on all depth images of a frame, or on the owned pixels of each; keeps the detection with the highest log
+    /// Runs the detector on the owned pixels of all depth images of a frame; keeps the detection with the highest log
     /// odds.
-    pub(super) fn detect(
-        &mut self,
-        body: &Body,
-        frame: &Frame,
-        ownership: Option<OwnershipMask>,
-        query: DetectionQuery,
-    ) {
+    pub(super) fn detect(&mut self, body: &Body, frame: &Frame, ownership: OwnershipMask, query: DetectionQuery) {
         self.forget();
         for (number, image) in frame.images.iter().enumerate() {
-            let (owners, own) =
-                ownership.map_or((&[][..], None), |ownership| (ownership.owners(number), Some(ownership.own)));
+            let (owners, own) = (ownership.owners(number), Some(ownership.own));
             let around =
                 Surroundings { ground: frame.ground, excluded: frame.excluded, owners, own, ..Surroundings::default() };
             for found in self.detector.detect(body, image, &around, query) {

@@ -1,13 +1,13 @@
 //! Changes of the body between frames that keep the track (K06 IV: "changes in the model itself").
 
-use super::Tracker;
+use super::BodyTracker;
 use crate::body::Joint;
 use crate::error::{BodyError, TrackError};
 use crate::math::Vec3;
 use crate::observation::picture::ColorPixels;
 use crate::shape::TaperedEllipticCylinder;
 
-impl Tracker {
+impl BodyTracker {
     /// Scales the whole body about its root.
     pub fn scale(&mut self, factor: f64) -> Result<(), BodyError> {
         self.model.scale(factor)?;

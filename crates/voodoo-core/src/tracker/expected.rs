@@ -1,6 +1,6 @@
 //! Extrapolation of the body from the last two estimates to other times.
 
-use super::Tracker;
+use super::BodyTracker;
 use super::estimate::Estimate;
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
@@ -29,10 +29,10 @@ impl Before {
 ///
 /// ```
 /// use voodoo_core::math::{Pose, Vec3};
-/// use voodoo_core::{Body, Config, Frame, HumanModel, Tracker};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, BodyTracker};
 ///
 /// let body = Body::human(1.75, HumanModel::Measured)?;
-/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
+/// let mut tracker = BodyTracker::new(body.clone(), Config::default())?;
 /// tracker.reset_pose(&body.rest_pose(Pose::IDENTITY))?;
 /// assert!(tracker.limb_motion().is_none()); // before two frames
 /// for stamp in [0.0, 0.1] {
@@ -53,7 +53,7 @@ pub struct LimbMotion<'a> {
     pub interval: f64,
 }
 
-impl Tracker {
+impl BodyTracker {
     /// Returns the motion of the limbs between the last two estimates; `None` where these are unrelated, as after a reset.
     pub fn limb_motion(&self) -> Option<LimbMotion<'_>> {
         let (before, now) = (&self.before, &self.estimate);
@@ -93,9 +93,9 @@ mod tests {
     use crate::{Body, Config};
 
     /// Returns a tracker whose body moved by `shift` within a tenth of a second.
-    fn moved(shift: Vec3) -> Tracker {
+    fn moved(shift: Vec3) -> BodyTracker {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
-        let mut tracker = Tracker::new(body.clone(), Config { prediction: 0.5, ..Config::default() }).unwrap();
+        let mut tracker = BodyTracker::new(body.clone(), Config { prediction: 0.5, ..Config::default() }).unwrap();
         assert!(matches!(tracker.expected_sites(0.0), Err(TrackError::NotInitialized)));
         tracker.reset_pose(&body.rest_pose(Pose::IDENTITY)).unwrap();
         tracker.before.keep(&tracker.estimate);

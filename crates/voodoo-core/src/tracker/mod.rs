@@ -1,4 +1,4 @@
-//! The tracker of one body. [`Tracker::step`] documents the method.
+//! The tracker of one body. [`BodyTracker::step`] documents the method.
 
 mod assess;
 mod edits;
@@ -16,7 +16,7 @@ use crate::hypotheses::Hypotheses;
 use crate::math::{Pose, Vec3, is_rigid, shifted};
 use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
-use crate::observation::observer::{Expectation, Observer};
+use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
 use crate::relocalize::{DetectionVerdict, FrameOutcome, Relocalizer};
 use crate::sizes::{Reliance, Sizes, Start};
@@ -32,13 +32,13 @@ const INTERRUPTION: f64 = 0.5;
 ///
 /// ```
 /// use voodoo_core::math::{Pose, Vec3};
-/// use voodoo_core::{Body, Config, Frame, HumanModel, PositionRelation, Tracker};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, PositionRelation, BodyTracker};
 ///
 /// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let standing = body.rest_pose(Pose::IDENTITY);
 /// let site = body.site_index("l_wrist")?;
 /// let marker = body.site_position(&standing, site) + Vec3::X * 0.02;
-/// let mut tracker = Tracker::new(body, Config::default())?;
+/// let mut tracker = BodyTracker::new(body, Config::default())?;
 /// tracker.reset_pose(&standing)?;
 /// for stamp in [0.00, 0.03, 0.06] {
 ///     let wrist = PositionRelation { site, position: marker, weight: 20.0, bias: 0.0, source: 0 };
@@ -48,7 +48,7 @@ const INTERRUPTION: f64 = 0.5;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct Tracker {
+pub struct BodyTracker {
     config: Config,
     model: Model,
     motion: Motion,
@@ -60,10 +60,12 @@ pub struct Tracker {
     assessor: Assessor,
     estimate: Estimate,
     before: Before,
+    /// Index of the image and pixels of the detection to which the body was moved in this frame.
+    moved_to: Option<(usize, Vec<usize>)>,
 }
 
-impl Tracker {
-    /// Returns a tracker of `body`. It has no pose until [`Tracker::reset`].
+impl BodyTracker {
+    /// Returns a tracker of `body`. It has no pose until [`BodyTracker::reset`].
     pub fn new(body: Body, config: Config) -> Result<Self, TrackError> {
         Ok(Self {
             model: Model::new(body),
@@ -76,16 +78,9 @@ impl Tracker {
             assessor: Assessor::default(),
             estimate: Estimate::default(),
             before: Before::default(),
+            moved_to: None,
             config,
         })
-    }
-
-    /// Returns the tracker with a detector. The detector initializes the body without a pose, finds it again when it is lost, and
-    /// detects when the body is elsewhere than its track. Without a detector, a lost body is searched for in every foreground
-    /// segment of its size.
-    pub fn with_detector(mut self, detector: Box<dyn Detect>) -> Self {
-        self.set_detector(Some(detector));
-        self
     }
 
     /// Replaces the detector, or removes it.
@@ -139,31 +134,29 @@ impl Tracker {
         self.report(f64::NAN, 0, None);
     }
 
-    /// Updates the pose with the next frame (K06 IV-B). On error the tracker is unchanged.
-    pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
-        self.check(frame)?;
-        self.before.keep(&self.estimate);
+    /// Updates the pose with the pixels and points of a frame, which the caller has checked, that show this body or nobody (K06
+    /// IV-B). A body without a pose stays without.
+    pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
         self.relocalizer.clear_error();
-        // Where the ground plane is not given, the one that the detector found under the body is used.
-        let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
+        self.moved_to = None;
         if self.is_started() {
-            self.verify_start(frame);
-            self.follow(frame, None)
-        } else {
-            self.search(frame)
+            self.before.keep(&self.estimate);
+            // Where the ground plane is not given, the one that the detector found under the body is used.
+            let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
+            self.verify_start(frame, ownership);
+            self.follow(frame, ownership);
         }
-        Ok(&self.estimate)
     }
 
     /// Verifies a given start in the first frame after a reset. If the detector reports the person elsewhere or facing the other
     /// way, and the frame confirms it, the start was wrong and the track restarts at the detection.
-    fn verify_start(&mut self, frame: &Frame) {
+    fn verify_start(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
             return;
         }
-        relocalizer.detect(&model.body, frame, motion.poses[0].translation, false, false, false);
-        if relocalizer.compare(&model.body, &motion.poses, false, false, false) == Some(DetectionVerdict::Elsewhere) {
+        relocalizer.detect(&model.body, frame, ownership, motion.poses[0].translation, false, false, false);
+        if relocalizer.compare(&model.body, &motion.poses, false) == Some(DetectionVerdict::Elsewhere) {
             observer.find_segmented(frame);
             let observation = observer.observation(frame, motion.origin);
             let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
@@ -180,6 +173,7 @@ impl Tracker {
     /// Restarts the track at the current detection, in the sizes that were set or, where they clearly differ, in the detected
     /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
+        self.note_move();
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
         let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
         let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.is_auto_initialized());
@@ -199,22 +193,6 @@ impl Tracker {
         }
     }
 
-    /// Searches for a person and tracks the one that is found.
-    fn search(&mut self, frame: &Frame) {
-        if let Some((body, poses)) = self.relocalizer.first_person(frame, &self.model) {
-            self.restart(body, poses, true);
-            self.assessor.distrust_pose();
-            self.relocalizer.record_start(true);
-            self.sizes.restart(&self.model, Start::Detected, &self.config);
-            self.update_sizes();
-            self.follow(frame, None);
-            if !matches!(self.estimate.status, Status::Lost | Status::Searching) {
-                return;
-            }
-        }
-        self.stop(frame.stamp);
-    }
-
     /// Starts the track at a detection, in the detected sizes or, with `known`, in the sizes that the body has. Returns whether
     /// the person is there.
     pub(crate) fn start_at_detection(
@@ -224,8 +202,6 @@ impl Tracker {
         detected: Detected,
         known: bool,
     ) -> bool {
-        // With several persons, color pictures only serve to identify them. No tracker is fitted to colors.
-        let frame = &Frame { colors: &[], ..*frame };
         let Some((body, poses)) = self.relocalizer.place_body(&self.model, detected, known) else { return false };
         self.restart(body, poses, !known);
         self.before.keep(&self.estimate);
@@ -233,19 +209,19 @@ impl Tracker {
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
         }
-        self.follow(frame, Some(ownership));
+        self.follow(frame, ownership);
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
     /// Removes the pose: no person is there. From the next frame on the tracker searches for one.
-    fn stop(&mut self, stamp: f64) {
+    pub(crate) fn stop(&mut self, stamp: f64) {
         self.motion.poses.clear();
         self.motion.stamp = Some(stamp);
         self.estimate = Estimate { stamp, ..Estimate::default() };
     }
 
-    /// Updates the pose with the next frame (K06 IV-B): with the whole frame, or with the part given by `ownership`.
-    fn follow(&mut self, frame: &Frame, ownership: Option<OwnershipMask>) {
+    /// Updates the pose with the part of a frame that is given by `ownership`.
+    fn follow(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
@@ -256,14 +232,8 @@ impl Tracker {
         }
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
-        let searched = relocalizer.frames_searched().filter(|_| config.relocalization);
         let Motion { poses, previous, predicted, origin, .. } = motion;
-        let own = relocalizer.own_pixels();
-        let expected = Expectation { body: &model.body, poses, origin: *origin, first: !known, searched, own };
-        match ownership {
-            None => observer.observe(frame, expected, config),
-            Some(ownership) => observer.observe_owned(frame, expected, ownership, config),
-        }
+        observer.observe(frame, &body_box(&model.body, poses, config.body_box_margin), *origin, ownership, config);
         let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale };
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
@@ -281,12 +251,11 @@ impl Tracker {
             let lost = assessor.status() == Status::Lost;
             let (root, limb_suspect) =
                 (poses[0].translation + *origin, assessor.has_suspect_limb() || sizes.is_uncertain());
-            match ownership {
-                None => {
-                    let (uncertain, anywhere) = (assessor.is_uncertain(), lost || interrupted);
-                    relocalizer.detect(&model.body, frame, root, limb_suspect, uncertain, anywhere);
-                }
-                Some(ownership) => relocalizer.detect_owned(&model.body, frame, ownership, root, lost),
+            if lost {
+                relocalizer.forget();
+            } else {
+                let uncertain = assessor.is_uncertain();
+                relocalizer.detect(&model.body, frame, ownership, root, limb_suspect, uncertain, interrupted);
             }
         }
         if config.hypotheses && schedule.whole_body && known {
@@ -304,7 +273,7 @@ impl Tracker {
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
         let relocalizes = self.config.relocalization && schedule.whole_body;
-        if relocalizes && self.relocalize(frame, known, ownership.is_some()) {
+        if relocalizes && self.relocalize(frame, known) {
             return self.follow(frame, ownership);
         }
         self.remember();
@@ -315,18 +284,13 @@ impl Tracker {
         }
     }
 
-    /// Updates the pose with the owned part of a frame, which the caller has checked.
-    pub(crate) fn step_owned(&mut self, frame: &Frame, ownership: OwnershipMask) -> &Estimate {
-        self.relocalizer.clear_error();
-        if self.is_started() {
-            self.before.keep(&self.estimate);
-            self.follow(&Frame { colors: &[], ..*frame }, Some(ownership));
-        }
-        &self.estimate
+    /// Whether a detection or a second of tracking confirmed the track.
+    pub(crate) fn is_confirmed(&self, stamp: f64) -> bool {
+        self.relocalizer.is_confirmed(stamp)
     }
 
     /// Checks the frame and the state of the tracker before anything changes.
-    fn check(&self, frame: &Frame) -> Result<(), TrackError> {
+    pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         if !self.is_started() && !self.can_search() {
             return Err(TrackError::NotInitialized);
         }
@@ -336,29 +300,21 @@ impl Tracker {
 
     /// Moves the body to where a detector has reported it often enough. A new track restarts there instead, in this frame: the
     /// result says whether it does.
-    fn relocalize(&mut self, frame: &Frame, known: bool, among: bool) -> bool {
-        let lost = self.assessor.status() == Status::Lost;
-        if !among {
-            let joints = self.motion.world_from_limb().map(|limb| limb.translation);
-            let views = self.observer.observation(frame, self.motion.origin).views;
-            self.relocalizer.observe_occlusion(views, joints, self.assessor.status() == Status::Tracking, lost);
-        }
+    fn relocalize(&mut self, frame: &Frame, known: bool) -> bool {
         if known && self.relocalizer.detected().is_some() {
             let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
             let new_track = self.relocalizer.is_new(frame.stamp);
-            match self.relocalizer.compare(&self.model.body, &world_from_limb, lost, new_track, among) {
+            match self.relocalizer.compare(&self.model.body, &world_from_limb, new_track) {
                 Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame) => {
                     // Sizes and scene were learned at the wrong position, so a new track restarts.
-                    return !among && new_track && self.restart_at_detection();
+                    return new_track && self.restart_at_detection();
                 }
-                Some(DetectionVerdict::Consistent) if !among => self.update_sizes(),
+                Some(DetectionVerdict::Consistent) => self.update_sizes(),
                 _ => {}
             }
         }
-        if !among {
-            self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
-            self.search_everywhere(frame);
-        }
+        self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
+        self.search_everywhere(frame);
         false
     }
 
@@ -383,10 +339,23 @@ impl Tracker {
         let place = relocalizer.try_detected(setting.with_model(model), fit, &motion.poses, lost);
         let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
         let moved = better && self.move_to_predicted(frame);
-        if !moved {
+        if moved {
+            self.note_move();
+        } else {
             self.observer.restore(frame, self.relocalizer.own_pixels(), &learned);
         }
         moved
+    }
+
+    /// Notes that the body has moved to the detection of this frame.
+    fn note_move(&mut self) {
+        let Own { image, pixels } = self.relocalizer.own_pixels();
+        self.moved_to = Some((image, pixels.to_vec()));
+    }
+
+    /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
+    pub(crate) fn moved_to(&self) -> Option<(usize, &[usize])> {
+        self.moved_to.as_ref().map(|(image, pixels)| (*image, pixels.as_slice()))
     }
 
     /// Swaps the pose with the predicted one, and keeps it if the body is not lost there. Returns whether it was kept.

@@ -1,6 +1,6 @@
 //! Queries of a tracker between frames: body, configuration, last estimate, distances of points from the posed body.
 
-use super::Tracker;
+use super::BodyTracker;
 use super::estimate::Estimate;
 use crate::body::Body;
 use crate::config::Config;
@@ -26,7 +26,7 @@ fn passes_by(shape: &TaperedEllipticCylinder, [from, to]: [Vec3; 2]) -> bool {
     high.z <= 0.0 || low.z >= shape.length() || low.x >= wide || high.x <= -wide || low.y >= deep || high.y <= -deep
 }
 
-impl Tracker {
+impl BodyTracker {
     /// Returns the lines along which the last step searched for color edges in a camera's picture.
     pub fn region_lines(&self, camera: u16) -> impl Iterator<Item = RegionLine> + '_ {
         self.fit.regions().lines(camera)

@@ -14,10 +14,10 @@ use crate::skin::naming::{Choice, Rules};
 use crate::skin::picture::Picture;
 use crate::skin::rules::{Expected, LimbDistances, SightContext, of_pieces};
 use crate::skin::teacher::Teacher;
+use voodoo_core::BodyTracker;
 use voodoo_core::PointSlice;
 use voodoo_core::Side;
 use voodoo_core::TrackError;
-use voodoo_core::Tracker;
 use voodoo_core::math::Vec3;
 
 /// Regions no longer than this, in palm radii, may be parts of one hand, so that a shadow between fingers and palm does not split
@@ -85,9 +85,9 @@ pub struct SkinInput<'a> {
     /// The sites that are searched for.
     pub expected: &'a [Expected],
     /// The tracked body in its last pose; `None` if it is not known.
-    pub tracker: Option<&'a Tracker>,
+    pub tracker: Option<&'a BodyTracker>,
     /// Other persons; a region nearer to them than to the body belongs to them.
-    pub others: &'a [&'a Tracker],
+    pub others: &'a [&'a BodyTracker],
 }
 
 impl SkinInput<'_> {

@@ -1,0 +1,135 @@
+//! The tracker of one person among whoever is there.
+
+use super::person::Person;
+use super::{People, PeopleOptions};
+use crate::body::Body;
+use crate::config::Config;
+use crate::detect::{Detect, DetectError};
+use crate::error::TrackError;
+use crate::math::{Pose, Vec3};
+use crate::observation::frame::{Frame, Scope};
+use crate::tracker::BodyTracker;
+use crate::tracker::estimate::Estimate;
+use std::ops::{Deref, DerefMut};
+
+/// After the person has been away for this, whoever is there is followed, seconds.
+const AWAY: f64 = 1.0;
+
+/// Tracks one body through a sequence of frames.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, PositionRelation, Tracker};
+///
+/// let body = Body::human(1.75, HumanModel::Measured)?;
+/// let standing = body.rest_pose(Pose::IDENTITY);
+/// let site = body.site_index("l_wrist")?;
+/// let marker = body.site_position(&standing, site) + Vec3::X * 0.02;
+/// let mut tracker = Tracker::new(body, Config::default())?;
+/// tracker.reset_pose(&standing)?;
+/// for stamp in [0.00, 0.03, 0.06] {
+///     let wrist = PositionRelation { site, position: marker, weight: 20.0, bias: 0.0, source: 0 };
+///     tracker.step(&Frame::empty(stamp).with_positions(&[wrist]))?;
+/// }
+/// assert!(tracker.estimate().sites[site].distance(marker) < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// It is a [`People`] of whom one is followed: a tracker with a detector also tracks everybody else in view, so that nobody else's
+/// pixels are taken for the one who is followed. Queries and edits are those of the [`BodyTracker`] of that person.
+#[derive(Debug)]
+pub struct Tracker {
+    /// The first person is the one who is followed.
+    people: People,
+}
+
+impl Tracker {
+    /// Returns a tracker of `body`. It has no pose until [`Tracker::reset`], or until it finds a person.
+    pub fn new(body: Body, config: Config) -> Result<Self, TrackError> {
+        let others = Config { threads: 1, ..config.clone() };
+        let mut people = People::new(body.clone(), others, PeopleOptions::default())?;
+        let mut person = Person::new(1, body, config, None, f64::INFINITY)?;
+        (person.followed, person.last_tracked) = (true, f64::NEG_INFINITY);
+        people.persons.push(person);
+        people.next_id += 1;
+        Ok(Self { people })
+    }
+
+    /// Returns the tracker with a detector. The detector initializes the body without a pose, finds it again when it is lost,
+    /// detects when the body is elsewhere than its track, and finds everybody else. Without a detector, a lost body is searched
+    /// for in every foreground segment of its size.
+    pub fn with_detector(mut self, detector: Box<dyn Detect>) -> Self {
+        self.set_detector(Some(detector.fresh()));
+        self.people = self.people.with_detector(detector);
+        self
+    }
+
+    /// The error of the detector in the last step, if it failed. The step then ran without detections.
+    pub fn detector_error(&self) -> Option<&DetectError> {
+        self.people.detector_error()
+    }
+
+    /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
+    /// are fitted starting from those of the body that was given to the tracker, not from those of an earlier reset. Stamps after
+    /// a reset may start again from any time. On error the tracker is unchanged.
+    pub fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
+        self.followed().tracker.reset(positions, fit_sizes)?;
+        Ok(self.restarted())
+    }
+
+    /// Sets the pose of every limb directly.
+    pub fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
+        self.followed().tracker.reset_pose(world_from_limb)?;
+        Ok(self.restarted())
+    }
+
+    /// Forgets everybody else, and the scene.
+    fn restarted(&mut self) -> &Estimate {
+        self.people.forget_others();
+        let person = self.followed();
+        (person.present, person.stays) = (true, true);
+        (person.created, person.last_tracked) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        person.tracker.estimate()
+    }
+
+    /// Updates the pose with the next frame (K06 IV-B). On error the tracker is unchanged.
+    pub fn step(&mut self, frame: &Frame) -> Result<&Estimate, TrackError> {
+        self.check(frame)?;
+        let id = self.followed().id;
+        // What was measured on the one who is followed says nothing about others.
+        let free = frame.clouds.iter().all(|cloud| cloud.scope == Scope::Free);
+        let clouds = if free { frame.clouds } else { &[] };
+        let shared = Frame { clouds, colors: &[], positions: &[], rays: &[], ..*frame };
+        self.people.advance(&shared, &[(id, *frame)]);
+        let person = self.followed();
+        if !person.present {
+            person.tracker.stop(frame.stamp);
+            if !(frame.stamp - person.last_tracked < AWAY) {
+                (person.created, person.last_tracked) = (f64::INFINITY, f64::NEG_INFINITY);
+                self.people.persons.truncate(1);
+            }
+        }
+        Ok(self.estimate())
+    }
+
+    /// The one who is followed.
+    fn followed(&mut self) -> &mut Person {
+        &mut self.people.persons[0]
+    }
+}
+
+/// Queries of the body that is followed.
+impl Deref for Tracker {
+    type Target = BodyTracker;
+
+    fn deref(&self) -> &BodyTracker {
+        &self.people.persons[0].tracker
+    }
+}
+
+/// Edits of the body that is followed.
+impl DerefMut for Tracker {
+    fn deref_mut(&mut self) -> &mut BodyTracker {
+        &mut self.followed().tracker
+    }
+}
