@@ -8,8 +8,11 @@ use crate::camera::Camera;
 use crate::config::Config;
 use crate::fit::{Context, Setting};
 use crate::math::{Pose, Quat, Vec3};
+use crate::observation::background::Backgrounds;
+use crate::observation::candidates::body_box;
 use crate::observation::frame::{DepthImage, DepthPixels, Frame};
-use crate::observation::observer::{Expectation, Observer, Own};
+use crate::observation::observer::Observer;
+use crate::observation::ownership::OwnershipMask;
 use crate::visibility::render::{Rendering, Viewpoint};
 
 /// The camera, which stands in the world's origin and looks along z.
@@ -70,7 +73,30 @@ pub(crate) fn with_frame<R>(pixels: &[u16], stamp: f64, check: impl FnOnce(&Fram
     check(&Frame { images: &images, ..Frame::empty(stamp) })
 }
 
-/// What a frame of `pixels` is to a part of the tracker that expects the body at `poses`, as in the first frame after a reset.
+/// A mask of a scene in which nobody else is.
+pub(crate) fn everything(scene: &Backgrounds) -> OwnershipMask<'_> {
+    OwnershipMask { owners: &[], cloud_owners: &[], own: 0, scene }
+}
+
+/// The scene of a frame in which the wall is known.
+pub(crate) fn wall(frame: &Frame) -> Backgrounds {
+    let mut scene = Backgrounds::default();
+    learn(&mut scene, frame, |depth| depth == 0.001 * f32::from(WALL));
+    scene
+}
+
+/// Learns the depths of a frame for which `is_scene` holds.
+pub(crate) fn learn(scene: &mut Backgrounds, frame: &Frame, is_scene: impl Fn(f32) -> bool) {
+    scene.register(frame, |_, _| {});
+    for image in frame.images {
+        for (index, depth) in scene.depth_mut(image).unwrap().iter_mut().enumerate() {
+            *depth =
+                Some(image.pixels.get(index) * image.meters_per_unit as f32).filter(|z| is_scene(*z)).unwrap_or(0.0);
+        }
+    }
+}
+
+/// What a frame of `pixels` is to a part of the tracker that expects the body at `poses`, with the wall as the scene.
 pub(crate) fn with_context<R>(
     pixels: &[u16],
     config: &Config,
@@ -91,15 +117,9 @@ pub(crate) fn with_setting<R>(
 ) -> R {
     with_frame(pixels, 0.0, |frame| {
         let mut observer = Observer::default();
-        let expected = Expectation {
-            body: &model.body,
-            poses,
-            origin: Vec3::ZERO,
-            first: true,
-            searched: None,
-            own: Own::default(),
-        };
-        observer.observe(frame, expected, config);
+        let scene = if config.background { wall(frame) } else { Backgrounds::default() };
+        let bounds = body_box(&model.body, poses, config.body_box_margin);
+        observer.observe(frame, &bounds, Vec3::ZERO, everything(&scene), config);
         check(Setting {
             config,
             observation: observer.observation(frame, Vec3::ZERO),

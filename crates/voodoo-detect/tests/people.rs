@@ -59,7 +59,7 @@ fn feed(people: &mut People, pixels: &[u16], frame: usize) -> Vec<(usize, Status
     let images = [CAMERA.image(pixels)];
     let input = Frame::empty(frame as f64 / RATE).with_images(&images);
     people.step(&input, &[]).unwrap();
-    let place = |tracker: &voodoo_core::Tracker| tracker.estimate().world_from_limb[0].translation;
+    let place = |tracker: &voodoo_core::BodyTracker| tracker.estimate().world_from_limb[0].translation;
     people.present().map(|(id, tracker)| (id, tracker.estimate().status, place(tracker))).collect()
 }
 

@@ -111,6 +111,7 @@ mod tests {
     use crate::camera::{Camera, Lens};
     use crate::math::Quat;
     use crate::observation::frame::DepthPixels;
+    use crate::testing::learn;
 
     const SIZE: (usize, usize) = (64, 48);
 
@@ -158,7 +159,7 @@ mod tests {
         let mut backgrounds = Backgrounds::default();
         let first = view_from(camera, &pose(0.0, 0.0));
         let images = [image(&first, camera, pose(0.0, 0.0))];
-        backgrounds.start(&Frame { images: &images, ..Frame::empty(0.0) }, |_, _| {});
+        learn(&mut backgrounds, &Frame { images: &images, ..Frame::empty(0.0) }, |_| true);
         let mut known = 0;
         for step in 1..=80 {
             // A sixth of a pixel per move: with rounding to pixels, everything would stay where it was in the image.
@@ -192,7 +193,7 @@ mod tests {
             let frame = Frame { images: &frame, ..Frame::empty(0.0) };
             backgrounds.register(&frame, |_, _| {});
             if now == pose(0.0, 0.0) {
-                backgrounds.start(&frame, |_, _| {});
+                learn(&mut backgrounds, &frame, |_| true);
             }
             backgrounds
                 .of_image(&frame.images[0])

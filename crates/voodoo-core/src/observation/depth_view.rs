@@ -238,7 +238,7 @@ mod tests {
         let scene = vec![3.0_f32; 12 * 10];
         let mut backgrounds = Backgrounds::default();
         let learned = image(&scene, 12, 10.0);
-        backgrounds.start(&Frame { images: &[learned], ..Frame::empty(0.0) }, |_, _| {});
+        crate::testing::learn(&mut backgrounds, &Frame { images: &[learned], ..Frame::empty(0.0) }, |_| true);
         let mut pixels = scene.clone();
         pixels[55] = 2.0;
         let images = [image(&pixels, 12, 10.0)];

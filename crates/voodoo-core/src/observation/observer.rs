@@ -132,94 +132,26 @@ impl Observer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::Model;
-    use crate::testing::{before_wall, moved, put_board, standing, with_frame};
-
-    /// A lamp beside the head: inside the body's box, but farther from the body than the pose error allows.
-    const LAMP: Vec3 = Vec3::new(0.34, -0.76, 2.6);
-    const LAMP_SIZE: f64 = 0.06;
-
-    fn with_lamp(model: &Model, poses: &[Pose]) -> Vec<u16> {
-        let mut pixels = before_wall(&model.body, poses);
-        put_board(&mut pixels, LAMP, [LAMP_SIZE; 2]);
-        pixels
-    }
-
-    /// Observes a frame; returns the number of candidates on the lamp, and of those elsewhere.
-    fn feed(
-        observer: &mut Observer,
-        pixels: &[u16],
-        model: &Model,
-        poses: &[Pose],
-        known: (bool, Option<usize>),
-    ) -> [usize; 2] {
-        let expected = Expectation {
-            body: &model.body,
-            poses,
-            origin: Vec3::ZERO,
-            first: known.0,
-            searched: known.1,
-            own: Own::default(),
-        };
-        with_frame(pixels, 0.0, |frame| observer.observe(frame, expected, &Config::default()));
-        let points = &observer.candidates().points;
-        let lamp = (0..points.len()).filter(|index| points.get(*index).distance(LAMP) < 1.6 * LAMP_SIZE).count();
-        [lamp, points.len() - lamp]
-    }
-
-    const FIRST: (bool, Option<usize>) = (true, None);
-    const LATER: (bool, Option<usize>) = (false, None);
-
-    #[test]
-    fn what_is_not_near_the_body_in_the_first_frame_is_left_out_of_the_candidates() {
-        let (model, poses) = standing();
-        let (lamp, alone) = (with_lamp(&model, &poses), before_wall(&model.body, &poses));
-        let mut observer = Observer::default();
-        for known in [FIRST, LATER, LATER] {
-            let [on_lamp, others] = feed(&mut observer, &lamp, &model, &poses, known);
-            assert_eq!(on_lamp, 0);
-            assert!(others > 1000, "{others} points of the body");
-        }
-        // A lamp that appears later may be a hand.
-        let mut observer = Observer::default();
-        feed(&mut observer, &alone, &model, &poses, FIRST);
-        assert!(feed(&mut observer, &lamp, &model, &poses, LATER)[0] > 20);
-    }
-
-    #[test]
-    fn a_pose_set_a_little_off_makes_no_background_of_the_body() {
-        let (model, poses) = standing();
-        let pixels = before_wall(&model.body, &poses);
-        let all = feed(&mut Observer::default(), &pixels, &model, &poses, FIRST)[1];
-        let left = |off: f64| feed(&mut Observer::default(), &pixels, &model, &moved(&poses, off * Vec3::X), FIRST)[1];
-        assert_eq!(left(0.10), all);
-        assert!(2 * left(0.40) < all, "who is set elsewhere is taken for the scene");
-    }
-
-    #[test]
-    fn a_body_that_stands_still_becomes_no_background_whether_it_is_tracked_or_searched() {
-        let (model, poses) = standing();
-        let pixels = before_wall(&model.body, &poses);
-        let (mut tracked, mut searched) = (Observer::default(), Observer::default());
-        let all = feed(&mut tracked, &pixels, &model, &poses, FIRST);
-        feed(&mut searched, &pixels, &model, &poses, FIRST);
-        for frame in 0..20 {
-            assert_eq!(feed(&mut tracked, &pixels, &model, &poses, LATER), all, "tracked, frame {frame}");
-            assert_eq!(feed(&mut searched, &pixels, &model, &poses, (false, Some(frame))), all, "searched {frame}");
-        }
-    }
+    use crate::testing::{before_wall, everything, standing, wall, with_frame};
 
     #[test]
     fn a_camera_that_was_there_and_gives_no_image_is_silent_until_everything_is_forgotten() {
         let (model, poses) = standing();
-        let pixels = with_lamp(&model, &poses);
+        let pixels = before_wall(&model.body, &poses);
+        let bounds = Aabb::from_points(poses.iter().map(|pose| pose.translation));
         let mut observer = Observer::default();
         let nothing = Frame::empty(1.0);
         assert!(!observer.silent(&nothing), "nobody knows of a camera");
-        feed(&mut observer, &pixels, &model, &poses, FIRST);
+        let observe = |observer: &mut Observer| {
+            with_frame(&pixels, 0.0, |frame| {
+                observer.observe(frame, &bounds, Vec3::ZERO, everything(&wall(frame)), &Config::default());
+            });
+        };
+        observe(&mut observer);
+        let none = Backgrounds::default();
+        observer.observe(&nothing, &bounds, Vec3::ZERO, everything(&none), &Config::default());
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
         assert!(!observer.silent(&nothing) && observer.candidates().is_empty());
-        assert!(feed(&mut observer, &pixels, &model, &poses, LATER)[0] > 20, "the lamp was forgotten");
     }
 }

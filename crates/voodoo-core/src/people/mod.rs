@@ -15,7 +15,9 @@ mod tentative_tracks;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::{BoundDetector, Detect, DetectError, Detected, DetectionQuery, Surroundings, fit_body};
+use crate::detect::{
+    BoundDetector, Detect, DetectError, Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body,
+};
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::background::Background;
@@ -391,7 +393,8 @@ impl People {
         let known = person.created < frame.stamp;
         let ownership = self.assignment.ownership(number, self.scene.known());
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
-        let came = person.tracker.start_at_detection(&Frame { colors: &[], ..*frame }, ownership, detected, known);
+        let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
+        let came = person.tracker.start_at_detection(&Frame { colors: &[], ..*frame }, ownership, placed, known);
         if came {
             person.present = true;
             person.created = person.created.min(frame.stamp);

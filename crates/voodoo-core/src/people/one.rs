@@ -133,3 +133,51 @@ impl DerefMut for Tracker {
         &mut self.followed().tracker
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::Model;
+    use crate::testing::{before_wall, moved, put_board, standing, with_frame};
+
+    /// A lamp beside the head: inside the body's box, but farther from the body than its pixels are.
+    const LAMP: Vec3 = Vec3::new(0.34, -0.76, 2.6);
+
+    fn with_lamp(model: &Model, poses: &[Pose]) -> Vec<u16> {
+        let mut pixels = before_wall(&model.body, poses);
+        put_board(&mut pixels, LAMP, [0.06; 2]);
+        pixels
+    }
+
+    /// Numbers of candidates in successive frames, for a body that was set at these poses.
+    fn candidates(poses: &[Pose], images: &[&[u16]]) -> Vec<usize> {
+        let mut tracker = Tracker::new(standing().0.body, Config::default()).unwrap();
+        tracker.reset_pose(poses).unwrap();
+        let feed = |(number, pixels): (usize, &&[u16])| {
+            with_frame(pixels, number as f64 / 30.0, |frame| tracker.step(frame).unwrap().sources[0].count)
+        };
+        images.iter().enumerate().map(feed).collect()
+    }
+
+    #[test]
+    fn what_stands_beside_the_body_from_the_start_is_scene_and_what_comes_later_is_not() {
+        let (model, poses) = standing();
+        let (lamp, alone) = (with_lamp(&model, &poses), before_wall(&model.body, &poses));
+        let without = candidates(&poses, &[alone.as_slice(); 4]);
+        assert!(without[3] > 1000, "{without:?}");
+        assert_eq!(candidates(&poses, &[lamp.as_slice(); 4])[3], without[3]);
+        let comes = candidates(&poses, &[alone.as_slice(), &alone, &alone, &lamp]);
+        assert!(comes[3] > without[3] + 20, "it may be a hand: {comes:?}");
+    }
+
+    #[test]
+    fn a_body_that_stands_still_becomes_no_scene_even_if_its_pose_was_set_a_little_off() {
+        let (model, poses) = standing();
+        let pixels = before_wall(&model.body, &poses);
+        let off = |off: f64| candidates(&moved(&poses, off * Vec3::X), &[pixels.as_slice(); 70]);
+        let [set, beside] = [0.0, 0.08].map(off);
+        assert_eq!(set[69], set[2]);
+        assert!(beside[69] + 10 > set[2], "{} of {}", beside[69], set[2]);
+    }
+}

@@ -11,7 +11,9 @@ mod trials;
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Model};
-use crate::detect::{Detect, DetectError, Detected, DetectionQuery, JointMap, fit_body, fit_pose, is_sized_like};
+use crate::detect::{
+    Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, fit_body, fit_pose, is_sized_like,
+};
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
@@ -82,8 +84,15 @@ impl Relocalizer {
         self.people.detects()
     }
 
-    /// Returns a body and its poses, world frame, for a detection: in the detected sizes, or with `known` in those of the model.
-    pub(crate) fn place_body(&self, model: &Model, detected: Detected, known: bool) -> Option<(Body, Vec<Pose>)> {
+    /// Takes this detection for the one of this frame.
+    pub(crate) fn set_detection(&mut self, detection: PlacedDetection) {
+        self.people.set_detection(detection);
+    }
+
+    /// Returns a body and its poses, world frame, for the detection of this frame: in the detected sizes, or with `known` in those
+    /// of the model.
+    pub(crate) fn place_body(&self, model: &Model, known: bool) -> Option<(Body, Vec<Pose>)> {
+        let detected = self.people.detection()?;
         if known { Some((model.body.clone(), fit_pose(&model.body, detected)?)) } else { fit_body(model, detected) }
     }
 

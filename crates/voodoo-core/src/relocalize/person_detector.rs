@@ -75,6 +75,11 @@ impl PersonDetector {
         self.person_odds
     }
 
+    /// Takes this detection for the one of this frame.
+    pub(super) fn set_detection(&mut self, detection: PlacedDetection) {
+        self.detection = Some(detection);
+    }
+
     /// Clears the detection.
     pub(super) fn forget(&mut self) {
         (self.detection, self.person_odds) = (None, None);
@@ -116,6 +121,7 @@ mod tests {
     use super::*;
     use crate::body::HumanModel;
     use crate::detect::{DetectedJoint, Detection};
+    use crate::math::Vec3;
 
     #[test]
     fn a_plane_at_the_ankles_is_the_floor_and_one_at_another_height_is_not() {

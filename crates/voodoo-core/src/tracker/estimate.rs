@@ -86,11 +86,11 @@ pub struct SourceReport {
 ///
 /// ```
 /// use voodoo_core::math::Pose;
-/// use voodoo_core::{Body, Config, Frame, HumanModel, LimbStatus, PositionRelation, Status, BodyTracker};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, LimbStatus, PositionRelation, Status, Tracker};
 ///
 /// let body = Body::human(1.75, HumanModel::Measured)?;
 /// let standing = body.rest_pose(Pose::IDENTITY);
-/// let mut tracker = BodyTracker::new(body.clone(), Config::default())?;
+/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
 /// tracker.reset_pose(&standing)?;
 /// let marker = |site| {
 ///     let position = body.site_position(&standing, site);

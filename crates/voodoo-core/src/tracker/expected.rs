@@ -29,10 +29,10 @@ impl Before {
 ///
 /// ```
 /// use voodoo_core::math::{Pose, Vec3};
-/// use voodoo_core::{Body, Config, Frame, HumanModel, BodyTracker};
+/// use voodoo_core::{Body, Config, Frame, HumanModel, Tracker};
 ///
 /// let body = Body::human(1.75, HumanModel::Measured)?;
-/// let mut tracker = BodyTracker::new(body.clone(), Config::default())?;
+/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
 /// tracker.reset_pose(&body.rest_pose(Pose::IDENTITY))?;
 /// assert!(tracker.limb_motion().is_none()); // before two frames
 /// for stamp in [0.0, 0.1] {

@@ -9,7 +9,7 @@ mod report;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::{Detect, DetectError, Detected};
+use crate::detect::{Detect, DetectError, PlacedDetection};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -28,23 +28,22 @@ use expected::Before;
 /// After this time without a frame the body may be anywhere, in any pose, seconds.
 const INTERRUPTION: f64 = 0.5;
 
-/// Tracks one body through a sequence of frames.
+/// The tracker of one body, in the part of each frame that shows it: as [`Tracker`](crate::Tracker) and
+/// [`People`](crate::People) hold one for every person. It answers queries about the body between two frames, and the body can be
+/// edited through it.
 ///
 /// ```
-/// use voodoo_core::math::{Pose, Vec3};
-/// use voodoo_core::{Body, Config, Frame, HumanModel, PositionRelation, BodyTracker};
+/// use voodoo_core::math::Pose;
+/// use voodoo_core::{Body, BodyTracker, Config, HumanModel, Tracker};
+///
+/// fn height(person: &BodyTracker) -> f64 {
+///     person.estimate().sites.iter().map(|site| site.z).fold(0.0, f64::max)
+/// }
 ///
 /// let body = Body::human(1.75, HumanModel::Measured)?;
-/// let standing = body.rest_pose(Pose::IDENTITY);
-/// let site = body.site_index("l_wrist")?;
-/// let marker = body.site_position(&standing, site) + Vec3::X * 0.02;
-/// let mut tracker = BodyTracker::new(body, Config::default())?;
-/// tracker.reset_pose(&standing)?;
-/// for stamp in [0.00, 0.03, 0.06] {
-///     let wrist = PositionRelation { site, position: marker, weight: 20.0, bias: 0.0, source: 0 };
-///     tracker.step(&Frame::empty(stamp).with_positions(&[wrist]))?;
-/// }
-/// assert!(tracker.estimate().sites[site].distance(marker) < 0.01);
+/// let mut tracker = Tracker::new(body.clone(), Config::default())?;
+/// tracker.reset_pose(&body.rest_pose(Pose::IDENTITY))?;
+/// assert!(height(&tracker) > 0.5); // above the root
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
@@ -65,8 +64,8 @@ pub struct BodyTracker {
 }
 
 impl BodyTracker {
-    /// Returns a tracker of `body`. It has no pose until [`BodyTracker::reset`].
-    pub fn new(body: Body, config: Config) -> Result<Self, TrackError> {
+    /// Returns a tracker of `body`. It has no pose yet.
+    pub(crate) fn new(body: Body, config: Config) -> Result<Self, TrackError> {
         Ok(Self {
             model: Model::new(body),
             motion: Motion::default(),
@@ -94,21 +93,21 @@ impl BodyTracker {
     }
 
     /// The error of the detector in the last step, if it failed. The step then ran without detections.
-    pub fn detector_error(&self) -> Option<&DetectError> {
+    pub(crate) fn detector_error(&self) -> Option<&DetectError> {
         self.relocalizer.error()
     }
 
     /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
     /// are fitted starting from those of the body that was given to the tracker, not from those of an earlier reset. Stamps after
     /// a reset may start again from any time. On error the tracker is unchanged.
-    pub fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
+    pub(crate) fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
         let (body, poses) = self.model.fit(positions, fit_sizes)?;
         self.restart(body, poses, fit_sizes);
         Ok(&self.estimate)
     }
 
     /// Sets the pose of every limb directly.
-    pub fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
+    pub(crate) fn reset_pose(&mut self, world_from_limb: &[Pose]) -> Result<&Estimate, TrackError> {
         let count = self.model.body.limbs().len();
         if world_from_limb.len() != count || !world_from_limb.iter().all(is_rigid) {
             return Err(TrackError::measurement(
@@ -199,15 +198,18 @@ impl BodyTracker {
         &mut self,
         frame: &Frame,
         ownership: OwnershipMask,
-        detected: Detected,
+        detection: PlacedDetection,
         known: bool,
     ) -> bool {
-        let Some((body, poses)) = self.relocalizer.place_body(&self.model, detected, known) else { return false };
+        self.relocalizer.set_detection(detection);
+        let Some((body, poses)) = self.relocalizer.place_body(&self.model, known) else { return false };
         self.restart(body, poses, !known);
         self.before.keep(&self.estimate);
         self.assessor.distrust_pose();
+        self.relocalizer.record_start(true);
         if !known {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
+            self.update_sizes();
         }
         self.follow(frame, ownership);
         !matches!(self.estimate.status, Status::Lost | Status::Searching)

@@ -2,13 +2,14 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use super::*;
+use crate::Tracker;
 use crate::testing::{before_wall, farthest, moved, put_board, standing, with_frame};
 
 /// Returns a tracker that has tracked the standing body for three frames, and the image.
-fn tracking() -> (BodyTracker, Vec<u16>) {
+fn tracking() -> (Tracker, Vec<u16>) {
     let (model, poses) = standing();
     let pixels = before_wall(&model.body, &poses);
-    let mut tracker = BodyTracker::new(model.body, Config::default()).unwrap();
+    let mut tracker = Tracker::new(model.body, Config::default()).unwrap();
     tracker.reset_pose(&poses).unwrap();
     for frame in 0..3 {
         feed(&mut tracker, &pixels, frame);
@@ -17,7 +18,7 @@ fn tracking() -> (BodyTracker, Vec<u16>) {
 }
 
 /// Steps the tracker with a depth image and returns the status.
-fn feed(tracker: &mut BodyTracker, pixels: &[u16], frame: usize) -> Status {
+fn feed(tracker: &mut Tracker, pixels: &[u16], frame: usize) -> Status {
     with_frame(pixels, frame as f64 / 30.0, |frame| tracker.step(frame).unwrap().status)
 }
 
@@ -51,7 +52,7 @@ fn a_body_that_sites_miss_by_far_is_not_tracked_whatever_depth_says() {
 
 #[test]
 fn edits_keep_the_track() {
-    type Edit = fn(&mut BodyTracker);
+    type Edit = fn(&mut Tracker);
     let edits: [Edit; 4] = [
         |tracker| tracker.scale(1.02).unwrap(),
         |tracker| tracker.remove_limb("l_hand").unwrap(),
