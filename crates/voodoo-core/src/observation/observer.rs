@@ -91,7 +91,8 @@ impl Observer {
             return;
         }
         self.backgrounds.adopt(frame, ownership.scene, |image, depth| {
-            for (depth, owner) in depth.iter_mut().zip(ownership.owners(image)) {
+            let owners = if ownership.alone { &[] } else { ownership.owners(image) };
+            for (depth, owner) in depth.iter_mut().zip(owners) {
                 *depth = if ownership.is_others(*owner) { OTHERS } else { *depth };
             }
         });

@@ -14,6 +14,8 @@ pub(crate) struct OwnershipMask<'a> {
     pub cloud_owners: &'a [Vec<u16>],
     /// Index of this person.
     pub own: u16,
+    /// Whether no pixel and no point has another owner.
+    pub alone: bool,
     /// The static scene, learned where no person was.
     pub scene: &'a Backgrounds,
 }

@@ -33,8 +33,9 @@ use rayon::prelude::*;
 use scene_model::SceneModel;
 use tentative_tracks::{SAME_PERSON, TentativeTrack, TentativeTracks};
 
-/// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
-const DETECT_EVERY: f64 = 0.06;
+/// Shortest time between two detections in pixels that no person explains, while anybody is tracked: where something new is in
+/// view, and otherwise, seconds.
+const DETECT_EVERY: [f64; 2] = [0.06, 0.3];
 /// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.3;
 /// A track that lasted for less than this is not remembered, seconds.
@@ -71,6 +72,8 @@ pub struct People {
     tentative: TentativeTracks,
     detector: BoundDetector,
     last_detection: Option<f64>,
+    /// Whether to look for persons who stood still from the start while others are tracked.
+    finds_still: bool,
     stamp: Option<f64>,
     threads: Threads,
 }
@@ -89,6 +92,7 @@ impl People {
             tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
             last_detection: None,
+            finds_still: true,
             stamp: None,
             threads,
             config: Config { threads: 1, ..config },
@@ -249,17 +253,22 @@ impl People {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
         });
+        let wait = match self.persons.iter().any(Person::is_tracked) {
+            true if self.scene.shows_something_new() => DETECT_EVERY[0],
+            true if self.finds_still => DETECT_EVERY[1],
+            true => f64::INFINITY,
+            false => 0.0,
+        };
         if everybody_there
             || !self.finds_new(frame.stamp)
             || !self.detector.knows()
-            || self.last_detection.is_some_and(|last| frame.stamp - last < DETECT_EVERY)
-                && self.persons.iter().any(Person::is_tracked)
+            || self.last_detection.is_some_and(|last| frame.stamp - last < wait)
         {
             return;
         }
         self.last_detection = Some(frame.stamp);
         self.tentative.prune(frame.stamp);
-        self.detect(frame, DetectionQuery::New);
+        self.detect(frame, if wait > 0.0 { DetectionQuery::New } else { DetectionQuery::Any });
         let confirmed = self.tentative.take_confirmed(frame.stamp);
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);

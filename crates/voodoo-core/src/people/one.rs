@@ -52,6 +52,8 @@ impl Tracker {
         (person.followed, person.last_tracked) = (true, f64::NEG_INFINITY);
         people.persons.push(person);
         people.next_id += 1;
+        // Others matter when they move, and a look at every piece of furniture takes as long as three frames.
+        people.finds_still = false;
         Ok(Self { people })
     }
 

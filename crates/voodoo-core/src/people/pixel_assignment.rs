@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
-use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
+use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
 use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// Distance from its expected position within which a surface explains a measurement, meters: the reach of the candidate search.
@@ -27,12 +27,13 @@ pub(super) struct PredictedBody<'a> {
 /// The owners of all pixels and free points, and working memory.
 #[derive(Debug, Default)]
 pub(super) struct PixelAssignment {
+    /// Numbers of the bodies that pixels and points were assigned to.
+    assigned: Vec<u16>,
     owners: Vec<Vec<u16>>,
     cloud_owners: Vec<Vec<u16>>,
     distances: Vec<f32>,
-    /// For every pixel of an image its depth, meters, and whether it has a return that is not background.
+    /// Depths of a row, meters.
     depth: Vec<f32>,
-    open: Vec<bool>,
     queries: Points,
     /// For each query its first pixel, and the number of pixels that it represents.
     pixels: Vec<(u32, u32)>,
@@ -48,7 +49,9 @@ impl PixelAssignment {
 
     /// Returns the ownership mask of a person for this frame.
     pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
-        OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own: number as u16, scene }
+        let own = number as u16;
+        let alone = self.assigned.iter().all(|assigned| *assigned == own);
+        OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own, alone, scene }
     }
 
     /// Returns the number of pixels and free points that a person explains.
@@ -64,14 +67,15 @@ impl PixelAssignment {
         scene: &Backgrounds,
         bodies: impl Iterator<Item = PredictedBody<'a>> + Clone,
     ) {
+        self.assigned.clear();
+        self.assigned.extend(bodies.clone().map(|body| body.number));
         self.owners.resize_with(frame.images.len(), Vec::new);
         for (number, image) in frame.images.iter().enumerate() {
             let mut owners = self.unassigned(number, image.pixels.len(), |assignment| &mut assignment.owners);
             let background = scene.of_image(image).map_or(&[][..], Background::depth);
-            self.measure(image, background);
             for PredictedBody { number, body, poses } in bodies.clone() {
                 if let Some(origin) = poses.first().map(|root| root.translation) {
-                    self.gather(image, origin, &body_box(body, poses, f64::from(REACH)));
+                    self.gather(image, background, origin, &body_box(body, poses, f64::from(REACH)));
                     self.assign_nearest(number, body, poses, origin, &mut owners);
                 }
             }
@@ -137,41 +141,33 @@ impl PixelAssignment {
         }
     }
 
-    /// Computes the depth of every pixel of an image, meters, and whether the pixel has a return that is not background. Both are
-    /// used for all bodies.
-    fn measure(&mut self, image: &DepthImage, background: &[f32]) {
-        let Self { depth, open, .. } = self;
-        let scale = image.meters_per_unit as f32;
-        depth.clear();
-        match image.pixels {
-            DepthPixels::U16(pixels) => depth.extend(pixels.iter().map(|pixel| f32::from(*pixel) * scale)),
-            DepthPixels::F32(pixels) => depth.extend(pixels.iter().map(|pixel| pixel * scale)),
-        }
-        open.clear();
-        open.extend(depth.iter().map(|z| *z > 0.0 && z.is_finite()));
-        for ((open, z), background) in open.iter_mut().zip(depth.iter()).zip(background) {
-            *open &= !Background::contains(*background, *z);
-        }
-    }
-
     /// Gathers the foreground returns within a box of the world, relative to `origin`. Of neighboring pixels on one surface the
     /// first represents all.
-    fn gather(&mut self, image: &DepthImage, origin: Vec3, bounds: &Aabb) {
+    fn gather(&mut self, image: &DepthImage, background: &[f32], origin: Vec3, bounds: &Aabb) {
         let [columns, rows] = image_window(image, &image.world_from_sensor, bounds);
         let together = (image.camera.width() / COLUMNS).max(1);
-        let Self { queries, pixels, depth, open, .. } = self;
+        let scale = image.meters_per_unit as f32;
+        let Self { queries, pixels, depth, .. } = self;
         queries.clear();
         pixels.clear();
         for row in rows {
-            let (start, end) = (row * image.camera.width(), (row + 1) * image.camera.width());
-            let (depth, open) = (&depth[start..end], &open[start..end]);
+            let start = row * image.camera.width();
+            depth.clear();
+            depth.extend((start..start + columns.end).map(|index| image.pixels.get(index) * scale));
+            // Where there is no return, or the scene, the depth is 0.
+            for z in depth.iter_mut() {
+                *z = if *z > 0.0 && *z < f32::INFINITY { *z } else { 0.0 };
+            }
+            for (z, scene) in depth.iter_mut().zip(background.get(start..).unwrap_or(&[])) {
+                *z = if Background::contains(*scene, *z) { 0.0 } else { *z };
+            }
             let mut column = columns.start;
             while column < columns.end {
-                if !open[column] {
+                let z = depth[column];
+                if z == 0.0 {
                     column += 1;
                     continue;
                 }
-                let z = depth[column];
                 let last = columns.end.min(column + together);
                 let mut run = 1;
                 while column + run < last && (depth[column + run] - z).abs() < LIKE_DEPTH {

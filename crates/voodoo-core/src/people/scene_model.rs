@@ -14,6 +14,8 @@ const NEW_DEPTH: f32 = 0.1;
 /// Number of consecutive observations after which a return becomes part of the scene, where no depth was known and where a deeper
 /// one was. The second number is large so that a standing person who has not been detected yet is not learned.
 const STILL_FRAMES: [u8; 2] = [4, 60];
+/// Least fraction of the pixels that somebody new covers: far away, or at the border of the image.
+const NEW_SHARE: f64 = 0.005;
 /// Time after which a camera's background has been searched for persons, seconds.
 const OLD: f64 = 3.0;
 /// Largest difference between equal depths, meters.
@@ -25,6 +27,9 @@ pub(super) struct SceneModel {
     known: Backgrounds,
     images: Vec<PendingDepth>,
     row: usize,
+    /// Number of pixels in the rows that were learned last, and of those that show no person before the known scene.
+    learned: usize,
+    unexplained: usize,
     /// Whether nothing is learned.
     off: bool,
 }
@@ -69,6 +74,11 @@ impl SceneModel {
         });
     }
 
+    /// Whether the last frame that was learned may show somebody new: something before the scene that is no person.
+    pub(super) fn shows_something_new(&self) -> bool {
+        self.unexplained as f64 >= NEW_SHARE * self.learned as f64
+    }
+
     /// Whether the camera of an image has been at its position for long enough that its view was searched for persons.
     pub(super) fn is_old(&self, image: usize, stamp: f64) -> bool {
         self.images.get(image).and_then(|image| image.since).is_some_and(|since| stamp - since > OLD)
@@ -77,6 +87,7 @@ impl SceneModel {
     /// Learns some rows in pixels that no person owns; the whole image in the second frame of a camera at its position.
     pub(super) fn learn(&mut self, frame: &Frame, owners: &[Vec<u16>]) {
         self.row = (self.row + 1) % LEARNED_ROWS;
+        (self.learned, self.unexplained) = (0, 0);
         for ((image, tentative), owners) in frame.images.iter().zip(&mut self.images).zip(owners) {
             let Some(known) = self.known.depth_mut(image) else { continue };
             if tentative.since.is_none() {
@@ -90,8 +101,11 @@ impl SceneModel {
                 }
             }
             for row in (self.row..image.camera.height()).step_by(LEARNED_ROWS) {
+                self.learned += image.camera.width();
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
                     let Some(z) = meters(image, index).filter(|_| owners[index] == NO_OWNER) else { continue };
+                    self.unexplained +=
+                        usize::from(z < known[index] - DEPTH_STEP && !Background::contains(known[index], z));
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
                 }
             }
