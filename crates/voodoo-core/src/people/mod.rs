@@ -33,9 +33,8 @@ use rayon::prelude::*;
 use scene_model::SceneModel;
 use tentative_tracks::{SAME_PERSON, TentativeTrack, TentativeTracks};
 
-/// Shortest time between two detections in pixels that no person explains, while anybody is tracked: where something new is in
-/// view, and otherwise, seconds.
-const DETECT_EVERY: [f64; 2] = [0.06, 0.3];
+/// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
+const DETECT_EVERY: f64 = 0.06;
 /// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.3;
 /// A track that lasted for less than this is not remembered, seconds.
@@ -253,9 +252,9 @@ impl People {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
         });
-        let wait = match self.persons.iter().any(Person::is_tracked) {
-            true if self.scene.shows_something_new() => DETECT_EVERY[0],
-            true if self.finds_still => DETECT_EVERY[1],
+        let tracked = self.persons.iter().any(Person::is_tracked);
+        let wait = match tracked {
+            true if self.finds_still || self.scene.shows_something_new() => DETECT_EVERY,
             true => f64::INFINITY,
             false => 0.0,
         };
@@ -268,7 +267,7 @@ impl People {
         }
         self.last_detection = Some(frame.stamp);
         self.tentative.prune(frame.stamp);
-        self.detect(frame, if wait > 0.0 { DetectionQuery::New } else { DetectionQuery::Any });
+        self.detect(frame, if tracked { DetectionQuery::New } else { DetectionQuery::Any });
         let confirmed = self.tentative.take_confirmed(frame.stamp);
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);

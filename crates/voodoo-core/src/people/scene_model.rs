@@ -27,7 +27,7 @@ pub(super) struct SceneModel {
     known: Backgrounds,
     images: Vec<PendingDepth>,
     row: usize,
-    /// Number of pixels in the rows that were learned last, and of those that show no person before the known scene.
+    /// Number of pixels in the rows that were learned last, and of those that show neither a person nor the known scene.
     learned: usize,
     unexplained: usize,
     /// Whether nothing is learned.
@@ -74,7 +74,7 @@ impl SceneModel {
         });
     }
 
-    /// Whether the last frame that was learned may show somebody new: something before the scene that is no person.
+    /// Whether the last frame that was learned may show somebody new: something that is neither a person nor the known scene.
     pub(super) fn shows_something_new(&self) -> bool {
         self.unexplained as f64 >= NEW_SHARE * self.learned as f64
     }
@@ -104,8 +104,7 @@ impl SceneModel {
                 self.learned += image.camera.width();
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
                     let Some(z) = meters(image, index).filter(|_| owners[index] == NO_OWNER) else { continue };
-                    self.unexplained +=
-                        usize::from(z < known[index] - DEPTH_STEP && !Background::contains(known[index], z));
+                    self.unexplained += usize::from(is_new(known[index], z));
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
                 }
             }
@@ -138,6 +137,11 @@ impl SceneModel {
             }
         }
     }
+}
+
+/// Whether a return is clearly before the known scene, or where nothing is known.
+fn is_new(known: f32, z: f32) -> bool {
+    known == 0.0 || z < known - DEPTH_STEP && !Background::contains(known, z)
 }
 
 fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
