@@ -71,8 +71,8 @@ pub struct People {
     tentative: TentativeTracks,
     detector: BoundDetector,
     last_detection: Option<f64>,
-    /// Whether to look for persons who stood still from the start while others are tracked.
-    finds_still: bool,
+    /// Whether everybody is wanted, who stood still from the start as well; otherwise the one who is followed is.
+    everybody: bool,
     stamp: Option<f64>,
     threads: Threads,
 }
@@ -91,7 +91,7 @@ impl People {
             tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
             last_detection: None,
-            finds_still: true,
+            everybody: true,
             stamp: None,
             threads,
             config: Config { threads: 1, ..config },
@@ -254,7 +254,7 @@ impl People {
         });
         let tracked = self.persons.iter().any(Person::is_tracked);
         let wait = match tracked {
-            true if self.finds_still || self.scene.shows_something_new() => DETECT_EVERY,
+            true if self.everybody || self.scene.shows_something_new() => DETECT_EVERY,
             true => f64::INFINITY,
             false => 0.0,
         };
@@ -297,7 +297,7 @@ impl People {
                     self.detector.reject(found.index);
                     continue;
                 }
-                let still = self.scene.is_still(frame, number, &found.detection.pixels);
+                let still = self.everybody && self.scene.is_still(frame, number, &found.detection.pixels);
                 self.tentative.update(frame.stamp, found, number, still);
             }
         }
@@ -402,7 +402,12 @@ impl People {
         let ownership = self.assignment.ownership(number, self.scene.known());
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
-        let came = person.tracker.start_at_detection(&Frame { colors: &[], ..*frame }, ownership, placed, known);
+        let depth_frame = &Frame { colors: &[], ..*frame };
+        let came = if person.present {
+            person.tracker.recover(depth_frame, ownership, placed)
+        } else {
+            person.tracker.start_at_detection(depth_frame, ownership, placed, known)
+        };
         if came {
             person.present = true;
             person.created = person.created.min(frame.stamp);

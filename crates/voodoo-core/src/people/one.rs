@@ -53,7 +53,7 @@ impl Tracker {
         people.persons.push(person);
         people.next_id += 1;
         // Others matter when they move, and a look at every piece of furniture takes as long as three frames.
-        people.finds_still = false;
+        people.everybody = false;
         Ok(Self { people })
     }
 

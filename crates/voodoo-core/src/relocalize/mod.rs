@@ -123,6 +123,11 @@ impl Relocalizer {
         self.check.is_new(stamp)
     }
 
+    /// Whether the detection of this frame may be of a body of these sizes.
+    pub(crate) fn detects_sizes_of(&self, body: &Body) -> bool {
+        self.people.detection().is_none_or(|detected| is_sized_like(body, detected, SIGMAS))
+    }
+
     /// Returns the body and its poses, world frame, that fit best the detection of this frame. The body is `set`, the one of the
     /// start, or has the detected sizes where these clearly differ.
     pub(crate) fn fit_detected(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {

@@ -85,8 +85,7 @@ impl PersonDetector {
         (self.detection, self.person_odds) = (None, None);
     }
 
-    /// Runs the detector on the owned pixels of all depth images of a frame; keeps the detection with the highest log
-    /// odds.
+    /// Runs the detector on the owned pixels of all depth images of a frame; keeps one detection.
     pub(super) fn detect(&mut self, body: &Body, frame: &Frame, ownership: OwnershipMask, query: DetectionQuery) {
         self.forget();
         for (number, image) in frame.images.iter().enumerate() {
@@ -94,7 +93,12 @@ impl PersonDetector {
             let around =
                 Surroundings { ground: frame.ground, excluded: frame.excluded, owners, own, ..Surroundings::default() };
             for found in self.detector.detect(body, image, &around, query) {
-                if self.detection.as_ref().is_none_or(|best| found.detection.person > best.detection.person) {
+                // Of several images the nearest detection counts, or the most confident one.
+                let cost = |found: &PlacedDetection| match query {
+                    DetectionQuery::Near(place) => found.root.distance(place),
+                    _ => -found.detection.person,
+                };
+                if self.detection.as_ref().is_none_or(|best| cost(&found) < cost(best)) {
                     (self.image, self.detection) = (number, Some(found));
                 }
             }

@@ -192,8 +192,8 @@ impl BodyTracker {
         }
     }
 
-    /// Starts the track at a detection, in the detected sizes or, with `known`, in the sizes that the body has. Returns whether
-    /// the person is there.
+    /// Starts the track at a detection, in the detected sizes or, with `known`, in the sizes that the body has unless these clearly
+    /// differ. Returns whether the person is there.
     pub(crate) fn start_at_detection(
         &mut self,
         frame: &Frame,
@@ -202,6 +202,7 @@ impl BodyTracker {
         known: bool,
     ) -> bool {
         self.relocalizer.set_detection(detection);
+        let known = known && self.relocalizer.detects_sizes_of(&self.model.body);
         let Some((body, poses)) = self.relocalizer.place_body(&self.model, known) else { return false };
         self.restart(body, poses, !known);
         self.before.keep(&self.estimate);
@@ -212,6 +213,22 @@ impl BodyTracker {
             self.update_sizes();
         }
         self.follow(frame, ownership);
+        !matches!(self.estimate.status, Status::Lost | Status::Searching)
+    }
+
+    /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame no worse. A new track
+    /// restarts there. Returns whether the person is there.
+    pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
+        self.relocalizer.set_detection(detection);
+        if !self.move_to_detection(frame) {
+            return false;
+        }
+        if self.relocalizer.is_new(frame.stamp) && self.restart_at_detection() {
+            self.follow(frame, ownership);
+        } else {
+            self.remember();
+            self.report(frame.stamp, 0, Some(1.0));
+        }
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
