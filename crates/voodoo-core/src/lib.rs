@@ -126,7 +126,9 @@
 //!
 //! # Several persons
 //!
-//! [`People`] spawns, associates and prunes a [`Tracker`] per person; it needs a detector.
+//! [`People`] tracks everybody, each with a [`BodyTracker`]; it finds persons with a detector. A [`Tracker`] is the same for one
+//! person who is followed: with a detector, everybody else who moves in view is tracked as well, so that nobody else is taken for
+//! that person.
 //!
 //! ```
 //! use voodoo_core::{Body, Config, HumanModel, People, PeopleOptions};

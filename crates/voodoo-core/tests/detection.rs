@@ -101,6 +101,31 @@ fn a_detector_of_five_joints_starts_a_body_from_nothing_and_names_that_the_body_
 }
 
 #[test]
+fn whoever_comes_is_not_taken_for_the_one_who_leaves() {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let poses = scene::standing(&body);
+    let aside = Pose::from_translation(0.9 * Vec3::Y);
+    let other: Vec<Pose> = poses.iter().map(|pose| aside * *pose).collect();
+    let mut noise = scene::Noise(3);
+    let [alone, beside] = [&poses, &other].map(|poses| CAMERA.shoot(&body, poses, 0.005, &mut noise).0);
+    let both: Vec<u16> = alone.iter().zip(&beside).map(|(a, b)| *a.min(b)).collect();
+    let detector = Fixed::of(&FIVE).seeing(&body, &poses).seeing(&body, &other);
+    let mut tracker = Tracker::new(body.clone(), Config::default()).unwrap().with_detector(Box::new(detector));
+    tracker.reset_pose(&poses).unwrap();
+    feed(&mut tracker, &alone, 0..10);
+    feed(&mut tracker, &both, 10..25);
+    assert_eq!(tracker.estimate().status, Status::Tracking);
+    feed(&mut tracker, &beside, 25..60);
+    assert_eq!(tracker.estimate().status, Status::Lost);
+    let root = tracker.estimate().world_from_limb[0].translation;
+    assert!(root.distance(poses[0].translation) < 0.3, "{root} is not where the person was");
+    // Who comes back is tracked again.
+    feed(&mut tracker, &both, 60..75);
+    assert_eq!(tracker.estimate().status, Status::Tracking);
+    assert!(farthest(&tracker, &body, &poses) < 0.1);
+}
+
+#[test]
 fn joints_are_those_of_the_body_after_its_limbs_were_edited() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let poses = scene::standing(&body);

@@ -114,6 +114,7 @@ impl Person {
             }
             return;
         }
+        self.present &= estimate.status != Status::Searching;
         if self.stays || !self.tracker.can_search() {
             return;
         }
@@ -122,7 +123,7 @@ impl Person {
             Presence::Outside => OUTSIDE,
             Presence::Gone => LEAVES,
         };
-        self.present &= estimate.status != Status::Searching && frame.stamp - self.last_tracked < patience;
+        self.present &= frame.stamp - self.last_tracked < patience;
     }
 
     /// Returns whether most sites of the lost person are hidden, outside of the images, or neither.

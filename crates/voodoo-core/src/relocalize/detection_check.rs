@@ -5,8 +5,7 @@ use crate::detect::Detected;
 use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
 
-/// Time for which a track is new, seconds. It is also the time after which a lost body is gone and the time for which an
-/// occlusion is remembered, and the interval between detections for a suspect limb.
+/// Time for which a track is new, seconds. It is also the interval between detections for a suspect limb.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;
 /// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two.
 const EVERY: f64 = 0.09;
@@ -22,6 +21,17 @@ const FALSE_TRACK_ODDS: f64 = 12.0;
 /// Sum of log odds from which on a detection is confirmed as a person, or as being elsewhere than the track. No single detection
 /// of a tracked person contributes more.
 pub(crate) const ENOUGH_ODDS: f64 = 4.0;
+
+/// What the frame before gave as reasons to run the detector.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Reasons {
+    /// A limb was not supported in its pose.
+    pub(crate) limb_suspect: bool,
+    /// It was uncertain whether one was.
+    pub(crate) pose_uncertain: bool,
+    /// The body may be anywhere.
+    pub(crate) anywhere: bool,
+}
 
 /// Result of comparing a detection with the tracked pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,8 +77,6 @@ pub(super) struct DetectionCheck {
     /// Log odds that the person is elsewhere, and that the tracked object is not a person.
     elsewhere: f64,
     false_track: f64,
-    /// Stamp since which the body has been lost, seconds.
-    lost_since: Option<f64>,
 }
 
 impl DetectionCheck {
@@ -103,19 +111,19 @@ impl DetectionCheck {
         self.compares
     }
 
-    /// Counts a frame and returns whether the detector is due. `limb_suspect`: a limb is not supported in its pose;
-    /// `pose_uncertain`: it is uncertain whether one is; `lost`: the body is lost.
-    pub(super) fn is_due(&mut self, stamp: f64, limb_suspect: bool, pose_uncertain: bool, lost: bool) -> bool {
+    /// Counts a frame and returns whether the detector is due.
+    pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons) -> bool {
+        let Reasons { limb_suspect, pose_uncertain, anywhere } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
         let waited = |last_detection: Option<f64>, every: f64| {
             last_detection.is_none_or(|last_detection| stamp - last_detection >= every)
         };
         // A given start that a detection confirmed is checked half as often.
-        let after = if self.agreed && !lost { 2.0 * EVERY } else { EVERY };
+        let after = if self.agreed && !anywhere { 2.0 * EVERY } else { EVERY };
         let comparison_due = new_track && waited(self.last_comparison, after);
-        let every = if pose_uncertain || lost { EVERY } else { NEW_TRACK_AGE };
-        let due = comparison_due || (limb_suspect || pose_uncertain || lost) && waited(self.last_detection, every);
+        let every = if pose_uncertain || anywhere { EVERY } else { NEW_TRACK_AGE };
+        let due = comparison_due || (limb_suspect || pose_uncertain || anywhere) && waited(self.last_detection, every);
         self.compares = comparison_due || !new_track;
         if comparison_due {
             self.last_comparison = Some(stamp);
@@ -155,15 +163,12 @@ impl DetectionCheck {
         DetectionVerdict::Consistent
     }
 
-    /// Updates with a frame: whether the body was lost, and the log odds that the object at the tracked position is a person.
-    /// Returns whether the person is gone.
-    pub(super) fn person_gone(&mut self, stamp: f64, lost: bool, verdict: Option<f64>) -> bool {
-        self.lost_since = if lost { self.lost_since.or(Some(stamp)) } else { None };
-        if let Some(person) = verdict {
+    /// Updates with the log odds that the object at the tracked position is a person. Returns whether it is none.
+    pub(super) fn is_false_track(&mut self, person_odds: Option<f64>) -> bool {
+        if let Some(person) = person_odds {
             self.false_track = (self.false_track - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.false_track >= FALSE_TRACK_ODDS
-            || self.auto_initialized && self.lost_since.is_some_and(|since| stamp - since >= NEW_TRACK_AGE)
     }
 
     /// Resets the evidence after the detected position was tried.
@@ -181,12 +186,11 @@ mod tests {
 
     #[test]
     fn new_lost_and_uncertain_tracks_are_checked_often_and_confident_ones_never() {
-        let count = |from: f64, [limb_suspect, pose_uncertain, lost]: [bool; 3]| {
+        let count = |from: f64, [limb_suspect, pose_uncertain, anywhere]: [bool; 3]| {
+            let reasons = Reasons { limb_suspect, pose_uncertain, anywhere };
             let mut check = DetectionCheck::default();
-            check.is_due(0.0, false, false, false);
-            (1..=27)
-                .filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, limb_suspect, pose_uncertain, lost))
-                .count()
+            check.is_due(0.0, Reasons::default());
+            (1..=27).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
         };
         let none = [false; 3];
         assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [9; 3]);
@@ -204,7 +208,7 @@ mod tests {
             let nothing = Detected { detection: &detection, map: &map };
             let agree = |check: &mut DetectionCheck| check.compare(nothing, &body, &poses, true);
             let due =
-                |check: &mut DetectionCheck, frame: i32| check.is_due(f64::from(frame) / 30.0, false, false, false);
+                |check: &mut DetectionCheck, frame: i32| check.is_due(f64::from(frame) / 30.0, Reasons::default());
             (0..30).filter(|frame| due(&mut check, *frame) && agree(&mut check) == DetectionVerdict::Consistent).count()
         };
         assert_eq!([false, true].map(comparisons), [5, 10]);
@@ -236,22 +240,11 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_auto_initialized_body_is_gone_and_so_is_any_body_that_is_no_person() {
-        let mut check = DetectionCheck::default();
-        assert!(
-            !(0..100).any(|frame| check.person_gone(f64::from(frame) / 30.0, true, None)),
-            "a body that the user placed is kept"
-        );
-        check.set_auto_initialized(true);
-        assert!(check.person_gone(100.0 / 30.0, true, None));
-        assert!(!check.person_gone(4.0, false, None), "recovered");
-        let mut check = DetectionCheck::default();
-        assert!((0..4).any(|frame| check.person_gone(f64::from(frame), false, Some(-4.0))));
-        let mut check = DetectionCheck::default();
-        assert!(!(0..40).any(|frame| check.person_gone(
-            f64::from(frame),
-            false,
-            Some(if frame % 2 == 0 { -4.0 } else { 4.0 })
-        )));
+    fn a_track_that_is_no_person_ends_and_one_that_is_mostly_a_person_does_not() {
+        let ends = |odds: &[f64]| {
+            let mut check = DetectionCheck::default();
+            odds.iter().any(|person| check.is_false_track(Some(*person)))
+        };
+        assert!(ends(&[-4.0; 4]) && !ends(&[-4.0, 4.0].repeat(20)));
     }
 }

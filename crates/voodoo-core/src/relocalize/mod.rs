@@ -1,4 +1,4 @@
-//! Finds a body at a detection: an auto-initialized body, a lost one, and one that is elsewhere than its track.
+//! Verifies a track by detections, and moves the body to one: a body that was lost, or is elsewhere than its track.
 //!
 //! The body is put at the detected pose and refined. The new pose is adopted if it explains the frame no worse, by the score of
 //! all hypotheses, and is not itself lost.
@@ -20,9 +20,9 @@ use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
-pub(crate) use detection_check::DetectionVerdict;
 pub(crate) use detection_check::ENOUGH_ODDS;
 use detection_check::{DetectionCheck, SIGMAS};
+pub(crate) use detection_check::{DetectionVerdict, Reasons};
 pub(crate) use loss_monitor::FrameOutcome;
 use loss_monitor::LossMonitor;
 use person_detector::PersonDetector;
@@ -149,23 +149,18 @@ impl Relocalizer {
     }
 
     /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
-    /// `limb_suspect`: in the frame before, a limb was not supported in its pose; `pose_uncertain`: it was uncertain whether one
-    /// was; `anywhere`: the body may be anywhere.
-    #[allow(clippy::too_many_arguments)]
     pub(crate) fn detect(
         &mut self,
         body: &Body,
         frame: &Frame,
         ownership: OwnershipMask,
         root: Vec3,
-        limb_suspect: bool,
-        pose_uncertain: bool,
-        anywhere: bool,
+        reasons: Reasons,
     ) {
         // A body that was just found may face the other way, so it is monitored closely.
-        let often = anywhere || self.loss.recently_recovered();
-        if self.check.is_due(frame.stamp, limb_suspect, pose_uncertain, often) && self.people.detects() {
-            let query = if anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
+        let often = Reasons { anywhere: reasons.anywhere || self.loss.recently_recovered(), ..reasons };
+        if self.check.is_due(frame.stamp, often) && self.people.detects() {
+            let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
             self.people.detect(body, frame, ownership, query);
         } else {
             self.people.forget();
@@ -200,9 +195,9 @@ impl Relocalizer {
         Some(self.check.compare(detected, body, world_from_limb, new_track))
     }
 
-    /// Whether the person is gone, by the frames up to this one: the body has been `lost` for long, or the track is not a person.
-    pub(crate) fn person_gone(&mut self, stamp: f64, lost: bool) -> bool {
-        self.check.person_gone(stamp, lost, self.people.person_odds())
+    /// Whether the track is not a person, by the detections up to this frame.
+    pub(crate) fn is_false_track(&mut self) -> bool {
+        self.check.is_false_track(self.people.person_odds())
     }
 
     /// Returns the detected poses of this frame, refined, if they explain the frame no worse than the present ones; working

@@ -18,7 +18,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::{DetectionVerdict, FrameOutcome, Relocalizer};
+use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::FittedPose;
 use assess::Assessor;
@@ -154,7 +154,7 @@ impl BodyTracker {
         if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
             return;
         }
-        relocalizer.detect(&model.body, frame, ownership, motion.poses[0].translation, false, false, false);
+        relocalizer.detect(&model.body, frame, ownership, motion.poses[0].translation, Reasons::default());
         if relocalizer.compare(&model.body, &motion.poses, false) == Some(DetectionVerdict::Elsewhere) {
             observer.find_segmented(frame);
             let observation = observer.observation(frame, motion.origin);
@@ -268,13 +268,16 @@ impl BodyTracker {
         // Alternative hypotheses for arms and legs.
         if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
-            let (root, limb_suspect) =
-                (poses[0].translation + *origin, assessor.has_suspect_limb() || sizes.is_uncertain());
+            // A lost body is searched for with everybody's detections, see `crate::People`.
             if lost {
                 relocalizer.forget();
             } else {
-                let uncertain = assessor.is_uncertain();
-                relocalizer.detect(&model.body, frame, ownership, root, limb_suspect, uncertain, interrupted);
+                let reasons = Reasons {
+                    limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
+                    pose_uncertain: assessor.is_uncertain(),
+                    anywhere: interrupted,
+                };
+                relocalizer.detect(&model.body, frame, ownership, poses[0].translation + *origin, reasons);
             }
         }
         if config.hypotheses && schedule.whole_body && known {
@@ -297,8 +300,7 @@ impl BodyTracker {
         }
         self.remember();
         self.report(frame.stamp, steps, Some(time_scale));
-        let lost = self.estimate.status == Status::Lost;
-        if self.relocalizer.person_gone(frame.stamp, lost) {
+        if self.relocalizer.is_false_track() {
             self.stop(frame.stamp);
         }
     }
