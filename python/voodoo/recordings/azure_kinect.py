@@ -18,7 +18,7 @@ from voodoo.errors import CameraError, RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.pictures import decode_color
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, refuse_blank
 
@@ -115,19 +115,14 @@ class AzureKinectRecording(Recording):
                     waiting.append(ColorImage("color", stamp, load, self._color, self._depth_from_color))
                     continue
                 number += 1
-                try:
-                    item = self._depth_image(stamp, bytes(packet))
-                except RecordingError as error:
-                    if self._left_out is None:
-                        raise
-                    self._left_out.add_error(error)
-                    continue
-                if self._left_out is not None:
-                    self._left_out.numbers["depth", stamp] = number
-                yield RecordedFrame(stamp, (*waiting, item))
-                waiting.clear()
+                item = None
+                with leaving_out(self._left_out):
+                    item = self._depth_image(stamp, bytes(packet), number)
+                if item is not None:
+                    yield RecordedFrame(stamp, (*waiting, item))
+                    waiting.clear()
 
-    def _depth_image(self, stamp: float, content: bytes) -> DepthImage:
+    def _depth_image(self, stamp: float, content: bytes, number: int) -> DepthImage:
         where, size = f"{self.path}, depth", (self._camera.height, self._camera.width)
         if len(content) != 2 * size[0] * size[1]:
             raise RecordingError(f"{where}: expected {2 * size[0] * size[1]} bytes, found {len(content)}")
@@ -135,6 +130,7 @@ class AzureKinectRecording(Recording):
         item = DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
         if self._left_out is not None:
             refuse_blank(item, where)
+            self._left_out.numbers["depth", stamp] = number
         return item
 
     def info(self) -> RecordingInfo:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from voodoo.errors import RecordingError
 from voodoo.model.camera import Camera
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.order import in_order
 from voodoo.recordings.pictures import decode_color
 from voodoo.stored import read_stored
@@ -70,12 +70,8 @@ def read_pictures(
     for sensor, paths in files.items():
         camera, pictures = cameras[sensor], []
         for path in paths[:: -(-len(paths) // MOST)]:
-            try:
+            with leaving_out(left_out, "pictures of the empty scene"):
                 pictures.append(decode_color(read_stored(path, "a picture"), path, (camera.width, camera.height)))
-            except RecordingError as error:
-                if left_out is None:
-                    raise
-                left_out.add("pictures of the empty scene", error)
         if pictures:
             read[sensor] = tuple(pictures)
     return read

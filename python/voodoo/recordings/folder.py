@@ -13,7 +13,7 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, read_calibration
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import (
@@ -141,19 +141,14 @@ class FolderRecording(Recording):
             while color is not None and upcoming is not None and upcoming[0] <= stamp:
                 measurements.append(_color_image(*upcoming, color))
                 upcoming = next(colors, None)
-            try:
-                measurements.append(self._depth_image(stamp, file))
-            except RecordingError as error:
-                if self._left_out is None:
-                    raise
-                self._left_out.add_error(error)
-                continue
-            if self._left_out is not None:
-                self._left_out.numbers["depth", stamp] = number
-            yield RecordedFrame(stamp, tuple(measurements))
-            measurements.clear()
+            item = None
+            with leaving_out(self._left_out):
+                item = self._depth_image(stamp, file, number)
+            if item is not None:
+                yield RecordedFrame(stamp, (*measurements, item))
+                measurements.clear()
 
-    def _depth_image(self, stamp: float, file: Path) -> DepthImage:
+    def _depth_image(self, stamp: float, file: Path, number: int) -> DepthImage:
         place = self._calibration.depth
         image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
         scale = 1.0 / self._calibration.depth_factor
@@ -161,6 +156,7 @@ class FolderRecording(Recording):
         item = DepthImage("depth", stamp, image, scale, place.camera, place.root_from_sensor)
         if self._left_out is not None:
             refuse_blank(item, file)
+            self._left_out.numbers["depth", stamp] = number
         return item
 
     def info(self) -> RecordingInfo:
@@ -248,12 +244,8 @@ def _listing(
         stamp = written if moved is None else moved
         if number and (moved is None or stamp <= rising[-1][0]):
             reason = "with a repeated stamp" if stamp == rising[-1][0] else "with a stamp before the last one"
-            error = RecordingError(
-                f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}", reason=reason
-            )
-            if left_out is None:
-                raise error
-            left_out.add_error(error)
+            expected = f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}"
+            leave_out(left_out, RecordingError(expected, reason=reason))
         elif number:
             rising.append((stamp, file))
     return rising

@@ -16,7 +16,7 @@ from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, M
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import find_background, no_pictures, pictures_of, read_pictures, scene_words
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import (
     Recording,
@@ -172,13 +172,9 @@ class RosRecording(Recording):
                     self._check_calibration(topic, message)
                 continue
             numbers[topic] += 1
-            try:
+            measured = None
+            with leaving_out(self._left_out):
                 measured = None if message is None else self._measured(topic, message, last, clock)
-            except RecordingError as error:
-                if self._left_out is None:
-                    raise
-                self._left_out.add_error(error)
-                measured = None
             if measured is None:
                 continue
             if self._left_out is not None:
@@ -281,14 +277,9 @@ class RosRecording(Recording):
         )
 
     def _add_transforms(self, message: Message | None, *, static: bool) -> None:
-        try:
-            with reading(self.path, "a readable transform"):
-                if message is not None:
-                    self._tree.add(message, static=static)
-        except RecordingError as error:
-            if self._left_out is None:
-                raise
-            self._left_out.add("transforms that cannot be read", error)
+        with leaving_out(self._left_out, "transforms that cannot be read"), reading(self.path, "a readable transform"):
+            if message is not None:
+                self._tree.add(message, static=static)
 
     def _read_recorders_transforms(self) -> None:
         """Read the transforms of librealsense's recorder: the pose of each stream relative to the common reference."""
@@ -351,21 +342,15 @@ class RosRecording(Recording):
     def _check_calibration(self, topic: str, message: Message) -> None:
         for source in self._sources.values():
             if source.info_topic == topic:
-                try:
-                    camera = camera_of(message, source.topic, f"{self.path}, topic {topic}")
-                except RecordingError as error:
-                    if self._left_out is None:
-                        raise
-                    self._left_out.add("calibrations that cannot be used", error)
-                    continue
-                if source.camera is not None and source.camera.model == "inverse_plumb_bob":
-                    camera = replace(camera, model="inverse_plumb_bob")
-                if camera != source.camera and self._left_out is not None:
-                    self._left_out.add("calibrations unlike the first", f"{self.path}, topic {topic}: {camera}")
-                elif camera != source.camera:
-                    raise RecordingError(
-                        f"{self.path}, topic {topic}: expected one calibration, found {camera} after {source.camera}"
-                    )
+                where = f"{self.path}, topic {topic}"
+                with leaving_out(self._left_out, "calibrations that cannot be used"):
+                    camera = camera_of(message, source.topic, where)
+                    if source.camera is not None and source.camera.model == "inverse_plumb_bob":
+                        camera = replace(camera, model="inverse_plumb_bob")
+                    if camera != source.camera and self._left_out is not None:
+                        self._left_out.add("calibrations unlike the first", f"{where}: {camera}")
+                    elif camera != source.camera:
+                        raise RecordingError(f"{where}: expected one calibration, found {camera} after {source.camera}")
 
     def _measurement(self, source: TopicSource, message: Message, stamp: float, where: str) -> Measurement:
         root_from_sensor = self._tree.lookup(self.root_frame, self._bag.frame_of(source.topic, message), stamp)
