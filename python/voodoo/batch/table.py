@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError
+from voodoo.errors import installed
 from voodoo.export.track import Track
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any] | list[str]]
@@ -97,7 +97,7 @@ def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
     Raises:
         VoodooError: pyarrow is not installed.
     """
-    pa, pq = _pyarrow()
+    pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
     arrays = [
         pa.array([value or None for value in column], pa.string())
         if isinstance(column, list)
@@ -115,7 +115,7 @@ def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
 
 def note_of(file: Any) -> dict[str, Any] | None:  # noqa: ANN401 - a binary file of any kind
     """The note in the footer of a Parquet file; None without one, or if the file is damaged."""
-    _, pq = _pyarrow()
+    pq = _pyarrow("pyarrow.parquet")
     try:
         found = json.loads(pq.read_metadata(file).metadata[NOTE])
     except Exception:  # a damaged file can cause any error in the reader; the file is written again
@@ -123,10 +123,5 @@ def note_of(file: Any) -> dict[str, Any] | None:  # noqa: ANN401 - a binary file
     return found if isinstance(found, dict) else None
 
 
-def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise VoodooError("tables are written by pyarrow: pip install 'voodoo-tracker[batch]'") from None
-    return pyarrow, pyarrow.parquet
+def _pyarrow(module: str = "pyarrow") -> Any:  # noqa: ANN401 - it has no types
+    return installed(module, "tables are written by pyarrow: pip install 'voodoo-tracker[batch]'")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from voodoo.errors import VoodooError
+from voodoo.errors import installed
 
 
 def new_figure(width: float, height: float) -> Any:  # noqa: ANN401 - of a library that may not be there
@@ -13,11 +13,7 @@ def new_figure(width: float, height: float) -> Any:  # noqa: ANN401 - of a libra
     Raises:
         VoodooError: Matplotlib is not installed; says how to install it.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise VoodooError("pictures of an evaluation need Matplotlib: pip install 'voodoo-tracker[eval]'") from None
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    missing = "pictures of an evaluation need Matplotlib: pip install 'voodoo-tracker[eval]'"
+    figure = installed("matplotlib.figure", missing).Figure(figsize=(width, height), layout="constrained")
+    installed("matplotlib.backends.backend_agg", missing).FigureCanvasAgg(figure)
     return figure

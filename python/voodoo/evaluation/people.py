@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.evaluation import metrics
 from voodoo.evaluation.metrics import FloatArray
 from voodoo.export.people_rows import PeopleRows
@@ -311,11 +311,7 @@ def motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
     Raises:
         VoodooError: it is not installed; says how to install it.
     """
-    try:
-        import motmetrics as library
-    except ImportError:
-        raise VoodooError("several people are judged by py-motmetrics: pip install 'voodoo-tracker[eval]'") from None
-    return library
+    return installed("motmetrics", "several people are judged by py-motmetrics: pip install 'voodoo-tracker[eval]'")
 
 
 def together(scores: Sequence[PeopleScore]) -> PeopleScore:

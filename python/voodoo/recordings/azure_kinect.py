@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.errors import CameraError, RecordingError, installed, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
@@ -146,11 +146,8 @@ class AzureKinectRecording(Recording):
 
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV
-    try:
-        import av
-    except ImportError:
-        advice = "which PyAV reads, found no PyAV: pip install 'voodoo-tracker[azure]'"
-        raise RecordingError(f"{path}: expected {_EXPECTED}, {advice}") from None
+    missing = f"{path}: expected {_EXPECTED}, which PyAV reads, found no PyAV: pip install 'voodoo-tracker[azure]'"
+    av = installed("av", missing, error=RecordingError)
     # Another demuxer might follow links in the file.
     return av.open(f"file:{path.absolute()}", format="matroska")
 

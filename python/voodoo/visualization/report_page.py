@@ -16,7 +16,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.export.skeleton import mean_interval
 from voodoo.export.track import FloatArray, Track
 
@@ -49,12 +49,7 @@ def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = N
     Raises:
         VoodooError: Plotly is not installed, stamps that do not increase, or a film that cannot be read.
     """
-    try:
-        import plotly  # noqa: F401
-    except ImportError:
-        raise VoodooError(
-            "a report needs Plotly, which is not installed: pip install 'voodoo-tracker[report]'"
-        ) from None
+    installed("plotly", "a report needs Plotly, which is not installed: pip install 'voodoo-tracker[report]'")
     parts = [f"<!DOCTYPE html><html lang=en><meta charset=utf-8><title>{escape(name)}</title>"]
     parts += [f"<body style='font:15px sans-serif;margin:1.5em'><h1>{escape(name)}</h1>"]
     if film is not None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.export.ros2 import STORE
 
 _BASE = {
@@ -27,13 +27,8 @@ def idl() -> Any:  # noqa: ANN401 - a module that may not be installed
     Raises:
         VoodooError: it is not installed.
     """
-    try:
-        import cyclonedds.idl
-    except ImportError as error:
-        raise VoodooError(
-            "ROS 2 topics need Cyclone DDS, which is not installed: pip install 'voodoo-tracker[ros2]'"
-        ) from error
-    return cyclonedds.idl
+    missing = "ROS 2 topics need Cyclone DDS, which is not installed: pip install 'voodoo-tracker[ros2]'"
+    return installed("cyclonedds.idl", missing)
 
 
 def dds_name(kind: str) -> str:
