@@ -41,17 +41,7 @@ class FirstFrame(Recording):
             SensorInfo(sensor, kind, self.root_frame, 1, float("nan"), "live")
             for sensor, kind in self._live.kinds.items()
         )
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="live",
-            frames=0,
-            start_stamp=self._frame.stamp,
-            duration=0.0,
-            rate_hz=float("nan"),
-            root_frame=self.root_frame,
-            sensors=sensors,
-        )
+        return self._described("live", sensors, start=self._frame.stamp, duration=0.0)
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""

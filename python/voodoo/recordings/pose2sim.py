@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     Reference,
     SensorInfo,
-    Start,
     mean_rate,
     number_option,
 )
@@ -107,7 +106,7 @@ class Pose2SimRecording(Recording):
         self._files, self._notes = _rows_of(path, self._folders)
         self._check(layout)
         self.reference = None if bare else read_triangulation(path, self.rate)
-        self.start = None if self.reference is None else start_of(self.reference)
+        self.start = None if self.reference is None else self.reference.as_start()
 
     def __len__(self) -> int:
         """Number of images of each camera."""
@@ -288,13 +287,3 @@ def read_triangulation(path: Path, rate: float) -> Reference | None:
     names, positions = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP).of(SITES)
     # Rows are images; the file's own time starts at 1 / rate for image 0.
     return Reference(np.arange(len(positions)) / rate, names, positions, exact=False)
-
-
-def start_of(reference: Reference) -> Start:
-    """The first row of a reference as a start."""
-    joints = {}
-    for name, position in zip(reference.names, reference.positions[0], strict=True):
-        if np.isfinite(position).all():
-            x, y, z = (float(value) for value in position)
-            joints[name] = (x, y, z)
-    return Start(joints=joints)

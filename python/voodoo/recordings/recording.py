@@ -45,6 +45,15 @@ class Reference:
     positions: FloatArray
     exact: bool
 
+    def as_start(self, *, without: tuple[str, ...] = ()) -> Start:
+        """The first row as a start, without the joints whose names end in one of these words."""
+        joints = {}
+        for name, position in zip(self.names, self.positions[0], strict=True):
+            if not name.endswith(without) and np.isfinite(position).all():
+                x, y, z = (float(value) for value in position)
+                joints[name] = (x, y, z)
+        return Start(joints=joints)
+
     def __repr__(self) -> str:
         """One line with the counts."""
         kind = "exact" if self.exact else "estimated"

@@ -15,7 +15,7 @@ from voodoo.errors import RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
-from voodoo.recordings.empty_scene import find_background, no_pictures, pictures_of, read_pictures, scene_words
+from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import (
@@ -140,9 +140,7 @@ class RosRecording(Recording):
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         self._read_beside(place, bare=bare)
-        self._background = find_background(place) if background is None else Path(background)
-        if background is not None and not self._background_files():
-            raise no_pictures(background, self._names_of_cameras())
+        self._scene = EmptyScene(place, background, self._names_of_cameras())
 
     def __len__(self) -> int:
         """Number of messages on the topic that defines the frames."""
@@ -225,7 +223,7 @@ class RosRecording(Recording):
             start=self._driver.first_stamp,
             duration=duration,
             unused=tuple(self._unused),
-            notes=(*self.assumed, *scene_words(self._background, self._background_files())),
+            notes=(*self.assumed, *self._scene.words),
         )
 
     def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
@@ -312,13 +310,10 @@ class RosRecording(Recording):
             if s.kind == "color"
         }
 
-    def _background_files(self) -> dict[str, tuple[Path, ...]]:
-        return {} if self._background is None else pictures_of(self._background, self._names_of_cameras())
-
     def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
         """See Recording."""
         cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
-        return read_pictures(self._background_files(), cameras, left_out=self._left_out)
+        return self._scene.read(cameras, left_out=self._left_out)
 
     def _connected(self, source: TopicSource, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver

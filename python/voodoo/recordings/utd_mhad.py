@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     Reference,
     SensorInfo,
-    Start,
     mean_rate,
 )
 
@@ -76,7 +75,8 @@ class UtdMhadRecording(Recording):
         self._depth: npt.NDArray[np.uint16] = depth
         skeleton = path.parent.parent / "Skeleton" / f"{self.name}_skeleton.mat"
         self.reference = _read_skeleton(skeleton, len(self)) if not bare and skeleton.is_file() else None
-        self.start = None if self.reference is None else _start(self.reference)
+        # A body without feet has no toes.
+        self.start = None if self.reference is None else self.reference.as_start(without=("_toe",))
 
     def __len__(self) -> int:
         """Number of depth images."""
@@ -125,13 +125,3 @@ def _read_skeleton(path: Path, frames: int) -> Reference:
     positions = skeleton[kept].transpose(2, 0, 1).astype(np.float64) * (-1.0, -1.0, 1.0)
     positions[(positions == 0.0).all(axis=2)] = np.nan  # the SDK's "not tracked"
     return Reference(np.arange(frames) / RATE_HZ, NAMES, positions, exact=False)
-
-
-def _start(reference: Reference) -> Start:
-    """First frame of the reference without the toes, which a body without feet does not have."""
-    joints = {}
-    for name, position in zip(reference.names, reference.positions[0], strict=True):
-        if not name.endswith("_toe") and np.isfinite(position).all():
-            x, y, z = (float(value) for value in position)
-            joints[name] = (x, y, z)
-    return Start(joints=joints)
