@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.errors import installed
+from voodoo.errors import VoodooError
 from voodoo.export.human_frames import frame_poses, on_parents
 from voodoo.export.skeleton import Skeleton, skeleton
 from voodoo.export.track import Track
@@ -32,10 +32,15 @@ def library(wanted: object) -> ModuleType:
     Raises:
         VoodooError: it is not installed; `wanted` needs it.
     """
-    missing = f"{wanted}: expected foxglove-sdk, found none; pip install 'voodoo-tracker[foxglove]'"
-    for part in ("channels", "messages"):
-        installed(f"foxglove.{part}", missing)
-    return installed("foxglove", missing)
+    try:
+        import foxglove
+        import foxglove.channels
+        import foxglove.messages
+    except ImportError:
+        raise VoodooError(
+            f"{wanted}: expected foxglove-sdk, found none; pip install 'voodoo-tracker[foxglove]'"
+        ) from None
+    return foxglove
 
 
 class Channels:
