@@ -95,9 +95,7 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
     """Compare errors with their standard deviations; None if no joint has both."""
     if not found:
         return None
-    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
-    measured = np.concatenate([each.measured for each in found])
-    known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    errors, sigma, measured, known = _together(found)
     if not known.any():
         return None
     coverages = [
@@ -127,6 +125,13 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
         kept_m=float(size[np.argsort(total, kind="stable")[:kept]].mean()),
         oracle_m=float(np.sort(size)[:kept].mean()),
     )
+
+
+def _together(found: Sequence[Deviations]) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
+    """Errors, standard deviations, whether the limb is measured, and which joints (F, 12) have both."""
+    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
+    known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    return errors, sigma, np.concatenate([each.measured for each in found]), known
 
 
 def _coverage(name: str, errors: FloatArray, sigma: FloatArray) -> Coverage:
@@ -166,9 +171,7 @@ def calibration_markdown(calibration: UncertaintyCalibration, against: str) -> s
 
 def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     """Plot the cumulative distribution of normalized errors, and error over standard deviation."""
-    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
-    measured = np.concatenate([each.measured for each in found])
-    known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    errors, sigma, measured, known = _together(found)
     figure = new_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)
     steps = np.linspace(0.0, 4.0, 81)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
 from voodoo.evaluation.people import ABSENT_S, IN_VIEW, JOINTS_IN_VIEW, MATCH_M, PeopleScore, together
+from voodoo.evaluation.tables import write_table
 from voodoo.whole import appearing_whole
 
 _HEADER = (
@@ -53,12 +53,8 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     table, text = folder / "people.csv", folder / "people.md"
-    names = [item.name for item in fields(PeopleScore)]
-    with appearing_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*names, *DERIVED])
-        for score in scores:
-            writer.writerow([_cell(getattr(score, name)) for name in (*names, *DERIVED)])
+    names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
+    write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
     with appearing_whole(text) as part:
         part.write_text(people_markdown(scores), encoding="utf-8")
     return [table, text]
@@ -93,9 +89,3 @@ def _row(cells: Sequence[str]) -> str:
 
 def _word(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6f}" if math.isfinite(value) else ""
-    return str(value)

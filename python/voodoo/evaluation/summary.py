@@ -12,6 +12,8 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.score import Score
 
 CLASSES = (0, 1, 2)
+KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
+"""What a sequence is compared with, by `Score.exact`."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,8 @@ SUMMARY = (*MEANS, *(f"{name}_together" for name in TOGETHER))
 
 def summarize(scores: Sequence[Score]) -> list[Summary]:
     """One summary for each kind of comparison; failures have the kind "no reference", unless their kind is known."""
-    kinds = {True: "exact truth", False: "reference skeleton", None: "no reference"}
     summaries = []
-    for exact, kind in kinds.items():
+    for exact, kind in KINDS.items():
         group = [score for score in scores if score.exact is exact]
         done = [score for score in group if not score.failure]
         if group:
