@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, a_path, columns_in, reading
+from voodoo.errors import VoodooError, a_path, reading
 from voodoo.export.collected import angle_sigmas_of, angles_of_estimates, covariances_of
-from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
+from voodoo.export.people_rows import PeopleRows, cells, header_of, is_people_file, read_cells, read_rows
 from voodoo.export.result_file import check_suffix
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
@@ -30,12 +30,15 @@ FORMAT_VERSION = 2
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
 BODIES, BODY_OF = "bodies", "body_of"
 """Arrays of a part that are not those of a result: texts of bodies, and the persons whose they are."""
+_FIRST = ("stamp_s", "status", "residual_m")
+"""The first columns of .csv."""
 _STATUS = "_status"
 """Suffix of the name of a limb's column in .csv."""
 _SIGMA = "_sigma_m"
 """Suffix of the name of a joint's column in .csv."""
 _UNKNOWN = ("angle_sigma", "covariance", "root_covariance")
 """Arrays that may be unknown in frames with a pose."""
+_WORDS = ("status", "joint_names", "limb_names", "angle_names")
 _BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
 
 
@@ -85,14 +88,10 @@ class Track:
     def __post_init__(self) -> None:
         """Check that the arrays are consistent, and that all frames with a pose status have a pose."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
-        if not self.angle_names:
-            object.__setattr__(self, "angles", np.empty((frames, 0)))
-        if not self.covariance.size:
-            object.__setattr__(self, "covariance", np.empty((frames, 0, 3, 3)))
-        if not self.angle_sigma.size:
-            object.__setattr__(self, "angle_sigma", np.empty((frames, 0)))
-        if not self.root_covariance.size:
-            object.__setattr__(self, "root_covariance", np.full((frames, 6, 6), np.nan))
+        missing = {"covariance": (0, 3, 3), "angle_sigma": (0,), "root_covariance": (6, 6), "angles": (0,)}
+        for name, size in missing.items():
+            if not (self.angle_names if name == "angles" else getattr(self, name).size):
+                object.__setattr__(self, name, np.full((frames, *size), np.nan))
         if len(self.status) != frames:
             raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
         for limb, words in self.limb_status.items():
@@ -270,37 +269,9 @@ class Track:
 
     @classmethod
     def _read_csv(cls, path: Path) -> Track:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-        first = 3
-        while first + 3 <= len(header) and header[first : first + 3] == [
-            f"{header[first][:-2]}_{axis}" for axis in "xyz"
-        ]:
-            first += 3
-        last = next((i for i in range(first, len(header)) if not header[i].endswith("_rad")), len(header))
-        names = tuple(cell.removesuffix("_x") for cell in header[3:first:3])
-        angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:last])
-        # Later versions add columns behind these, which are ignored.
-        limbs = {cell.removesuffix(_STATUS): i for i, cell in enumerate(header) if i >= last and cell.endswith(_STATUS)}
-        if header[:last] != _header(names, angle_names) or len(set(header)) != len(header):
-            raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {columns_in(header)}")
-        for line, row in enumerate(rows, start=2):
-            if len(row) != len(header):
-                raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")
-        joints = np.array([[float(cell or "nan") for cell in row[3:first]] for row in rows], dtype=np.float64)
-        angles = np.array([[float(cell or "nan") for cell in row[first:last]] for row in rows], dtype=np.float64)
-        return cls(
-            angle_names=angle_names,
-            angles=angles.reshape(len(rows), len(angle_names)),
-            stamps=np.array([float(row[0]) for row in rows], dtype=np.float64),
-            status=tuple(row[1] for row in rows),
-            residual=np.array([float(row[2] or "nan") for row in rows], dtype=np.float64),
-            joint_names=names,
-            joints=joints.reshape(len(rows), len(names), 3),
-            limb_names=(),
-            world_from_limb=np.empty((len(rows), 0, 4, 4)),
-            limb_status={limb: tuple(row[column] for row in rows) for limb, column in limbs.items()},
-        )
+        rows, others = read_cells(path, _FIRST, more=True)
+        limbs = {name.removesuffix(_STATUS): words for name, words in others.items() if name.endswith(_STATUS)}
+        return replace(track_of_rows(rows, 1), limb_status=limbs)
 
     @classmethod
     def _read_npz(cls, path: Path) -> Track:
@@ -316,7 +287,7 @@ def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
             if not number:
                 limbs = [f"{limb}{_STATUS}" for limb in part.limb_status]
                 sigmas_of = [f"{name}{_SIGMA}" for name in part.joint_names if sure]
-                writer.writerow(_header(part.joint_names, part.angle_names) + limbs + sigmas_of)
+                writer.writerow(header_of(_FIRST, part.joint_names, part.angle_names) + limbs + sigmas_of)
             words = zip(*part.limb_status.values(), strict=True) if limbs else [()] * len(part)
             sigmas = np.full((len(part), len(sigmas_of)), np.nan)
             if part.covariance.size:
@@ -325,9 +296,8 @@ def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
                 part.stamps, part.status, part.residual, part.joints, part.angles, words, sigmas, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
-                row = [repr(float(stamp)), status]
-                row += [_cell(value) for value in (residual, *joints.ravel(), *angles)]
-                writer.writerow([*row, *support, *(_cell(value) for value in sigma)])
+                row = [repr(float(stamp)), status, *cells((residual, *joints.ravel(), *angles))]
+                writer.writerow([*row, *support, *cells(sigma)])
 
 
 def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
@@ -368,9 +338,8 @@ def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Array
 
 def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
     """All data of a track as arrays of numbers and words, for .npz."""
-    words = ("status", "joint_names", "limb_names", "angle_names")
     limbs = np.array(list(track.limb_status.values()), dtype=np.str_)
-    return {name: np.array(getattr(track, name), dtype=np.str_) for name in words} | {
+    return {name: np.array(getattr(track, name), dtype=np.str_) for name in _WORDS} | {
         **{name: getattr(track, name) for name in _BY_FRAME},
         "format_version": np.array(FORMAT_VERSION),
         "limb_status_names": np.array(list(track.limb_status), dtype=np.str_),
@@ -394,22 +363,9 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         raise VoodooError(
             f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
         )
-    return Track(
-        stamps=content["stamps"],
-        status=tuple(str(value) for value in content["status"]),
-        residual=content["residual"],
-        joint_names=tuple(str(value) for value in content["joint_names"]),
-        joints=content["joints"],
-        limb_names=tuple(str(value) for value in content["limb_names"]),
-        world_from_limb=content["world_from_limb"],
-        # Files of earlier versions have no angles.
-        angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
-        angles=content["angles"] if "angles" in content else np.empty((0, 0)),
-        covariance=content.get("covariance", np.empty((0, 0, 3, 3))),
-        root_covariance=content.get("root_covariance", np.empty((0, 6, 6))),
-        angle_sigma=content.get("angle_sigma", np.empty((0, 0))),
-        **_optional_fields(content),
-    )
+    words = {name: tuple(map(str, content[name])) for name in _WORDS if name in content}
+    arrays = {name: content[name] for name in _BY_FRAME if name in content}
+    return Track(**words, **arrays, **_optional_fields(content))  # type: ignore[arg-type]
 
 
 def track_of_rows(rows: PeopleRows, person: int) -> Track:
@@ -463,13 +419,3 @@ def _optional_fields(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
         "limb_status": {str(limb): tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)},
         "left_out": {str(reason): int(count) for reason, count in zip(reasons, counts, strict=True)},
     }
-
-
-def _cell(value: float) -> str:
-    """Text of a number; empty if unknown."""
-    return "" if np.isnan(value) else f"{value:.6f}"
-
-
-def _header(names: Sequence[str], angle_names: Sequence[str] = ()) -> list[str]:
-    places = [f"{name}_{axis}" for name in names for axis in "xyz"]
-    return ["stamp_s", "status", "residual_m", *places, *(f"{name}_rad" for name in angle_names)]
