@@ -110,6 +110,21 @@ def reading(source: object, expected: str, *, error: type[VoodooError] = Recordi
         raise error(f"{source}: expected {expected}, found damage: {type(cause).__name__}: {found}") from cause
 
 
+@contextmanager
+def naming(where: object, of: type[VoodooError], *, error: type[VoodooError] | None = None) -> Iterator[None]:
+    """Errors raised inside begin with where they occurred.
+
+    Args:
+        where: file, key or argument.
+        of: class of these errors.
+        error: class that they become; None: the same.
+    """
+    try:
+        yield
+    except of as cause:
+        raise (error or of)(f"{where}: {cause}") from cause
+
+
 def installed(library: str, missing: str, *, error: type[VoodooError] = VoodooError) -> ModuleType:
     """A library that is optional.
 

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError, columns_in, reading
+from voodoo.errors import VoodooError, columns_in, naming, reading
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import stored_arrays
 
@@ -70,11 +70,8 @@ def read_rows(path: Path) -> PeopleRows:
         VoodooError: another header, an invalid cell, decreasing stamps, or two rows of a person at one stamp.
     """
     check_stored(path, "a result of voodoo track --people", most=MOST_RECORDED)
-    with reading(path, "a result of voodoo track --people"):
-        try:
-            return read_cells(path, FIRST)[0]
-        except VoodooError as error:
-            raise VoodooError(f"{path}: {error}") from error
+    with reading(path, "a result of voodoo track --people"), naming(path, VoodooError):
+        return read_cells(path, FIRST)[0]
 
 
 def read_cells(

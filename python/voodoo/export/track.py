@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, a_path, reading
+from voodoo.errors import VoodooError, a_path, naming, reading
 from voodoo.export.collected import angle_sigmas_of, angles_of_estimates, covariances_of
 from voodoo.export.people_rows import PeopleRows, cells, header_of, is_people_file, read_cells, read_rows
 from voodoo.export.result_file import check_suffix
@@ -261,11 +261,8 @@ class Track:
         check_suffix(path)
         if is_people_file(path):
             return _only_person(path)
-        with reading(path, "a result of voodoo track"):
-            try:
-                return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
-            except VoodooError as error:
-                raise VoodooError(f"{path}: {error}") from error
+        with reading(path, "a result of voodoo track"), naming(path, VoodooError):
+            return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
 
     @classmethod
     def _read_csv(cls, path: Path) -> Track:

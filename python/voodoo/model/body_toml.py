@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
-from voodoo.errors import BodyError
-from voodoo.model.joint import Joint, Strict, Vector, problems
+from voodoo.errors import BodyError, naming
+from voodoo.model.joint import Joint, Strict, Vector, valid
 from voodoo.model.toml_io import parse_toml
 
 
@@ -48,24 +48,18 @@ def core_body(text: str, *, source: str) -> _core.Body:
         BodyError: names the key, what was expected and what was found.
     """
     values = parse_toml(text, source=source, error=BodyError)
-    try:
+    with valid(source, BodyError, values):
         spec = _BodySpec.model_validate(values)
-    except ValidationError as error:
-        raise BodyError(f"{source}: {problems(values, error)}") from None
     limbs = []
     for limb in spec.limbs:
         shape = limb.shape
-        try:
+        with naming(f"{source}: limbs.{limb.name}.shape", BodyError):
             cylinder = TaperedEllipticCylinder(shape.length, shape.a0, shape.b0, shape.a1, shape.b1)
-        except BodyError as error:
-            raise BodyError(f"{source}: limbs.{limb.name}.shape: {error}") from None
         joint = None if limb.joint is None else limb.joint.parts()
         limbs.append((limb.name, limb.parent, cylinder, joint, limb.match_caps))
     sites = [(site.name, site.limb, site.position) for site in spec.sites]
-    try:
+    with naming(source, BodyError):
         return _core.Body(spec.name, limbs, sites)
-    except BodyError as error:
-        raise BodyError(f"{source}: {error}") from None
 
 
 def body_text(body: _core.Body) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from voodoo._core import Estimate
 from voodoo.config import Config
@@ -17,7 +17,7 @@ from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.joint import expectation, short
+from voodoo.model.joint import short, valid
 from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
@@ -70,10 +70,8 @@ class Init(BaseModel):
             VoodooError: not readable, not JSON, or not of that form; names the file and the key.
         """
         content = read_stored(a_path(path, error=VoodooError), "a JSON file", most=MOST_METADATA)
-        try:
+        with valid(path, VoodooError, most=1):
             return cls.model_validate_json(content)
-        except ValidationError as error:
-            raise VoodooError(f"{path}: {_first_problem(error)}") from error
 
     def to_json(self) -> str:
         """JSON text that `load` reads, one joint per line."""
@@ -110,10 +108,8 @@ class Init(BaseModel):
         """
         if recording.start is None:
             return None
-        try:
+        with valid(f"{recording.name}, start", VoodooError, most=1):
             return cls.model_validate(dict(recording.start))
-        except ValidationError as error:
-            raise VoodooError(f"{recording.name}, start: {_first_problem(error)}") from error
 
 
 Automatic: TypeAlias = Literal["auto"]
@@ -291,10 +287,3 @@ def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] |
             '{"height_m": 1.76, "joints": {"l_shoulder": [x, y, z], "r_hip": [x, y, z], ...}} '
             f"in meters in the frame {recording.root_frame!r}"
         )
-
-
-def _first_problem(error: ValidationError) -> str:
-    """The first error of pydantic as "key: what was expected, found what"."""
-    problem = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in problem["loc"])
-    return f"{key}: {expectation(problem)}" if key else expectation(problem)

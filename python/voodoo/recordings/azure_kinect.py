@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError, installed, reading
+from voodoo.errors import CameraError, RecordingError, installed, naming, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
@@ -183,14 +183,12 @@ def _camera(path: Path, cameras: dict[str, Any], purpose: str, mode: str) -> Cam
     with reading(f"{path}, calibration", f"{purpose} with 14 parameters of its lens"):
         numbers = [float(number) for number in cameras[purpose]["Intrinsics"]["ModelParameters"]]
         cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = numbers
-        try:
+        with naming(f"{path}, calibration", CameraError, error=RecordingError):
             # The device's pixel coordinates begin at the corner of the first pixel, ours in its center.
             return Camera(
                 width, height, fx * wide, fy * high, cx * wide - left - 0.5, cy * high - top - 0.5,
                 (k1, k2, p1, p2, k3, k4, k5, k6), "rational_polynomial",
             )  # fmt: skip
-        except CameraError as error:
-            raise RecordingError(f"{path}, calibration: {error}") from error
 
 
 def _pose(path: Path, cameras: dict[str, Any], purpose: str) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError
+from voodoo.errors import CameraError, RecordingError, naming
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
@@ -127,14 +127,12 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     distortion = table.get("distortion", [])
     if not isinstance(distortion, list):
         raise RecordingError(f"{where}: distortion: expected a list of numbers, found {short(distortion)}")
-    try:
+    with naming(where, CameraError, error=RecordingError):
         camera = Camera(
             **{key: table[key] for key in _CAMERA_KEYS},
             distortion=tuple(distortion),
             model=table.get("model", "plumb_bob"),
         )
-    except CameraError as error:
-        raise RecordingError(f"{where}: {error}") from error
     frame = table.get("sensor_frame", f"camera_{kind}_optical_frame")
     if not isinstance(frame, str):
         raise RecordingError(f"{where}: sensor_frame: expected a name, found {short(frame)}")

@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError
+from voodoo.errors import CameraError, RecordingError, naming
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
@@ -73,7 +73,7 @@ def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
         raise RecordingError(f"{where}, matrix: expected no skew and a last row 0 0 1, found {matrix.tolist()}")
     coefficients = tuple(float(value) for value in _numbers(where, table, "distortions", None))
     fisheye = table.get("fisheye", False)
-    try:
+    with naming(where, CameraError, error=RecordingError):
         camera = Camera(
             width=round(float(size[0])),
             height=round(float(size[1])),
@@ -84,8 +84,6 @@ def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
             distortion=coefficients,
             model="equidistant" if fisheye is True else "plumb_bob" if len(coefficients) < 8 else "rational_polynomial",
         )
-    except CameraError as error:
-        raise RecordingError(f"{where}: {error}") from error
     turn = _numbers(where, table, "rotation", None)
     if turn.shape != (3, 3):
         turn = np.asarray(cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))[0], dtype=np.float64)

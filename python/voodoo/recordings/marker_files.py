@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from voodoo.errors import RecordingError, shortened
 from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
-from voodoo.model.joint import short
+from voodoo.model.joint import valid
 from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
@@ -65,12 +65,8 @@ class MarkerMap(BaseModel):
             RecordingError: unreadable or of another format; names file and key.
         """
         tables = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
-        try:
+        with valid(path, RecordingError, most=1):
             return cls.model_validate(tables)
-        except ValidationError as error:
-            problem = error.errors(include_url=False)[0]
-            key = ".".join(str(part) for part in problem["loc"])
-            raise RecordingError(f"{path}: {key}: {problem['msg']}, found {short(problem['input'])}") from error
 
     def worn(self) -> dict[str, tuple[str, tuple[float, float, float]]]:
         """The markers on limbs, in the format of voodoo.sensors.markers.body_with_markers."""

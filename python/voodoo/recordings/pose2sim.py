@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.errors import MeasurementError, RecordingError
+from voodoo.errors import MeasurementError, RecordingError, naming
 from voodoo.measurements import KeypointImage, RecordedFrame
 from voodoo.recordings.camera_files import read_camera_toml, tables_of
 from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
@@ -82,10 +82,8 @@ class Pose2SimRecording(Recording):
         self.name = path.name
         self.root_frame = FRAME
         self._left_out = left_out
-        try:
+        with naming(path, MeasurementError, error=RecordingError):
             layout_of(layout or "body25b")
-        except MeasurementError as error:
-            raise RecordingError(f"{path}: {error}") from error
         self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
         scale = number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
         placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)

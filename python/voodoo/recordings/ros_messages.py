@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png
@@ -97,12 +97,10 @@ def camera_of(info: Message, topic: str, source: str) -> Camera:
             f"and a region of interest at ({region.x_offset}, {region.y_offset})"
         )
     rectified = "rect" in base_topic(topic).rsplit("/", 1)[-1]
-    try:
+    with naming(source, CameraError, error=RecordingError):
         return Camera.from_camera_info(
             width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
         )
-    except CameraError as error:
-        raise RecordingError(f"{source}: {error}") from error
 
 
 def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import CameraError, VoodooError
+from voodoo.errors import CameraError, VoodooError, naming
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Faults
 from voodoo.live.source import Arrival, Source, SourceGone
@@ -216,7 +216,7 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
     if lens not in _LENSES:
         raise VoodooError(f"{source}: expected a lens of {', '.join(_LENSES)}, found {lens}")
     model = _LENSES[lens]
-    try:
+    with naming(source, CameraError, error=VoodooError):
         return Camera(
             intrinsics.width,
             intrinsics.height,
@@ -227,8 +227,6 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
             tuple(coefficients[:4] if model == "equidistant" else coefficients),
             model,  # type: ignore[arg-type]
         )
-    except CameraError as error:
-        raise VoodooError(f"{source}: {error}") from error
 
 
 def _pose(extrinsics: Any) -> FloatArray:  # noqa: ANN401
