@@ -181,17 +181,13 @@ class Track:
         limb_names: tuple[str, ...] = (
             tuple(posed[0].world_from_limb) if posed else () if body is None else body.limb_names
         )
-        nowhere, unposed = np.full((len(joint_names), 3), np.nan), np.full((len(limb_names), 4, 4), np.nan)
-        joints, poses = [], []
+        joints = np.full((len(estimates), len(joint_names), 3), np.nan)
+        poses = np.full((len(estimates), len(limb_names), 4, 4), np.nan)
         for index, estimate in enumerate(estimates):
-            if str(estimate.status) == SEARCHING:
-                joints.append(nowhere)
-                poses.append(unposed)
-                continue
-            if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
-                raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
-            joints.append(np.array(list(estimate.joints.values()), dtype=np.float64))
-            poses.append(np.array(list(estimate.world_from_limb.values()), dtype=np.float64))
+            if str(estimate.status) != SEARCHING:
+                if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
+                    raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
+                joints[index], poses[index] = estimate.joint_positions, estimate.limb_poses
         angle_names, angles = angles_of_estimates(estimates, body)
         covariance, root_covariance = covariances_of(estimates, joint_names, limb_names)
         return cls(
@@ -204,9 +200,9 @@ class Track:
             status=tuple(str(estimate.status) for estimate in estimates),
             residual=np.array([estimate.residual for estimate in estimates], dtype=np.float64),
             joint_names=joint_names,
-            joints=np.array(joints, dtype=np.float64),
+            joints=joints,
             limb_names=limb_names,
-            world_from_limb=np.array(poses, dtype=np.float64),
+            world_from_limb=poses,
             limb_status={
                 limb: tuple(str(each.limb_status[limb]) if each.limb_status else "" for each in estimates)
                 for limb in limb_names
