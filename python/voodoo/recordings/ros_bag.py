@@ -186,7 +186,7 @@ class Bag:
     def _open(self) -> Iterator[BagFile]:
         with self._naming():
             with reading(self.path, "a complete ROS bag"):
-                reader: BagFile = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
+                reader = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
                 reader.open()
             try:
                 yield reader

@@ -192,7 +192,7 @@ class SqliteFile:
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """See BagFile.messages; those in a damaged part of the file are errors."""
+        """See bag_file; those in a damaged part of the file are errors."""
         wanted = {item.id: item for item in connections}
         places = ",".join("?" * len(wanted))
         rows = self._rows(
