@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
-from voodoo.evaluation.figure import new_figure
+from voodoo.evaluation.figure import new_figure, save_figure
 from voodoo.evaluation.metrics import mean_or_nan
-from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
@@ -202,7 +201,4 @@ def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     right.plot(reach, reach, color="#333333", linestyle="--", linewidth=1.0)
     right.set(xscale="log", yscale="log", xlabel="standard deviation [cm]", ylabel="root mean square error [cm]")
     right.legend(frameon=False, fontsize=8)
-    for axes in (left, right):
-        axes.spines[["top", "right"]].set_visible(False)
-    with appearing_whole(path) as place:
-        figure.savefig(place, dpi=130)
+    save_figure(figure, path)
