@@ -24,7 +24,6 @@ class FirstFrame(Recording):
         self.name = live.sources[0].name
         self.path = Path(self.name)
         self.root_frame = live.root_frame
-        self.start, self.reference = None, None
         self._live, self._frame = live, frame
 
     def __len__(self) -> int:

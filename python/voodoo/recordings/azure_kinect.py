@@ -60,7 +60,6 @@ class AzureKinectRecording(Recording):
     def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
         """Read the tracks, the calibration and the stamps; see the class."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
-        self.start, self.reference = None, None
         self._left_out = left_out
         with reading(path, _EXPECTED), _opened(path) as film:
             tags = {word: value for word, value in film.metadata.items() if word.startswith("K4A_")}

@@ -108,7 +108,6 @@ class FolderRecording(Recording):
         file = path / "calibration.toml" if calibration is None else Path(calibration)
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
-        self.start, self.reference = None, None
         if not bare:
             self._read_beside()
         self._color: list[tuple[float, Path]] = []

@@ -113,7 +113,6 @@ class MarkerRecording(Recording):
         first = {name: at for name, at in self._at(0).items() if name not in self.map.limbs}
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
         self.start = None if bare or not first else start
-        self.reference = None
         doubts = self._doubts() if self.map.y_up is None else ()
         self.assumed = (*content.remarks, *half_told, *self._unnamed(content.names), *doubts)
 

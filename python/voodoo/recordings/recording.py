@@ -148,8 +148,8 @@ class Recording(ABC):
     path: Path
     name: str
     root_frame: str
-    start: Start | None
-    reference: Reference | None
+    start: Start | None = None
+    reference: Reference | None = None
     people: PeopleTruth | None = None
     complete: bool = False
 

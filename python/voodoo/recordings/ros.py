@@ -238,7 +238,6 @@ class RosRecording(Recording):
 
     def _read_beside(self, place: Path, *, bare: bool) -> None:
         """Read reference and start from the files beside the bag; if damage is left out, files that do not fit are only noted."""
-        self.reference, self.start, self.people = None, None, None
         for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
             file = find_beside(place, name)
             try:

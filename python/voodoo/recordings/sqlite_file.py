@@ -146,9 +146,6 @@ class SqliteFile:
             raise ValueError("expected the tables messages and topics, found none")
         self._tables = tables
 
-    def _columns(self, table: str) -> set[str]:
-        return {row[1] for row in self._rows("SELECT * FROM pragma_table_xinfo(?)", (table,))}
-
     def _read_topics(self) -> None:
         definitions: dict[str, MessageDefinition] = {}
         if "message_definitions" in self._tables:

@@ -147,19 +147,21 @@ class TransformTree:
 
     def covers(self, root: str, frame: str, stamp: float) -> bool:
         """Whether every changing transform between two frames is known up to a stamp [s]; False if there is no chain."""
-        try:
-            edges = [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
-        except RecordingError:
-            return False
-        return all(edge.constant or (bool(edge.stamps) and edge.stamps[-1] >= stamp) for edge in edges)
+        edges = self._chain(root, frame)
+        return edges is not None and all(
+            edge.constant or (bool(edge.stamps) and edge.stamps[-1] >= stamp) for edge in edges
+        )
 
     def reaches(self, root: str, frame: str) -> bool:
         """Whether transforms lead from `root` to `frame`."""
+        return self._chain(root, frame) is not None
+
+    def _chain(self, root: str, frame: str) -> list[_Edge] | None:
+        """The transforms between two frames; None if they are not connected."""
         try:
-            self.path(root, frame)
+            return [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
         except RecordingError:
-            return False
-        return True
+            return None
 
     def path(self, root: str, frame: str) -> list[str]:
         """Frames from `root` to `frame`, both included.
@@ -186,20 +188,10 @@ class TransformTree:
             result.append(previous[result[-1]])
         return result[::-1]
 
-    def constant(self, root: str, frame: str) -> bool:
-        """Whether root_from_frame is constant."""
-        path = self.path(root, frame)
-        return all(self._edge(a, b)[0].constant for a, b in pairwise(path))
-
     def moves(self, root: str, frame: str) -> bool:
         """Whether a frame moves in another one by more than the drift of a standing robot; False if not connected."""
-        if not {root, frame} <= self._neighbors.keys():
-            return False
-        try:
-            path = self.path(root, frame)
-        except RecordingError:
-            return False
-        return any(self._edge(a, b)[0].moves() for a, b in pairwise(path))
+        edges = self._chain(root, frame)
+        return edges is not None and any(edge.moves() for edge in edges)
 
     def lookup(self, root: str, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) at `stamp`.

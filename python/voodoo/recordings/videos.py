@@ -98,7 +98,6 @@ class VideosRecording(Recording):
         self._read_beside(bare=bare)
 
     def _read_beside(self, *, bare: bool) -> None:
-        self.start, self.reference = None, None
         if bare:
             return
         truth, start = (find_beside(self.path, name) for name in ("truth.csv", "init.json"))
