@@ -12,7 +12,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
-from voodoo.recordings.calibration import Calibration, read_calibration
+from voodoo.recordings.calibration import Calibration, FolderCalibration, read_calibration
 from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
@@ -138,7 +138,7 @@ class FolderRecording(Recording):
         measurements: list[Measurement] = []
         for number, (stamp, file) in enumerate(self._depth):
             while color is not None and upcoming is not None and upcoming[0] <= stamp:
-                measurements.append(_color_image(*upcoming, color))
+                measurements.append(color_image(*upcoming, color))
                 upcoming = next(colors, None)
             item = None
             with leaving_out(self._left_out):
@@ -148,11 +148,7 @@ class FolderRecording(Recording):
                 measurements.clear()
 
     def _depth_image(self, stamp: float, file: Path, number: int) -> DepthImage:
-        place = self._calibration.depth
-        image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
-        scale = 1.0 / self._calibration.depth_factor
-        image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
-        item = DepthImage("depth", stamp, image, scale, place.camera, place.root_from_sensor)
+        item = depth_image(stamp, file, self._calibration)
         if self._left_out is not None:
             refuse_blank(item, file)
             self._left_out.numbers["depth", stamp] = number
@@ -275,7 +271,16 @@ def _read(file: Path) -> bytes:
     return read_stored(file, "a readable picture")
 
 
-def _color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+def depth_image(stamp: float, file: Path, calibration: FolderCalibration) -> DepthImage:
+    """The image in a file of depth/."""
+    place = calibration.depth
+    image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
+    image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
+    return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.root_from_sensor)
+
+
+def color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+    """The image in a file of rgb/, which is read when it is decoded."""
     size = (color.camera.width, color.camera.height)
     step = -1 if color.mirrored else 1
     load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
