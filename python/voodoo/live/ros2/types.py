@@ -45,16 +45,11 @@ def ros_name(name: str) -> str:
     return f"{parts[0]}/msg/{parts[3][:-1]}"
 
 
-def _deserialize(kind: Any, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Any:  # noqa: ANN401
+def _deserialize(kind: Any, data: bytes, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - with options of the library
     return message_of(kind, data)
 
 
-def _serialize(
-    message: Any,  # noqa: ANN401
-    buffer: Any = None,  # noqa: ANN401
-    endianness: Any = None,  # noqa: ANN401
-    use_version_2: bool | None = None,
-) -> bytes:
+def _serialize(message: Any, *_: Any, **__: Any) -> bytes:  # noqa: ANN401 - with options of the library
     return bytes(message.data_as_sent)
 
 
