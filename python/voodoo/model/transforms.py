@@ -32,6 +32,18 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
 
 
 # Cached, because most sensors are static, and several steps of a frame check the same transform.
+def pose_of(rotation: npt.ArrayLike, translation: npt.ArrayLike = (0.0, 0.0, 0.0)) -> npt.NDArray[np.float64]:
+    """The transform (4, 4) of a rotation (3, 3) and a translation (3,)."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, translation
+    return pose
+
+
+def inverse(a_from_b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """b_from_a (4, 4) of a rigid a_from_b: the inverse rotation is the transposed one."""
+    return pose_of(a_from_b[:3, :3].T, -a_from_b[:3, :3].T @ a_from_b[:3, 3])
+
+
 @lru_cache(maxsize=64)
 def _turns_and_shifts(entries: bytes) -> bool:
     # Sixteen numbers are faster without arrays; numbers that are not finite fail a comparison.

@@ -12,6 +12,7 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.rotations import turned_between
+from voodoo.model.transforms import inverse, pose_of
 from voodoo.recordings.ros_messages import Message
 from voodoo.recordings.set_back import SetBack
 
@@ -31,30 +32,18 @@ def matrix(translation: Message, rotation: Message, source: object) -> FloatArra
     if not np.isfinite(t).all() or not abs(norm - 1.0) < 0.01:
         raise RecordingError(f"{source}: expected a finite translation and a unit quaternion, found {t} and {q}")
     x, y, z, w = (float(value) for value in q / norm)
-    result = np.eye(4)
-    result[:3, :3] = [
+    turn = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    result[:3, 3] = t
-    return result
-
-
-def inverse(a_from_b: FloatArray) -> FloatArray:
-    """b_from_a (4, 4) of a rigid a_from_b."""
-    result = np.eye(4)
-    result[:3, :3] = a_from_b[:3, :3].T
-    result[:3, 3] = -a_from_b[:3, :3].T @ a_from_b[:3, 3]
-    return result
+    return pose_of(turn, t)
 
 
 def between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
     """Interpolated rigid transform (4, 4) at a fraction, 0 to 1: linear translation, constant angular velocity."""
-    result = np.eye(4)
-    result[:3, :3] = turned_between(first[:3, :3], second[:3, :3], fraction)
-    result[:3, 3] = (1.0 - fraction) * first[:3, 3] + fraction * second[:3, 3]
-    return result
+    place = (1.0 - fraction) * first[:3, 3] + fraction * second[:3, 3]
+    return pose_of(turned_between(first[:3, :3], second[:3, :3], fraction), place)
 
 
 class _Edge:

@@ -17,6 +17,7 @@ from voodoo.live.faults import Faults
 from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
+from voodoo.model.transforms import pose_of
 from voodoo.recordings.calibration import read_calibration
 
 _SIZE, _RATE = (640, 480), 30
@@ -231,12 +232,9 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
 
 def _pose(extrinsics: Any) -> FloatArray:  # noqa: ANN401
     """(4, 4) of `pyrealsense2.extrinsics`, whose rotation is stored by columns."""
-    pose = np.eye(4)
     turn = np.array(extrinsics.rotation, dtype=np.float64).reshape(3, 3).T
     u, _, v = np.linalg.svd(turn)  # single precision is no rotation for the tracker
-    pose[:3, :3] = u @ v
-    pose[:3, 3] = extrinsics.translation
-    return pose
+    return pose_of(u @ v, extrinsics.translation)
 
 
 def _library() -> Any:  # noqa: ANN401
