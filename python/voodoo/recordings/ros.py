@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +111,6 @@ class RosRecording(Recording):
         scale = number_option(path, "meters_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
-        self._info: RecordingInfo | None = None
         given = (
             None if unpacked_gb is None else number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
         )
@@ -201,10 +200,9 @@ class RosRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize; reads the first and last message of every topic in use, once."""
-        if self._info is None:
-            self._info = self._summary()
-        return self._info
+        return self._summary
 
+    @cached_property
     def _summary(self) -> RecordingInfo:
         sensors = []
         duration = 0.0
