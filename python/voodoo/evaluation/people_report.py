@@ -9,7 +9,7 @@ from pathlib import Path
 
 from voodoo.evaluation.people import ABSENT_S, IN_VIEW, JOINTS_IN_VIEW, MATCH_M, PeopleScore, together
 from voodoo.evaluation.tables import write_table
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 DERIVED = ("mota", "idf1", "false_a_minute")
 
@@ -44,8 +44,7 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     table, text = folder / "people.csv", folder / "people.md"
     names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
     write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
-    with appearing_whole(text) as part:
-        part.write_text(people_markdown(scores), encoding="utf-8")
+    write_whole(text, people_markdown(scores))
     return [table, text]
 
 

@@ -15,7 +15,7 @@ from voodoo.evaluation.plot import plot_errors
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.evaluation.summary import KINDS, Summary, summarize
 from voodoo.evaluation.tables import write_frames, write_sequences, write_summary
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("error_m", "mean joint error", lambda value: f"{100 * value:.1f} cm"),
@@ -157,8 +157,7 @@ def write_reports(
     )
     write_sequences(sequences, scores)
     write_summary(summary, summarize(scores))
-    with appearing_whole(text) as part:
-        part.write_text(markdown(scores, tables), encoding="utf-8")
+    write_whole(text, markdown(scores, tables))
     if not picture:
         return [sequences, summary, text]
     plot_errors(plot, scores)
