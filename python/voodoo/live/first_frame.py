@@ -37,7 +37,7 @@ class FirstFrame(Recording):
     def info(self) -> RecordingInfo:
         """The sensors with measurements."""
         sensors = tuple(
-            SensorInfo(sensor, kind, self.root_frame, 1, float("nan"), "live")
+            SensorInfo.during(0.0, sensor, kind, self.root_frame, 1, "live")
             for sensor, kind in self._live.kinds.items()
         )
         return self._described("live", sensors, start=self._frame.stamp, duration=0.0)

@@ -21,7 +21,7 @@ from voodoo.model.joint import short
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.pictures import decode_color
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, refuse_blank
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, refuse_blank
 
 FRAME = "depth_camera_optical_frame"
 COLOR_FRAME = "rgb_camera_optical_frame"
@@ -139,8 +139,8 @@ class AzureKinectRecording(Recording):
         for sensor, stamps in self._stamps.items():
             camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
             detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
-            rate = mean_rate(len(stamps), stamps[-1] - stamps[0] if stamps else 0.0)
-            sensors.append(SensorInfo(sensor, sensor, frame, len(stamps), rate, detail))
+            span = stamps[-1] - stamps[0] if stamps else 0.0
+            sensors.append(SensorInfo.during(span, sensor, sensor, frame, len(stamps), detail))
         first, last = self._stamps["depth"][0], self._stamps["depth"][-1]
         return self._described("azure-kinect", sensors, start=first, duration=last - first, unused=self._unused)
 

@@ -20,7 +20,6 @@ from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
     SensorInfo,
-    mean_rate,
     number_option,
     refuse_blank,
 )
@@ -288,7 +287,7 @@ def color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
 
 
 def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: Calibration) -> SensorInfo:
-    rate = mean_rate(len(entries), entries[-1][0] - entries[0][0])
+    span = entries[-1][0] - entries[0][0]
     detail = f"{calibration.camera.width}x{calibration.camera.height} {words}"
     name = "rgb" if kind == "color" else kind
-    return SensorInfo(name, kind, calibration.sensor_frame, len(entries), rate, detail)
+    return SensorInfo.during(span, name, kind, calibration.sensor_frame, len(entries), detail)

@@ -17,7 +17,7 @@ from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
 from voodoo.recordings.pose2sim import SITES
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start
 
 FRAME = "world"
 _HIGH_M = 1.5
@@ -171,8 +171,7 @@ class MarkerRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = float(self._stamps[-1] - self._stamps[0])
-        rate = mean_rate(len(self), duration)
         detail = f"{len(self._sites)} markers"
-        sensor = SensorInfo(self.path.name, "markers", FRAME, len(self), rate, detail)
+        sensor = SensorInfo.during(duration, self.path.name, "markers", FRAME, len(self), detail)
         notes = (f"up is {self._up} of the file", *self.assumed)
         return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration, notes=notes)

@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     Reference,
     SensorInfo,
-    mean_rate,
     number_option,
 )
 
@@ -155,14 +154,13 @@ class Pose2SimRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = (len(self) - 1) / self.rate
-        rate = mean_rate(len(self), duration)
         sensors = (
-            SensorInfo(
+            SensorInfo.during(
+                duration,
                 one.name,
                 "keypoints",
                 one.name,
                 len(self),
-                rate,
                 f"{self.layout} keypoints of {folder.relative_to(self.path)}",
             )
             for one, folder in zip(self.cameras, self._folders, strict=True)

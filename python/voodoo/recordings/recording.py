@@ -72,6 +72,11 @@ class SensorInfo:
     rate_hz: float
     detail: str
 
+    @classmethod
+    def during(cls, seconds: float, name: str, kind: str, frame: str, messages: int, detail: str) -> SensorInfo:
+        """A source whose last message was so long after the first one."""
+        return cls(name, kind, frame, messages, mean_rate(messages, seconds), detail)
+
 
 @dataclass(frozen=True)
 class RecordingInfo:

@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
     SensorInfo,
-    mean_rate,
     number_option,
     refuse_blank,
 )
@@ -213,8 +212,8 @@ class RosRecording(Recording):
                 span = stamp_of(last, where) - source.first_stamp
             if source is self._driver:
                 duration = span
-            rate = mean_rate(source.messages, span)
-            sensors.append(SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail))
+            about = source.topic, source.kind, source.frame, source.messages, source.detail
+            sensors.append(SensorInfo.during(span, *about))
         return self._described(
             self.loader,
             sensors,

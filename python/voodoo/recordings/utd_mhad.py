@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     Reference,
     SensorInfo,
-    mean_rate,
 )
 
 CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=160.5, cy=119.0)
@@ -92,10 +91,9 @@ class UtdMhadRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = (len(self) - 1) / RATE_HZ
-        rate = mean_rate(len(self), duration)
         return self._described(
             "utd-mhad",
-            [SensorInfo("depth", "depth", FRAME, len(self), rate, "320x240 16UC1, person cut out")],
+            [SensorInfo.during(duration, "depth", "depth", FRAME, len(self), "320x240 16UC1, person cut out")],
             duration=duration,
             notes=(
                 "stamps are nominal (30 Hz); the true rate may be near 19 Hz",

@@ -22,7 +22,6 @@ from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
     SensorInfo,
-    mean_rate,
     number_option,
 )
 from voodoo.recordings.together import together
@@ -134,8 +133,8 @@ class VideosRecording(Recording):
         sensors = []
         for one in self._cameras:
             words = f"{one.camera.width}x{one.camera.height} pictures"
-            each = mean_rate(len(one.stamps), one.stamps[-1] - one.stamps[0])
-            sensors.append(SensorInfo(one.sensor, "color", one.placed.name, len(one.stamps), each, words))
+            span = one.stamps[-1] - one.stamps[0]
+            sensors.append(SensorInfo.during(span, one.sensor, "color", one.placed.name, len(one.stamps), words))
         notes = (*self.assumed, *self._notes, *self._scene.words)
         return self._described("videos", sensors, start=float(stamps[0]), duration=duration, notes=notes)
 
