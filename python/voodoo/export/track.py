@@ -39,7 +39,7 @@ _SIGMA = "_sigma_m"
 _UNKNOWN = ("angle_sigma", "covariance", "root_covariance")
 """Arrays that may be unknown in frames with a pose."""
 _WORDS = ("status", "joint_names", "limb_names", "angle_names")
-_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
+BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -142,6 +142,11 @@ class Track:
         """Which frames (F,) have a pose: all but the searching ones."""
         return np.array([status != SEARCHING for status in self.status], dtype=bool)
 
+    @property
+    def joint_sigma(self) -> FloatArray:
+        """Root mean square (F, J) of the standard deviations of each joint's x, y and z [m]; (F, 0) without covariances."""
+        return np.asarray(np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3.0))
+
     def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Track:
         """The track of some frames: a mask (F,), or their numbers."""
         numbers = np.arange(len(self))[chosen]
@@ -149,7 +154,7 @@ class Track:
             self,
             status=tuple(self.status[number] for number in numbers),
             limb_status={limb: tuple(words[number] for number in numbers) for limb, words in self.limb_status.items()},
-            **{name: getattr(self, name)[numbers] for name in _BY_FRAME},
+            **{name: getattr(self, name)[numbers] for name in BY_FRAME},
         )
 
     def __len__(self) -> int:
@@ -220,7 +225,7 @@ class Track:
         if not tracks:
             raise VoodooError("tracks: expected at least one, found none")
         arrays: dict[str, Any] = {}
-        for name in _BY_FRAME:
+        for name in BY_FRAME:
             parts = [getattr(track, name) for track in tracks]
             shape = max((part.shape[1:] for part in parts), key=lambda one: one[0] if one else 0)
             # Without covariances there are no columns.
@@ -284,7 +289,7 @@ def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
             words = zip(*part.limb_status.values(), strict=True) if limbs else [()] * len(part)
             sigmas = np.full((len(part), len(sigmas_of)), np.nan)
             if part.covariance.size:
-                sigmas = np.sqrt(np.trace(part.covariance, axis1=2, axis2=3) / 3.0)
+                sigmas = part.joint_sigma
             for stamp, status, residual, joints, angles, support, sigma in zip(
                 part.stamps, part.status, part.residual, part.joints, part.angles, words, sigmas, strict=True
             ):
@@ -308,7 +313,7 @@ def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Array
             if name in (BODIES, BODY_OF):
                 continue
             array = part[name]
-            if name.rpartition("/")[2] in (*_BY_FRAME, "status", "limb_status"):
+            if name.rpartition("/")[2] in (*BY_FRAME, "status", "limb_status"):
                 count, row, kind = kinds.get(name, (0, array.shape[1:], array.dtype))
                 # Without covariances there are no columns.
                 kinds[name] = count + len(array), max(row, array.shape[1:]), np.result_type(kind, array.dtype)
@@ -333,7 +338,7 @@ def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
     """All data of a track as arrays of numbers and words, for .npz."""
     limbs = np.array(list(track.limb_status.values()), dtype=np.str_)
     return {name: np.array(getattr(track, name), dtype=np.str_) for name in _WORDS} | {
-        **{name: getattr(track, name) for name in _BY_FRAME},
+        **{name: getattr(track, name) for name in BY_FRAME},
         "format_version": np.array(FORMAT_VERSION),
         "limb_status_names": np.array(list(track.limb_status), dtype=np.str_),
         "limb_status": limbs.reshape(len(track.limb_status), len(track)).T,
@@ -357,7 +362,7 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
             f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
         )
     words = {name: tuple(map(str, content[name])) for name in _WORDS if name in content}
-    arrays = {name: content[name] for name in _BY_FRAME if name in content}
+    arrays = {name: content[name] for name in BY_FRAME if name in content}
     return Track(**words, **arrays, **_optional_fields(content))  # type: ignore[arg-type]
 
 
