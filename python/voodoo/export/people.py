@@ -10,15 +10,12 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError
-from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
+from voodoo.export.people_rows import PeopleRows, write_rows
 from voodoo.export.result_file import check_suffix
-from voodoo.export.track import BY_FRAME, Track, arrays_of, track_of_rows, tracks_of, write_arrays
+from voodoo.export.track import BY_FRAME, Track, arrays_of, read_persons, save_result
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
-from voodoo.unpacking import stored_arrays
-from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -122,13 +119,7 @@ class PeopleTrack:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        path = Path(path)
-        check_suffix(path)
-        with appearing_whole(path) as part:
-            if path.suffix == ".csv":
-                write_rows(part, [self.rows()])
-            else:
-                write_arrays(part, lambda: iter([self.arrays()]))
+        save_result(path, lambda part: write_rows(part, [self.rows()]), self.arrays)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """All data as arrays, see `save`."""
@@ -152,11 +143,4 @@ class PeopleTrack:
         """
         path = Path(path)
         check_suffix(path)
-        if path.suffix == ".csv":
-            rows = read_rows(path)
-            persons = np.unique(rows.persons).tolist()
-            return cls(np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in persons})
-        with stored_arrays(path, "a result of voodoo track --people") as content:
-            if "persons" not in content:
-                raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
-            return cls(content["stamps"], tracks_of(content))
+        return cls(*read_persons(path))

@@ -243,13 +243,8 @@ class Track:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        path = Path(path)
-        check_suffix(path)
-        with appearing_whole(path) as part:
-            if path.suffix == ".csv":
-                write_csv(part, [self], sure=self.covariance.size > 0)
-            else:
-                write_arrays(part, lambda: iter([arrays_of(self)]))
+        sure = self.covariance.size > 0
+        save_result(path, lambda part: write_csv(part, [self], sure=sure), lambda: arrays_of(self))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
@@ -263,18 +258,28 @@ class Track:
         if is_people_file(path):
             return _only_person(path)
         with reading(path, "a result of voodoo track"), naming(path, VoodooError):
-            return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
+            if path.suffix == ".csv":
+                rows, others = read_cells(path, _FIRST, more=True)
+                limbs = {name.removesuffix(_STATUS): words for name, words in others.items() if name.endswith(_STATUS)}
+                return replace(track_of_rows(rows, 1), limb_status=limbs)
+            with stored_arrays(path, "a result of voodoo track") as content:
+                return track_of(content)
 
-    @classmethod
-    def _read_csv(cls, path: Path) -> Track:
-        rows, others = read_cells(path, _FIRST, more=True)
-        limbs = {name.removesuffix(_STATUS): words for name, words in others.items() if name.endswith(_STATUS)}
-        return replace(track_of_rows(rows, 1), limb_status=limbs)
 
-    @classmethod
-    def _read_npz(cls, path: Path) -> Track:
-        with stored_arrays(path, "a result of voodoo track") as content:
-            return track_of(content)
+def save_result(path: str | Path, write: Callable[[Path], None], arrays: Callable[[], Arrays]) -> None:
+    """Write a result as .csv, by `write`, or as .npz of its arrays; the file appears only when it is complete.
+
+    Raises:
+        VoodooError: another suffix.
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    check_suffix(path)
+    with appearing_whole(path) as part:
+        if path.suffix == ".csv":
+            write(part)
+        else:
+            write_arrays(part, lambda: iter([arrays()]))
 
 
 def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
@@ -392,14 +397,20 @@ def tracks_of(content: Mapping[str, npt.NDArray[Any]]) -> dict[int, Track]:
     return tracks
 
 
+def read_persons(path: Path) -> tuple[FloatArray, dict[int, Track]]:
+    """The stamps in a result of several people, and the tracks by person; see `PeopleTrack.load`."""
+    if path.suffix == ".csv":
+        rows = read_rows(path)
+        return np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
+    with stored_arrays(path, "a result of voodoo track --people") as content:
+        if "persons" not in content:
+            raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
+        return content["stamps"], tracks_of(content)
+
+
 def _only_person(path: Path) -> Track:
     """The track in a result of several people that holds one."""
-    if path.suffix == ".npz":
-        with stored_arrays(path, "a result of voodoo track --people") as content:
-            tracks = tracks_of(content)
-    else:
-        rows = read_rows(path)
-        tracks = {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
+    _, tracks = read_persons(path)
     if len(tracks) != 1:
         found = ", ".join(str(one) for one in tracks) or "nobody"
         raise VoodooError(f"{path}: expected the result of one person, found persons {found}")
