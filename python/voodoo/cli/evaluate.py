@@ -12,8 +12,8 @@ from voodoo.cli.common import (
     clear_errors,
     loader_words,
     print_interrupted,
-    print_message,
     print_text,
+    print_written,
     progressing,
     reporting,
     until_interrupted,
@@ -151,6 +151,6 @@ def eval_command(
         if out is not None and scores:
             with deferred():
                 files = write_reports(out, scores, tables, picture=not interrupted)
-            (print_message if as_json else typer.echo)("wrote " + ", ".join(str(file) for file in files))
+            print_written(files, aside=as_json)
         print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
         refuse_failures(scores)
