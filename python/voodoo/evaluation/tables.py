@@ -20,10 +20,11 @@ def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[objec
     with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
-        writer.writerows(map(_cell, row) for row in rows)
+        writer.writerows(map(cell, row) for row in rows)
 
 
-def _cell(value: object) -> str:
+def cell(value: object) -> str:
+    """A value as text; "" if it is not known."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
     return f"{value:.6f}" if isinstance(value, float) else str(value)

@@ -31,7 +31,6 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
     return pose
 
 
-# Cached, because most sensors are static, and several steps of a frame check the same transform.
 def pose_of(rotation: npt.ArrayLike, translation: npt.ArrayLike = (0.0, 0.0, 0.0)) -> npt.NDArray[np.float64]:
     """The transform (4, 4) of a rotation (3, 3) and a translation (3,)."""
     pose = np.eye(4)
@@ -44,6 +43,7 @@ def inverse(a_from_b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return pose_of(a_from_b[:3, :3].T, -a_from_b[:3, :3].T @ a_from_b[:3, 3])
 
 
+# Cached, because most sensors are static, and several steps of a frame check the same transform.
 @lru_cache(maxsize=64)
 def _turns_and_shifts(entries: bytes) -> bool:
     # Sixteen numbers are faster without arrays; numbers that are not finite fail a comparison.

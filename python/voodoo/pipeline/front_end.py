@@ -147,7 +147,8 @@ class FrontEnd:
             gate=self._gate,
             memory=self.memory,
         )
-        frame = context.new_frame()
+        frame = Frame(stamp=recorded.stamp)
+        context.add_scene(frame)
         for item in alive:
             for adapter in adapters_of(item):
                 if adapter.kind in use and (self.search.posed or adapter.while_searching):

@@ -77,7 +77,8 @@ class PeopleFrontEnd:
             gate=SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest),
             memory=self.memory,
         )
-        frame = context.new_frame()
+        frame = Frame(stamp=recorded.stamp)
+        context.add_scene(frame)
         for item in alive:
             used = [adapter for adapter in adapters_of(item) if adapter.kind in chosen.use]
             for adapter in used:

@@ -91,14 +91,12 @@ class Context:
     others: Sequence[Followed] = ()
     rays: list[SiteRay] = field(default_factory=list)
 
-    def new_frame(self) -> Frame:
-        """A frame of the tracker with what is known of the scene: boxes without a person, and the floor."""
-        frame = Frame(stamp=self.stamp)
+    def add_scene(self, frame: Frame) -> None:
+        """Add what is known of the scene: boxes without a person, and the floor."""
         for low, high in self.settings.exclude:
             frame.exclude(low, high)
         if self.settings.ground_z is not None:
             frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
-        return frame
 
     def add_rays(self, frame: Frame) -> list[SiteRay]:
         """Add the collected rays to a frame; returns them with the trust by which they agree."""
