@@ -135,6 +135,7 @@ _EXPECTED = {
     "string_too_short": "a word",
     "literal_error": "one of {expected}",
     "extra_forbidden": "a known key",
+    "model": "an object",
     "float": "a number",
     "int": "a whole number",
     "bool": "true or false",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import ConfigDict, Field, FiniteFloat
 
 from voodoo._core import Estimate
 from voodoo.config import Config
@@ -28,22 +28,19 @@ from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
+from voodoo.recordings.truth import FirstPose
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
 from voodoo.sensors.settings import FrontEndSettings, inputs_for
 from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
-Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
 _ROUNDED_S = 1e-6
 _DEFAULT_M = 1.75
 """Stature of `Body.human()`."""
 
 
-Position = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-
-
-class Init(BaseModel):
+class Init(FirstPose):
     """First pose of the body, in the first frame or at a time: any subset of named positions that determines the pose.
 
     Args:
@@ -56,11 +53,8 @@ class Init(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    height_m: Height | None = None
     stamp_s: FiniteFloat | None = None
-    frame: str | None = None
     format_version: Annotated[int, Field(ge=1, le=1)] = 1
-    joints: Annotated[dict[str, Position], Field(min_length=1)]
 
     @classmethod
     def load(cls, path: Path) -> Init:
@@ -96,8 +90,8 @@ class Init(BaseModel):
             return self
         about = recording.info()
         pose = recording.root_from(str(self.frame), about.start_stamp if self.stamp_s is None else self.stamp_s)
-        moved = {name: tuple(pose[:3, :3] @ place + pose[:3, 3]) for name, place in self.joints.items()}
-        return type(self).model_validate({**self.model_dump(), "frame": recording.root_frame, "joints": moved})
+        moved = {"frame": recording.root_frame, "joints": self.moved(pose)}
+        return type(self).model_validate({**self.model_dump(), **moved})
 
     @classmethod
     def of(cls, recording: Recording) -> Init | None:
