@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from copy import deepcopy
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -190,18 +190,14 @@ class WithKeypoints(Around):
         """Check the keypoints of the first frames against calibration and depth."""
         instants: list[list[KeypointImage]] = []
         pairs: list[tuple[KeypointImage, DepthImage]] = []
-        before = deepcopy(vars(self._left_out)) if self._left_out is not None else {}
-        try:
+        # Reading the frames again reports what is damaged.
+        with nullcontext() if self._left_out is None else self._left_out.aside(), suppress(RecordingError):
             for recorded in islice(self, _CHECKED):
                 images = [item for item in recorded.measurements if isinstance(item, KeypointImage)]
                 depths = [item for item in recorded.measurements if isinstance(item, DepthImage)]
                 pairs += [(image, depths[-1]) for image in images if depths]
                 if len(images) == len(self._files) and any(image.people for image in images):
                     instants.append(sorted(images, key=lambda image: image.sensor))
-        except RecordingError:
-            pass  # reading the frames again reports it
-        if self._left_out is not None:
-            vars(self._left_out).update(before)
         check_on_depth("keypoints", pairs)
         return check_keypoints("keypoints", instants)
 

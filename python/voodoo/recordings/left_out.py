@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import deepcopy
 
 from voodoo.errors import RecordingError, VoodooError
 
@@ -45,11 +46,11 @@ class LeftOut:
     @contextmanager
     def aside(self) -> Iterator[None]:
         """What is read inside is read again, and not counted here."""
-        before = dict(self.counts), dict(self.first)
+        before = deepcopy(vars(self))
         try:
             yield
         finally:
-            self.counts, self.first = before
+            vars(self).update(before)
 
     def __len__(self) -> int:
         """Number of left-out measurements."""
