@@ -19,9 +19,9 @@ from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFram
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
 from voodoo.model.transforms import pose_of
-from voodoo.recordings.left_out import LeftOut, leaving_out
+from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, refuse_blank
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, usable
 
 FRAME = "depth_camera_optical_frame"
 COLOR_FRAME = "rgb_camera_optical_frame"
@@ -115,23 +115,18 @@ class AzureKinectRecording(Recording):
                     waiting.append(ColorImage("color", stamp, load, self._color, self._depth_from_color))
                     continue
                 number += 1
-                item = None
-                with leaving_out(self._left_out):
-                    item = self._depth_image(stamp, bytes(packet), number)
+                make = partial(self._depth_image, stamp, bytes(packet))
+                item = usable(make, number, f"{self.path}, depth", self._left_out)
                 if item is not None:
                     yield RecordedFrame(stamp, (*waiting, item))
                     waiting.clear()
 
-    def _depth_image(self, stamp: float, content: bytes, number: int) -> DepthImage:
+    def _depth_image(self, stamp: float, content: bytes) -> DepthImage:
         where, size = f"{self.path}, depth", (self._camera.height, self._camera.width)
         if len(content) != 2 * size[0] * size[1]:
             raise RecordingError(f"{where}: expected {2 * size[0] * size[1]} bytes, found {len(content)}")
         image = np.frombuffer(content, dtype=">u2").reshape(size).astype(np.uint16)
-        item = DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
-        if self._left_out is not None:
-            refuse_blank(item, where)
-            self._left_out.numbers["depth", stamp] = number
-        return item
+        return DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
 
     def info(self) -> RecordingInfo:
         """Summarize from tracks and calibration."""

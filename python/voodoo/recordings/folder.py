@@ -13,7 +13,7 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.calibration import Calibration, FolderCalibration, read_calibration
-from voodoo.recordings.left_out import LeftOut, leave_out, leaving_out
+from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import (
@@ -21,7 +21,7 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     SensorInfo,
     number_option,
-    refuse_blank,
+    usable,
 )
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.truth import read_start, read_truth
@@ -139,19 +139,10 @@ class FolderRecording(Recording):
             while color is not None and upcoming is not None and upcoming[0] <= stamp:
                 measurements.append(color_image(*upcoming, color))
                 upcoming = next(colors, None)
-            item = None
-            with leaving_out(self._left_out):
-                item = self._depth_image(stamp, file, number)
+            item = usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out)
             if item is not None:
                 yield RecordedFrame(stamp, (*measurements, item))
                 measurements.clear()
-
-    def _depth_image(self, stamp: float, file: Path, number: int) -> DepthImage:
-        item = depth_image(stamp, file, self._calibration)
-        if self._left_out is not None:
-            refuse_blank(item, file)
-            self._left_out.numbers["depth", stamp] = number
-        return item
 
     def info(self) -> RecordingInfo:
         """Summarize from names and calibration."""

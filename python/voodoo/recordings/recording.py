@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
@@ -16,6 +16,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PeopleTruth
 
 
@@ -245,6 +246,21 @@ def refuse_blank(item: DepthImage, where: object) -> None:
         raise RecordingError(
             f"{where}, stamp {item.stamp:.6f}: expected depths, found a blank image", reason="that are blank"
         )
+
+
+def usable(make: Callable[[], DepthImage], number: int, where: object, left_out: LeftOut | None) -> DepthImage | None:
+    """A depth image by its number; of a damaged recording, in which also blank ones are left out, None for one that is.
+
+    Raises:
+        RecordingError: without `left_out`, that of `make`.
+    """
+    with leaving_out(left_out):
+        item = make()
+        if left_out is not None:
+            refuse_blank(item, where)
+            left_out.numbers[item.sensor, item.stamp] = number
+        return item
+    return None
 
 
 def number_option(path: Path, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:

@@ -217,8 +217,7 @@ class RosFeed:
         if self._pose is not None and topic == self._topics[0]:
             return self._pose[1]
         try:
-            with self._lock:
-                return self._tree.lookup(self.root_frame, frame, stamp)
+            return self.root_from(frame, stamp)
         except RecordingError as error:
             raise Fault(kind_of(error, "transform missing"), f"{topic}, stamp {stamp:.6f}: {error}") from error
 
