@@ -192,7 +192,8 @@ class Track:
             if str(estimate.status) != SEARCHING:
                 if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
                     raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
-                joints[index], poses[index] = estimate.joint_positions, estimate.limb_poses
+                joints[index] = np.reshape(list(estimate.joints.values()), (-1, 3))
+                poses[index] = np.reshape(list(estimate.world_from_limb.values()), (-1, 4, 4))
         angle_names, angles = angles_of_estimates(estimates, body)
         covariance, root_covariance = covariances_of(estimates, joint_names, limb_names)
         return cls(
