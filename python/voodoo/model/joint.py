@@ -189,6 +189,14 @@ def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return found.astype(np.float64, copy=False)
 
 
+def numbers_or_nan(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """An array of real numbers; of other values a single NaN, in one dimension."""
+    try:
+        return as_numbers(values)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([np.nan])
+
+
 def short(value: object) -> str:
     """A value as text for a message."""
     try:

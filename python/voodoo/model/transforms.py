@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.model.joint import as_numbers
+from voodoo.model.joint import numbers_or_nan
 
 _OFF = 1e-4
 """Tolerance for the products of the rows of a rotation, as in the core."""
@@ -22,10 +22,7 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
     Raises:
         MeasurementError: another shape, not finite, or not a rotation and translation; names `name`.
     """
-    try:
-        pose = as_numbers(value)
-    except (TypeError, ValueError, OverflowError):
-        pose = np.empty(0)
+    pose = numbers_or_nan(value)
     if pose.shape != (4, 4) or not _turns_and_shifts(pose.tobytes()):
         raise MeasurementError(f"{name}: expected a rigid 4x4 transform, found {value!r}")
     return pose

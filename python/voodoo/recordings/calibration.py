@@ -11,7 +11,7 @@ import numpy as np
 from voodoo.errors import CameraError, RecordingError, naming
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
-from voodoo.model.joint import short
+from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.camera_yaml import camera_tables
 from voodoo.recordings.pictures import picture_size
@@ -142,13 +142,10 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where), mirrored)
 
 
-def _pose(rows: object, where: str) -> FloatArray:
+def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here
     if rows is None:
         return np.eye(4)
-    try:
-        pose = np.array(rows, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        pose = np.empty(0)
+    pose = numbers_or_nan(rows)
     rigid = (
         pose.shape == (4, 4)
         and np.isfinite(pose).all()

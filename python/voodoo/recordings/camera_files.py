@@ -12,7 +12,7 @@ import numpy as np
 from voodoo.errors import CameraError, RecordingError, naming
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
-from voodoo.model.joint import short
+from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.camera_yaml import camera_tables
@@ -96,10 +96,7 @@ def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
 
 
 def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> FloatArray:
-    try:
-        values = np.array(table[key], dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        values = np.array([np.nan])
+    values = numbers_or_nan(table[key])
     if not np.isfinite(values).all() or (shape is not None and values.shape != shape) or values.ndim == 0:
         expected = "a list of" if shape is None else "x".join(map(str, shape))
         raise RecordingError(f"{where}, {key}: expected {expected} finite numbers, found {short(table[key])}")
