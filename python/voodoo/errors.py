@@ -142,6 +142,18 @@ def installed(library: str, missing: str, *, error: type[VoodooError] = VoodooEr
         raise error(missing) from None
 
 
+def of_kind(name: str, value: object, kind: type[T], error: type[VoodooError]) -> T:
+    """An argument, of the class that it must have.
+
+    Raises:
+        VoodooError: of the class `error`, for another one; names the argument.
+    """
+    if isinstance(value, kind):
+        return value
+    expected = "a name" if kind is str else f"a voodoo.{kind.__name__}"
+    raise error(f"{name}: expected {expected}, found {type(value).__name__}")
+
+
 def reason(error: Exception) -> str:
     """An error as words, which name its file."""
     if isinstance(error, OSError) and error.filename and error.strerror:
