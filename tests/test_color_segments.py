@@ -10,7 +10,7 @@ from voodoo.measurements import ColorImage
 from voodoo.pipeline.ik import Positions, follow
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording
-from voodoo.sensors.silhouettes import RegionSilhouettes
+from voodoo.sensors.silhouettes.regions import RegionSilhouettes
 from voodoo.synthetic.render import render_depth
 
 FRAMES, CAMERAS = 8, 4

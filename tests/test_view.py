@@ -1,6 +1,5 @@
 """The Rerun file, verified by Rerun's own command line, and the geometry that is shown."""
 
-import builtins
 import re
 import subprocess
 import sys
@@ -154,14 +153,7 @@ def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path)
 
 
 def test_without_rerun_the_message_reports_what_to_install(monkeypatch, tmp_path):
-    find = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name == "rerun":
-            raise ImportError(name)
-        return find(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(VoodooError, match=r"pip install 'voodoo-tracker\[view\]'"):
         Viewer(save=tmp_path / "x.rrd")
 

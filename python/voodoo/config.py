@@ -8,11 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 import voodoo._core as _core
-from voodoo.errors import ConfigError
-from voodoo.model.joint import expectation
+from voodoo.errors import ConfigError, naming
+from voodoo.model.joint import valid
 from voodoo.model.toml_io import commented, edited, parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
@@ -30,21 +30,8 @@ class _Base(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False)
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 - validated below
-        try:
+        with valid("Config", ConfigError, known=_FIELDS):
             super().__init__(**values)
-        except ValidationError as error:
-            raise ConfigError(_message("Config", error)) from None
-
-
-def _message(what: str, error: ValidationError) -> str:
-    problems = []
-    for item in error.errors():
-        key = ".".join(str(part) for part in item["loc"])
-        if item["type"] == "extra_forbidden":
-            problems.append(f"{key}: unknown key; known are {', '.join(_FIELDS)}")
-        else:
-            problems.append(f"{key}: {expectation(item)}")
-    return f"{what}: " + "; ".join(problems)
 
 
 if TYPE_CHECKING:
@@ -68,10 +55,8 @@ class Config(ConfigFields, frozen=True):
     def from_toml(cls, text: str, *, source: str = "configuration") -> Config:
         """A configuration from TOML text; missing keys keep their defaults."""
         values = parse_toml(text, source=source, error=ConfigError)
-        try:
+        with naming(source, ConfigError):
             return cls(**values)
-        except ConfigError as error:
-            raise ConfigError(f"{source}: {error}") from None
 
     @classmethod
     def load(cls, path: str | Path) -> Config:

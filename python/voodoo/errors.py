@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
+from importlib import import_module
 from os import PathLike, fspath
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -107,6 +108,50 @@ def reading(source: object, expected: str, *, error: type[VoodooError] = Recordi
     except Exception as cause:
         found = shortened(str(cause).strip() or "no further detail")
         raise error(f"{source}: expected {expected}, found damage: {type(cause).__name__}: {found}") from cause
+
+
+@contextmanager
+def naming(where: object, of: type[VoodooError], *, error: type[VoodooError] | None = None) -> Iterator[None]:
+    """Errors raised inside begin with where they occurred.
+
+    Args:
+        where: file, key or argument.
+        of: class of these errors.
+        error: class that they become; None: the same.
+    """
+    try:
+        yield
+    except of as cause:
+        raise (error or of)(f"{where}: {cause}") from cause
+
+
+def installed(library: str, missing: str, *, error: type[VoodooError] = VoodooError) -> ModuleType:
+    """A library that is optional.
+
+    Args:
+        library: name of the module.
+        missing: message of the error, which says how to install it.
+        error: class of the error to raise.
+
+    Raises:
+        VoodooError: of the class `error`, if it is not installed.
+    """
+    try:
+        return import_module(library)
+    except ImportError:
+        raise error(missing) from None
+
+
+def of_kind(name: str, value: object, kind: type[T], error: type[VoodooError]) -> T:
+    """An argument, of the class that it must have.
+
+    Raises:
+        VoodooError: of the class `error`, for another one; names the argument.
+    """
+    if isinstance(value, kind):
+        return value
+    expected = "a name" if kind is str else f"a voodoo.{kind.__name__}"
+    raise error(f"{name}: expected {expected}, found {type(value).__name__}")
 
 
 def reason(error: Exception) -> str:

@@ -13,7 +13,7 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
-from voodoo.errors import BodyError, ConfigError, MeasurementError, one_thread
+from voodoo.errors import BodyError, ConfigError, MeasurementError, of_kind, one_thread
 from voodoo.model.body import Body, checked_joints
 
 __all__ = ["Followed", "People", "PeopleEstimate", "Person"]
@@ -93,17 +93,13 @@ class People:
             BodyError: `body` is not a Body.
             ConfigError: an invalid parameter, or `detector` is not a detector.
         """
-        if body is not None and not isinstance(body, Body):
-            raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
-        if config is not None and not isinstance(config, Config):
-            raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
+        self._prototype = of_kind("body", Body.human() if body is None else body, Body, BodyError)
+        self.config = of_kind("config", Config() if config is None else config, Config, ConfigError)
         if limit is not None and (not isinstance(limit, int) or limit < 1):
             raise ConfigError(f"limit: expected a whole number from 1, or None, found {limit!r}")
         if not (isinstance(forget_after, int | float) and math.isfinite(forget_after) and forget_after >= 0.0):
             raise ConfigError(f"forget_after: expected a finite number of seconds, found {forget_after!r}")
-        self.config = Config() if config is None else config
         self.detector = detector
-        self._prototype = Body.human() if body is None else body
         self._core = _core.People(
             self._prototype.core,
             self.config.values(),

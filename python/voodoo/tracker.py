@@ -12,7 +12,7 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame, TaperedEllipticCylinder
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
-from voodoo.errors import BodyError, ConfigError, MeasurementError, one_thread
+from voodoo.errors import BodyError, ConfigError, MeasurementError, of_kind, one_thread
 from voodoo.model.body import Body, Joint, checked_joints, ordered_poses
 from voodoo.model.joint import number_of
 
@@ -58,13 +58,9 @@ class Tracker:
             BodyError: `body` is not a Body.
             ConfigError: `config` is not a Config, or `detector` is not a detector.
         """
-        if not isinstance(body, Body):
-            raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
-        if config is not None and not isinstance(config, Config):
-            raise ConfigError(f"config: expected a voodoo.Config, found {type(config).__name__}")
-        self.config = Config() if config is None else config
+        self._initial = of_kind("body", body, Body, BodyError)
+        self.config = of_kind("config", Config() if config is None else config, Config, ConfigError)
         self.detector = detector
-        self._initial = body
         self._backgrounds: dict[str, tuple[npt.NDArray[np.uint8], ...]] = {}
         self.search()
 
@@ -135,8 +131,7 @@ class Tracker:
             MeasurementError: images of another kind, or of different sizes. The next step rejects images whose size differs
                 from its own.
         """
-        if not isinstance(source, str):
-            raise MeasurementError(f"source: expected a name, found {type(source).__name__}")
+        of_kind("source", source, str, MeasurementError)
         pictures = tuple(images)
         self._core._set_background(source, pictures)
         self._backgrounds[source] = pictures
@@ -152,7 +147,7 @@ class Tracker:
             MeasurementError: time not after the last frame, an invalid measurement, or no pose yet and `can_search` is false.
             BodyError: the frame names a limb or site that is not in the body.
         """
-        return self._core.step(_frame(frame))
+        return self._core.step(of_kind("frame", frame, Frame, MeasurementError))
 
     def region_lines(self, source: str) -> RegionLines:
         """The search lines of the last step in the image of the color camera `source`; none if it had no image."""
@@ -178,14 +173,14 @@ class Tracker:
             MeasurementError: no pose, or an invalid image.
             BodyError: a limb is missing or unknown.
         """
-        return self._core._segment(_frame(frame), self._ordered(world_from_limb))
+        return self._core._segment(of_kind("frame", frame, Frame, MeasurementError), self._ordered(world_from_limb))
 
     def learn_colors(self, frame: Frame, *, world_from_limb: Mapping[str, npt.ArrayLike] | None = None) -> None:
         """Learn the colors of the body and of its surroundings in the images of a frame; `step` does so by itself.
 
         Args, Raises: as for `segment`.
         """
-        self._core._learn_colors(_frame(frame), self._ordered(world_from_limb))
+        self._core._learn_colors(of_kind("frame", frame, Frame, MeasurementError), self._ordered(world_from_limb))
 
     def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
@@ -244,7 +239,8 @@ class Tracker:
         Raises:
             BodyError: an unknown limb.
         """
-        _check_parts(limb=(limb, str), shape=(shape, TaperedEllipticCylinder))
+        of_kind("limb", limb, str, BodyError)
+        of_kind("shape", shape, TaperedEllipticCylinder, BodyError)
         self._core.set_shape(limb, shape)
 
     def add_limb(
@@ -268,9 +264,10 @@ class Tracker:
         Raises:
             BodyError: a name that is taken, an unknown parent, or numbers that give no valid joint.
         """
-        _check_parts(
-            name=(name, str), parent=(parent, str), shape=(shape, TaperedEllipticCylinder), joint=(joint, Joint)
-        )
+        of_kind("name", name, str, BodyError)
+        of_kind("parent", parent, str, BodyError)
+        of_kind("shape", shape, TaperedEllipticCylinder, BodyError)
+        of_kind("joint", joint, Joint, BodyError)
         places = list(checked_joints(sites or {}, what="sites").items())
         self._core._add_limb(name, parent, shape, joint.parts(), places)
 
@@ -280,7 +277,7 @@ class Tracker:
         Raises:
             BodyError: an unknown limb, or the root.
         """
-        _check_parts(name=(name, str))
+        of_kind("name", name, str, BodyError)
         self._core.remove_limb(name)
 
     def __copy__(self) -> Tracker:
@@ -290,22 +287,3 @@ class Tracker:
     def __repr__(self) -> str:
         """Body, limbs and last estimate."""
         return repr(self._core)
-
-
-def _check_parts(**parts: tuple[object, type]) -> None:
-    """Reject arguments of another type.
-
-    Raises:
-        BodyError: it names the argument.
-    """
-    for name, (value, kind) in parts.items():
-        if not isinstance(value, kind):
-            expected = "a name" if kind is str else f"a voodoo.{kind.__name__}"
-            raise BodyError(f"{name}: expected {expected}, found {type(value).__name__}")
-
-
-def _frame(frame: object) -> Frame:
-    """The argument, checked to be a frame."""
-    if not isinstance(frame, Frame):
-        raise MeasurementError(f"frame: expected a voodoo.Frame, found {type(frame).__name__}")
-    return frame

@@ -61,8 +61,7 @@ class Hidden:
 
     def keep(self, **note: Any) -> None:  # noqa: ANN401 - any values of JSON
         """Keep the folder after a crash; `note` tells what is in it."""
-        with appearing_whole(self.folder / KEPT) as place:
-            place.write_text(json.dumps(note), encoding="utf-8")
+        write_whole(self.folder / KEPT, json.dumps(note))
 
     def remove(self) -> None:
         """Delete the folder."""
@@ -132,6 +131,16 @@ def appearing_whole(path: Path) -> Iterator[Path]:
     finally:
         if hidden is not None:
             hidden.remove()
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file, which appears when it is complete.
+
+    Raises:
+        OSError: it cannot be written; names `path`.
+    """
+    with appearing_whole(path) as place:
+        place.write_text(text, encoding="utf-8")
 
 
 def move_whole(place: Path, path: Path) -> None:

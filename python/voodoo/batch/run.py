@@ -19,7 +19,7 @@ from voodoo.batch.storage import Store, named
 from voodoo.batch.summary import FAILED, REPORTS, Row, read_table, write_index, write_table
 from voodoo.batch.task import Job, Settings, do, failed, stored_row
 from voodoo.children import children
-from voodoo.errors import VoodooError, reading
+from voodoo.errors import VoodooError, installed, reading
 
 SUMMARY, SETTINGS, INDEX = "summary.csv", "settings.json", "index.html"
 _EVERY_S, _FRACTION = 2.0, 0.05
@@ -141,7 +141,7 @@ def run(
     Raises:
         VoodooError: Dask is not installed, the scheduler does not answer, or it has no worker.
     """
-    distributed = _distributed()
+    distributed = installed("distributed", "many recordings are run by Dask: pip install 'voodoo-tracker[batch]'")
     with _client(distributed, workers, scheduler) as client:
         threads = sum(client.nthreads().values()) or workers
         waiting = iter(jobs)
@@ -230,11 +230,3 @@ def _own_keys(distributed: Any) -> Any:  # noqa: ANN401 - Dask has no types
         raise VoodooError(
             "the processes of a batch need the package cryptography: pip install 'voodoo-tracker[batch]'"
         ) from None
-
-
-def _distributed() -> Any:  # noqa: ANN401 - Dask has no types
-    try:
-        import distributed
-    except ImportError:
-        raise VoodooError("many recordings are run by Dask: pip install 'voodoo-tracker[batch]'") from None
-    return distributed

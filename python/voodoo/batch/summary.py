@@ -12,6 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from voodoo.errors import VoodooError
+from voodoo.evaluation.tables import cell
 
 DONE, FAILED = "done", "failed"
 REPORTS = "reports"
@@ -50,7 +51,7 @@ class Row:
 
     def cells(self) -> list[str]:
         """The row as text; unknown values are empty."""
-        return [_cell(getattr(self, field.name)) for field in fields(self)]
+        return [cell(getattr(self, field.name)) for field in fields(self)]
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Row:
@@ -106,14 +107,8 @@ def write_index(rows: Iterable[Row], pages: Container[str]) -> str:
     lines += ["<body style='font:15px sans-serif;margin:1.5em'><table cellpadding=4>"]
     lines.append(f"<tr>{''.join(f'<th align=left>{name}' for name in shown)}")
     for row in sorted(rows, key=lambda row: row.recording):
-        cells = [escape(cell) for cell in row.cells()[: len(shown)]]
+        cells = [escape(words) for words in row.cells()[: len(shown)]]
         if f"{row.recording}.html" in pages:
             cells[0] = f"<a href='{REPORTS}/{quote(row.recording)}.html'>{cells[0]}</a>"
         lines.append(f"<tr>{''.join(f'<td>{cell}' for cell in cells)}")
     return "\n".join([*lines, "</table></body></html>", ""])
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.6f}"
-    return str(value)

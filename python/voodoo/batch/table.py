@@ -10,7 +10,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError
+from voodoo.errors import installed
+from voodoo.export.people import by_time
 from voodoo.export.track import Track
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any] | list[str]]
@@ -28,7 +29,6 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     Args:
         tracks: of each person, from 1; with the same joints.
     """
-    found: Columns = {}
     if not tracks:
         return {
             "stamp_s": np.empty(0),
@@ -36,38 +36,18 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
             "status": [],
             "residual_m": np.empty(0, np.float32),
         }
-    stamps = np.concatenate([track.stamps for track in tracks.values()])
-    persons = np.concatenate([np.full(len(track), one, dtype=np.int32) for one, track in tracks.items()])
-    order = np.lexsort((persons, stamps))
-    first = next(iter(tracks.values()))
-
-    def numbers(name: str) -> npt.NDArray[np.float32]:
-        return np.concatenate([getattr(track, name) for track in tracks.values()])[order].astype(np.float32)
-
-    def words(all_of_them: list[str]) -> list[str]:
-        return [all_of_them[index] for index in order]
-
-    found |= {"stamp_s": stamps[order], "person": persons[order]}
-    found["status"] = words([word for track in tracks.values() for word in track.status])
-    found["residual_m"] = numbers("residual")
-    joints, angles = numbers("joints"), numbers("angles")
-    for number, name in enumerate(first.joint_names):
+    persons, rows = by_time(tracks)
+    residual, joints, angles = (values.astype(np.float32) for values in (rows.residual, rows.joints, rows.angles))
+    found: Columns = {"stamp_s": rows.stamps, "person": persons.astype(np.int32), "status": list(rows.status)}
+    found["residual_m"] = residual
+    for number, name in enumerate(rows.joint_names):
         found |= {f"{name}_{axis}": joints[:, number, place] for place, axis in enumerate("xyz")}
-    found |= {f"{name}_rad": angles[:, number] for number, name in enumerate(first.angle_names)}
-    for limb in first.limb_status:
-        found[f"{limb}_status"] = words([word for track in tracks.values() for word in track.limb_status[limb]])
-    sure = [_sigmas(track) for track in tracks.values()]
-    if any(np.isfinite(part).any() for part in sure):
-        sigmas = np.concatenate(sure)[order].astype(np.float32)
-        found |= {f"{name}_sigma_m": sigmas[:, number] for number, name in enumerate(first.joint_names)}
+    found |= {f"{name}_rad": angles[:, number] for number, name in enumerate(rows.angle_names)}
+    found |= {f"{limb}_status": list(words) for limb, words in rows.limb_status.items()}
+    if np.isfinite(rows.joint_sigma).any():
+        sigmas = rows.joint_sigma.astype(np.float32)
+        found |= {f"{name}_sigma_m": sigmas[:, number] for number, name in enumerate(rows.joint_names)}
     return found
-
-
-def _sigmas(track: Track) -> npt.NDArray[np.float64]:
-    """Root mean square (F, J) of the standard deviations of each joint's coordinates [m]; NaN where unknown."""
-    if not track.covariance.size:
-        return np.full(track.joints.shape[:2], np.nan)
-    return np.asarray(np.sqrt(np.trace(track.covariance, axis1=2, axis2=3) / 3.0))
 
 
 def stacked(parts: Sequence[Columns]) -> Columns:
@@ -97,7 +77,7 @@ def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
     Raises:
         VoodooError: pyarrow is not installed.
     """
-    pa, pq = _pyarrow()
+    pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
     arrays = [
         pa.array([value or None for value in column], pa.string())
         if isinstance(column, list)
@@ -115,7 +95,7 @@ def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
 
 def note_of(file: Any) -> dict[str, Any] | None:  # noqa: ANN401 - a binary file of any kind
     """The note in the footer of a Parquet file; None without one, or if the file is damaged."""
-    _, pq = _pyarrow()
+    pq = _pyarrow("pyarrow.parquet")
     try:
         found = json.loads(pq.read_metadata(file).metadata[NOTE])
     except Exception:  # a damaged file can cause any error in the reader; the file is written again
@@ -123,10 +103,5 @@ def note_of(file: Any) -> dict[str, Any] | None:  # noqa: ANN401 - a binary file
     return found if isinstance(found, dict) else None
 
 
-def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise VoodooError("tables are written by pyarrow: pip install 'voodoo-tracker[batch]'") from None
-    return pyarrow, pyarrow.parquet
+def _pyarrow(module: str = "pyarrow") -> Any:  # noqa: ANN401 - it has no types
+    return installed(module, "tables are written by pyarrow: pip install 'voodoo-tracker[batch]'")

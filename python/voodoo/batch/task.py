@@ -228,15 +228,10 @@ def _parts(items: Iterable[T], limit_s: float | None) -> Iterator[list[T]]:
 
 def joined(parts: Sequence[Track]) -> Track:
     """Concatenates tracks of one body; limbs and joint angles are left out."""
-    first = next((part for part in parts if part.found.any()), parts[0])
-    return Track(
-        stamps=np.concatenate([part.stamps for part in parts]),
-        status=tuple(word for part in parts for word in part.status),
-        residual=np.concatenate([part.residual for part in parts]),
-        joint_names=first.joint_names,
-        joints=np.concatenate([part.joints for part in parts]),
-        limb_names=(),
-        world_from_limb=np.empty((sum(map(len, parts)), 0, 4, 4)),
+    none = [np.empty((len(part), 0, 4, 4)) for part in parts]
+    kept = zip(parts, none, strict=True)
+    return Track.joined(
+        [Track(p.stamps, p.status, p.residual, p.joint_names, p.joints, (), limbs) for p, limbs in kept]
     )
 
 

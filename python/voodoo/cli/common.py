@@ -111,6 +111,11 @@ def wrote(files: Sequence[Path]) -> str:
     return f"; wrote {' and '.join(map(str, files))}" if files else ""
 
 
+def print_written(files: Iterable[Path], *, aside: bool) -> None:
+    """Name the written files on stdout; `aside`: on stderr."""
+    (print_message if aside else typer.echo)(f"wrote {', '.join(map(str, files))}")
+
+
 def refuse_missing(failures: Iterable[Exception | None], done: str) -> None:
     """Raise an error if outputs are missing, which tells what there is; None: one that is not missing.
 

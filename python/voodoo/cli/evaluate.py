@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,8 +12,8 @@ from voodoo.cli.common import (
     clear_errors,
     loader_words,
     print_interrupted,
-    print_message,
     print_text,
+    print_written,
     progressing,
     reporting,
     until_interrupted,
@@ -112,15 +112,14 @@ def eval_command(
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         several = [path for path in paths if has_people(path)]
-        judgments = list(
-            progressing(
-                evaluate_all_people(
-                    several, config_file=config, loader=loader, options=options, model=model, use=kinds
-                ),
-                "following everybody",
-                len(several),
-            )
-        )
+        how: dict[str, Any] = {
+            "config_file": config,
+            "loader": loader,
+            "options": options,
+            "model": model,
+            "use": kinds,
+        }
+        judgments = list(progressing(evaluate_all_people(several, **how), "following everybody", len(several)))
         if several:
             show_people(judgments, out, report=report)
             refuse_failures(judgments)
@@ -129,16 +128,7 @@ def eval_command(
             return
         if out is not None:
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        done = evaluate_all(
-            paths,
-            config_file=config,
-            loader=loader,
-            options=options,
-            model=model,
-            use=kinds,
-            init=automatic,
-            jobs=jobs,
-        )
+        done = evaluate_all(paths, **how, init=automatic, jobs=jobs)
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
@@ -151,6 +141,6 @@ def eval_command(
         if out is not None and scores:
             with deferred():
                 files = write_reports(out, scores, tables, picture=not interrupted)
-            (print_message if as_json else typer.echo)("wrote " + ", ".join(str(file) for file in files))
+            print_written(files, aside=as_json)
         print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
         refuse_failures(scores)

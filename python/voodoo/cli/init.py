@@ -66,7 +66,7 @@ def init_command(
     from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
     from voodoo.recordings.left_out import LeftOut
     from voodoo.sensors.settings import FrontEndSettings
-    from voodoo.whole import appearing_whole
+    from voodoo.whole import write_whole
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
@@ -99,6 +99,5 @@ def init_command(
         if out is None:
             typer.echo(text)
         else:
-            with appearing_whole(out) as place:
-                place.write_text(text + "\n", encoding="utf-8")
+            write_whole(out, text + "\n")
             typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")

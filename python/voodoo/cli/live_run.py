@@ -44,7 +44,7 @@ from voodoo.sensors.settings import Box, FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 _STANDING = {
     "l_shoulder": (2.4, 0.19, 1.42),
@@ -144,7 +144,7 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
                 session.finish()
             finally:
                 if report is not None:
-                    write_report(report, session)
+                    write_whole(report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
         done.ended, done.with_pose = ended.is_set(), session.with_pose
         if files is not None:
@@ -164,12 +164,6 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
         if now - reported >= _LINE_S:
             reported += _LINE_S
             print_message(session.line())
-
-
-def write_report(path: Path, session: Session) -> None:
-    """Write the report as JSON, atomically."""
-    with appearing_whole(path) as place:
-        place.write_text(json.dumps(session.report(), indent=2) + "\n", encoding="utf-8")
 
 
 def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from voodoo.cli.common import print_message
+from voodoo.cli.common import print_written
 from voodoo.errors import NoPoseError, VoodooError
 
 if TYPE_CHECKING:
@@ -110,9 +110,7 @@ def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict
     else:
         typer.echo(people_markdown(scores))
     if out is not None:
-        (typer.echo if report is None else print_message)(
-            "wrote " + ", ".join(str(file) for file in write_people(out, scores))
-        )
+        print_written(write_people(out, scores), aside=report is not None)
 
 
 def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:

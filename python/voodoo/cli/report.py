@@ -33,7 +33,7 @@ def report_command(
     from voodoo.export.result_file import check_suffix
     from voodoo.export.track import Track
     from voodoo.visualization.report_page import report_page
-    from voodoo.whole import appearing_whole
+    from voodoo.whole import write_whole
 
     with clear_errors():
         if out.suffix != ".html":
@@ -44,7 +44,5 @@ def report_command(
             tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
         else:
             tracks = {"the person": Track.load(result)}
-        page = report_page(result.stem, tracks, film=film)
-        with appearing_whole(out) as place:
-            place.write_text(page, encoding="utf-8")
+        write_whole(out, report_page(result.stem, tracks, film=film))
         typer.echo(f"wrote {out}")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.detectors.base import JOINTS, DetectedPerson, DetectorImage, names_of
-from voodoo.errors import ConfigError, a_path
+from voodoo.errors import ConfigError, a_path, installed
 from voodoo.stored import MOST_RECORDED, check_stored
 
 if TYPE_CHECKING:
@@ -56,12 +56,8 @@ class OnnxDetector:
         Raises:
             ConfigError: onnxruntime is missing, the file cannot be read, or its input and outputs differ from the above.
         """
-        try:
-            import onnxruntime
-        except ImportError:
-            raise ConfigError(
-                "OnnxDetector: expected onnxruntime, found none; pip install 'voodoo-tracker[onnx]'"
-            ) from None
+        missing = "OnnxDetector: expected onnxruntime, found none; pip install 'voodoo-tracker[onnx]'"
+        onnxruntime = installed("onnxruntime", missing, error=ConfigError)
         self.joints = names_of("joints", joints)
         self._sigma, self._most = float(joint_sigma), int(most)
         self.path = a_path(path, error=ConfigError)

@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
-from voodoo.evaluation.figure import new_figure
+from voodoo.evaluation.figure import new_figure, save_figure
 from voodoo.evaluation.metrics import mean_or_nan
-from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
@@ -95,9 +94,7 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
     """Compare errors with their standard deviations; None if no joint has both."""
     if not found:
         return None
-    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
-    measured = np.concatenate([each.measured for each in found])
-    known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    errors, sigma, measured, known = _together(found)
     if not known.any():
         return None
     coverages = [
@@ -127,6 +124,13 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
         kept_m=float(size[np.argsort(total, kind="stable")[:kept]].mean()),
         oracle_m=float(np.sort(size)[:kept].mean()),
     )
+
+
+def _together(found: Sequence[Deviations]) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
+    """Errors, standard deviations, whether the limb is measured, and which joints (F, 12) have both."""
+    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
+    known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    return errors, sigma, np.concatenate([each.measured for each in found]), known
 
 
 def _coverage(name: str, errors: FloatArray, sigma: FloatArray) -> Coverage:
@@ -166,9 +170,7 @@ def calibration_markdown(calibration: UncertaintyCalibration, against: str) -> s
 
 def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     """Plot the cumulative distribution of normalized errors, and error over standard deviation."""
-    errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
-    measured = np.concatenate([each.measured for each in found])
-    known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    errors, sigma, measured, known = _together(found)
     figure = new_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)
     steps = np.linspace(0.0, 4.0, 81)
@@ -199,7 +201,4 @@ def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     right.plot(reach, reach, color="#333333", linestyle="--", linewidth=1.0)
     right.set(xscale="log", yscale="log", xlabel="standard deviation [cm]", ylabel="root mean square error [cm]")
     right.legend(frameon=False, fontsize=8)
-    for axes in (left, right):
-        axes.spines[["top", "right"]].set_visible(False)
-    with appearing_whole(path) as place:
-        figure.savefig(place, dpi=130)
+    save_figure(figure, path)

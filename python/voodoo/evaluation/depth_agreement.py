@@ -89,15 +89,19 @@ def witness(
         Empty arrays for a searching frame, which has no model to compare with.
     """
     distances, about, overlaps = [np.empty(0)], [np.empty(0, dtype=bool)], [np.empty(0)]
+    box = _box(tracker.body, estimate, truth, selection) if estimate.joints else None
     for item in recorded.measurements if estimate.joints else ():
         if isinstance(item, DepthImage):
-            points, valid = depth_points(item, box=_box(tracker.body, estimate, truth, selection))
+            points, valid = depth_points(item, box=box)
         elif isinstance(item, PointCloud):
             points = transform(item.root_from_sensor, item.points)
             valid = np.ones(len(points), dtype=bool)
         else:
             continue
-        chosen = _select(points, tracker.body, estimate, truth, selection)
+        if selection == "truth":
+            chosen = near_joints(points, truth)
+        else:
+            chosen = np.ones(len(points), dtype=bool) if box is None else _in_box(points, *box)
         person = np.zeros(len(valid), dtype=bool)
         person[valid], points = chosen, points[chosen]
         if len(points):
@@ -142,19 +146,6 @@ def _around(capsules: Sequence[tuple[FloatArray, FloatArray, float]]) -> tuple[F
 def _in_box(points: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
     x, y, z = ((points[:, axis] >= low[axis]) & (points[:, axis] <= high[axis]) for axis in range(3))
     return np.asarray(x & y & z)
-
-
-def _select(
-    points: FloatArray,
-    body: Body,
-    estimate: Estimate,
-    truth: Mapping[str, FloatArray],
-    selection: Selection,
-) -> BoolArray:
-    if selection == "truth":
-        return near_joints(points, truth)
-    box = _box(body, estimate, truth, selection)
-    return np.ones(len(points), dtype=bool) if box is None else _in_box(points, *box)
 
 
 def _box(

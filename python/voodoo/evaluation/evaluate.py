@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -109,11 +110,7 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
 
 def differences(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
     """Errors by coordinate, (F, 12, 3): estimate minus reference."""
-    column = {name: index for index, name in enumerate(result.joint_names)}
-    positions = np.full((len(result), len(metrics.JOINTS), 3), np.nan)
-    for index, name in enumerate(metrics.JOINTS):
-        if name in column:
-            positions[:, index] = result.joints[:, column[name]]
+    positions = _joints(result.joint_names, result.joints)
     reference = _reference_positions(recording, result.stamps)
     lag = metrics.best_lag(positions, reference) if at_best_lag else 0
     return np.asarray(positions - metrics.shifted(reference, lag))
@@ -152,31 +149,21 @@ def evaluate_all(
 
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
     """
-    tasks = [
-        (
-            str(path),
-            None if config_file is None else str(config_file),
-            loader,
-            dict(options or {}),
-            model,
-            None if use is None else tuple(use),
-            init,
-        )
-        for path in paths
-    ]
-    if jobs == 1 or len(tasks) == 1:
-        for index, task in enumerate(tasks):
-            yield index, *_task(*task)
+    how = {"loader": loader, "options": dict(options or {}), "model": model, "use": use, "init": init}
+    task = partial(_task, config_file, how)
+    if jobs == 1 or len(paths) == 1:
+        for index, path in enumerate(paths):
+            yield index, *task(path)
         return
     others = set(multiprocessing.active_children())
     with children():  # starts a helper process of multiprocessing
         pool = ProcessPoolExecutor(
-            min(jobs, len(tasks)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
+            min(jobs, len(paths)), mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
         )
     done = False
     try:
         with children(), _deaf_children():
-            futures = {pool.submit(_task, *task): index for index, task in enumerate(tasks)}
+            futures = {pool.submit(task, path): index for index, path in enumerate(paths)}
         for future in as_completed(futures):
             yield futures[future], *future.result()
         done = True
@@ -212,20 +199,11 @@ def _one_thread() -> None:
     cv2.setNumThreads(1)
 
 
-def _task(
-    path: str,
-    config_file: str | None,
-    loader: str | None,
-    options: Mapping[str, Any],
-    model: HumanModel | None,
-    use: Sequence[str] | None,
-    init: Automatic | None,
-) -> tuple[Score, FrameTable | None]:
+def _task(config_file: Path | None, how: Mapping[str, Any], path: Path) -> tuple[Score, FrameTable | None]:
     try:
-        config = None if config_file is None else Config.load(config_file)
-        return evaluate(Path(path), config=config, loader=loader, options=options, model=model, use=use, init=init)
+        return evaluate(path, config=None if config_file is None else Config.load(config_file), **how)
     except (VoodooError, OSError) as error:
-        return Score(Path(path).name, Path(path), failure=str(error)), None
+        return Score(path.name, path, failure=str(error)), None
 
 
 def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
@@ -343,15 +321,20 @@ def _first_pose(
     return max(float(stamps[found[0]] - stamps[known[0]]), 0.0), metrics.mean_or_nan(errors[found[0]])
 
 
+def _joints(names: Sequence[str], positions: FloatArray) -> FloatArray:
+    """Of positions (F, J, 3) those of metrics.JOINTS (F, 12, 3); NaN where a joint is missing."""
+    chosen = np.full((len(positions), len(metrics.JOINTS), 3), np.nan)
+    for index, name in enumerate(metrics.JOINTS):
+        if name in names:
+            chosen[:, index] = positions[:, names.index(name)]
+    return chosen
+
+
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     """Reference of the twelve joints at the stamps, (F, 12, 3); NaN where there is none."""
     reference = recording.reference
     if reference is None:
         return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
-    column = {name: index for index, name in enumerate(reference.names)}
-    table = np.full((len(reference.stamps), len(metrics.JOINTS), 3), np.nan)
-    for index, name in enumerate(metrics.JOINTS):
-        if name in column:
-            table[:, index] = reference.positions[:, column[name]]
+    table = _joints(reference.names, reference.positions)
     period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / 30.0
     return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)

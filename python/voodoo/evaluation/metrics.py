@@ -150,7 +150,7 @@ def angle_error(estimated: FloatArray, reference: FloatArray) -> tuple[float, fl
     return mean_or_nan(np.abs(errors)), float(np.mean(spreads)) if spreads else float("nan")
 
 
-def shifted(reference: FloatArray, lag: int) -> FloatArray:
+def shifted(reference: FloatArray | BoolArray, lag: int) -> FloatArray:
     """The reference (F, ...) shifted for an estimate that is `lag` frames late; NaN outside."""
     moved = np.full(reference.shape, np.nan)
     source = np.arange(len(reference)) - lag
@@ -269,11 +269,7 @@ def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) ->
         return float("nan")
     second = np.full(positions.shape[:2], np.nan)
     second[1:-1] = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
-    source = np.arange(len(positions)) - lag
-    inside = (source >= 0) & (source < len(positions))
-    counted = np.zeros(still.shape, dtype=bool)
-    counted[inside] = still[source[inside]]
-    return mean_or_nan(second[counted])
+    return mean_or_nan(second[shifted(still, lag) == 1.0])
 
 
 def fraction_within(distances: FloatArray, limit: float) -> float:

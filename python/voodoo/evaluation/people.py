@@ -8,7 +8,7 @@ in view are expected; others may be tracked or not without effect. MOTA, IDF1 an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.evaluation import metrics
 from voodoo.evaluation.metrics import FloatArray
 from voodoo.export.people_rows import PeopleRows
@@ -311,19 +311,14 @@ def motmetrics() -> Any:  # noqa: ANN401 - py-motmetrics has no types
     Raises:
         VoodooError: it is not installed; says how to install it.
     """
-    try:
-        import motmetrics as library
-    except ImportError:
-        raise VoodooError("several people are judged by py-motmetrics: pip install 'voodoo-tracker[eval]'") from None
-    return library
+    return installed("motmetrics", "several people are judged by py-motmetrics: pip install 'voodoo-tracker[eval]'")
 
 
 def together(scores: Sequence[PeopleScore]) -> PeopleScore:
     """Combines the scores without failure: sums of counts, and means weighted by their counts."""
     good = [one for one in scores if not one.failure]
-    added = ["seconds", "persons", "ids", "expected", "missed", "extra", "switches", "id_true", "id_false", "id_missed"]
-    added += ["returns", "returned", "visits", "visits_matched", "false_bodies", "left_behind", "joints"]
-    sums = {name: sum(getattr(one, name) for one in good) for name in added}
+    counted = [field.name for field in fields(PeopleScore) if field.default == 0]
+    sums = {name: sum(getattr(one, name) for one in good) for name in counted}
 
     def mean(name: str, weight: str) -> float:
         parts = [(getattr(one, name), getattr(one, weight)) for one in good if np.isfinite(getattr(one, name))]

@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
 from voodoo.evaluation.people import ABSENT_S, IN_VIEW, JOINTS_IN_VIEW, MATCH_M, PeopleScore, together
-from voodoo.whole import appearing_whole
+from voodoo.evaluation.tables import write_table
+from voodoo.whole import write_whole
 
-_HEADER = (
-    "recording",
-    "persons",
-    "ids",
-    "MOTA",
-    "IDF1",
-    "id switches",
-    "same id after return",
-    "first pose after, s (worst)",
-    "never found",
-    "false bodies a minute",
-    "left behind",
-    "joint error, cm",
-    "ms a frame",
-)
 DERIVED = ("mota", "idf1", "false_a_minute")
 
 
 def people_markdown(scores: Sequence[PeopleScore]) -> str:
     """A table with a row per recording, and one for all together."""
-    lines = ["## Several people, against exact truth\n", _row(_HEADER), "|" + "---|" * len(_HEADER)]
+    lines = [
+        "## Several people, against exact truth\n",
+        _row([name for name, _ in _COLUMNS]),
+        "|" + "---|" * len(_COLUMNS),
+    ]
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
         lines.append(_line(together(scores)))
@@ -53,38 +42,16 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     table, text = folder / "people.csv", folder / "people.md"
-    names = [item.name for item in fields(PeopleScore)]
-    with appearing_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*names, *DERIVED])
-        for score in scores:
-            writer.writerow([_cell(getattr(score, name)) for name in (*names, *DERIVED)])
-    with appearing_whole(text) as part:
-        part.write_text(people_markdown(scores), encoding="utf-8")
+    names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
+    write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
+    write_whole(text, people_markdown(scores))
     return [table, text]
 
 
 def _line(score: PeopleScore) -> str:
     if score.failure:
-        return _row((score.name, score.failure.replace("|", "/"), *[""] * (len(_HEADER) - 2)))
-    wait = _word(score.first_pose_s, 2)
-    return _row(
-        (
-            score.name,
-            f"{score.persons}",
-            f"{score.ids}",
-            _word(score.mota, 3),
-            _word(score.idf1, 3),
-            f"{score.switches}",
-            f"{score.returned} of {score.returns}" if score.returns else "-",
-            wait if wait == "-" else f"{wait} ({_word(score.worst_first_pose_s, 2)})",
-            f"{score.visits - score.visits_matched} of {score.visits}",
-            _word(score.false_a_minute, 1),
-            f"{score.left_behind}",
-            _word(100.0 * score.joint_error_m, 1),
-            _word(1000.0 * score.step_s, 1),
-        )
-    )
+        return _row((score.name, score.failure.replace("|", "/"), *[""] * (len(_COLUMNS) - 2)))
+    return _row([cell(score) for _, cell in _COLUMNS])
 
 
 def _row(cells: Sequence[str]) -> str:
@@ -95,7 +62,24 @@ def _word(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
 
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6f}" if math.isfinite(value) else ""
-    return str(value)
+def _first_pose(score: PeopleScore) -> str:
+    wait = _word(score.first_pose_s, 2)
+    return wait if wait == "-" else f"{wait} ({_word(score.worst_first_pose_s, 2)})"
+
+
+_COLUMNS: tuple[tuple[str, Callable[[PeopleScore], str]], ...] = (
+    ("recording", lambda score: score.name),
+    ("persons", lambda score: f"{score.persons}"),
+    ("ids", lambda score: f"{score.ids}"),
+    ("MOTA", lambda score: _word(score.mota, 3)),
+    ("IDF1", lambda score: _word(score.idf1, 3)),
+    ("id switches", lambda score: f"{score.switches}"),
+    ("same id after return", lambda score: f"{score.returned} of {score.returns}" if score.returns else "-"),
+    ("first pose after, s (worst)", _first_pose),
+    ("never found", lambda score: f"{score.visits - score.visits_matched} of {score.visits}"),
+    ("false bodies a minute", lambda score: _word(score.false_a_minute, 1)),
+    ("left behind", lambda score: f"{score.left_behind}"),
+    ("joint error, cm", lambda score: _word(100.0 * score.joint_error_m, 1)),
+    ("ms a frame", lambda score: _word(1000.0 * score.step_s, 1)),
+)
+"""Name and cell of each column."""

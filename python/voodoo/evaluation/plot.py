@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.evaluation.figure import new_figure
+from voodoo.evaluation.figure import new_figure, save_figure
 from voodoo.evaluation.score import Score
 from voodoo.evaluation.summary import CLASSES
-from voodoo.whole import appearing_whole
 
 _CLASS_COLORS = ("#c8553d", "#e8b04b", "#4c8c6b")
 
@@ -38,7 +37,4 @@ def plot_errors(path: Path, scores: Sequence[Score]) -> None:
     right.margins(y=0.12)
     right.set_xlabel("class (2: never lost, 0: lost at the end)", fontsize=8)
     right.set_ylabel("sequences")
-    for axes in (left, right):
-        axes.spines[["top", "right"]].set_visible(False)
-    with appearing_whole(path) as place:
-        figure.savefig(place, dpi=130)
+    save_figure(figure, path)

@@ -13,9 +13,9 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown, plot_calibration
 from voodoo.evaluation.plot import plot_errors
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
-from voodoo.evaluation.summary import summarize
+from voodoo.evaluation.summary import KINDS, Summary, summarize
 from voodoo.evaluation.tables import write_frames, write_sequences, write_summary
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 _LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
     ("error_m", "mean joint error", lambda value: f"{100 * value:.1f} cm"),
@@ -57,16 +57,13 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
     text = []
     deviations = deviations_of(scores, tables)
     for summary in summarize(scores):
-        count = f"{summary.sequences} sequence{'s' * (summary.sequences > 1)}"
-        text += [f"## Against {summary.kind}: {count}\n" if summary.sequences else "## Not tracked\n"]
+        text += _head(summary) if summary.sequences else ["## Not tracked\n"]
         if summary.sequences:
-            zero, one, two = summary.classes
-            text += ["| | |", "|---|---|", f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |"]
             text += [f"| class average | {_word(summary.class_average, lambda value: f'{value:.2f}')} |"]
             text += [f"| {words} | {_word(summary.means[name], form)} |" for name, words, form in _LINES]
             lags = ", ".join(f"{lag:+d}: {count}" for lag, count in summary.lags) or "-"
             text += [f"| best lag in frames: sequences | {lags} |", ""]
-            group = [s for s in scores if not s.failure and _kind(s) == summary.kind]
+            group = [s for s in scores if not s.failure and KINDS[s.exact] == summary.kind]
             text += _joint_table(group)
             calibration = calibrate(deviations.get(summary.kind, ()))
             if calibration is not None:
@@ -106,18 +103,23 @@ _BRIEF = (
 """What the first screen tells beside the classes."""
 
 
+def _head(summary: Summary) -> list[str]:
+    """The heading of a table, and its first row."""
+    zero, one, two = summary.classes
+    return [
+        f"## Against {summary.kind}: {summary.sequences} sequence{'s' * (summary.sequences > 1)}\n",
+        "| | |",
+        "|---|---|",
+        f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |",
+    ]
+
+
 def brief(scores: Sequence[Score]) -> str:
     """The ten rows of `markdown` that tell most, for each kind of comparison, and the failures."""
     text = []
     for summary in summarize(scores):
         if summary.sequences:
-            zero, one, two = summary.classes
-            text += [
-                f"## Against {summary.kind}: {summary.sequences} sequence{'s' * (summary.sequences > 1)}\n",
-                "| | |",
-                "|---|---|",
-            ]
-            text += [f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |"]
+            text += _head(summary)
             text += [
                 f"| {words} | {_word(summary.means[name], form)} |" for name, words, form in _LINES if name in _BRIEF
             ]
@@ -130,7 +132,7 @@ def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) 
     found: dict[str, list[Deviations]] = {}
     for score, table in zip(scores, tables, strict=False):
         if table is not None and table.deviations is not None:
-            found.setdefault(_kind(score), []).append(table.deviations)
+            found.setdefault(KINDS[score.exact], []).append(table.deviations)
     return found
 
 
@@ -155,8 +157,7 @@ def write_reports(
     )
     write_sequences(sequences, scores)
     write_summary(summary, summarize(scores))
-    with appearing_whole(text) as part:
-        part.write_text(markdown(scores, tables), encoding="utf-8")
+    write_whole(text, markdown(scores, tables))
     if not picture:
         return [sequences, summary, text]
     plot_errors(plot, scores)
@@ -179,10 +180,6 @@ def _joint_table(scores: Sequence[Score]) -> list[str]:
             f"| {word} | " + " | ".join(_word(mean, lambda value: f"{100 * value:.1f}") for mean in means) + " |"
         )
     return [*lines, ""]
-
-
-def _kind(score: Score) -> str:
-    return {True: "exact truth", False: "reference skeleton", None: "no reference"}[score.exact]
 
 
 def _word(value: float, form: Callable[[float], str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.score import Score
 
 CLASSES = (0, 1, 2)
+KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
+"""What a sequence is compared with, by `Score.exact`."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,7 @@ class Summary:
         )
 
 
-MEANS = (
-    "error_m", "error_lag0_m", "error_best_lag_m", "error_without_offsets_m",
-    "class_without_offsets", "lost_without_offsets", "first_pose_s", "first_pose_error_m",
-    "within_5cm", "within_10cm", "depth_within_5cm", "depth_median_m",
-    "depth_p95_m", "person_within_5cm", "silhouette_iou", "jitter_m", "reference_jitter_m", "standing_jitter_m",
-    "reference_standing_jitter_m", "degraded_share", "lost_share", "searching_share", "lost_recall", "false_alarm_rate", "step_s",
-    "angle_error_deg", "angle_spread_deg", "left_out_share",
-)  # fmt: skip
+MEANS = tuple(item.name for item in fields(Score) if item.type == "float")
 
 
 TOGETHER = {"lost_recall": "far_ends", "false_alarm_rate": "near_ends"}
@@ -64,9 +59,8 @@ SUMMARY = (*MEANS, *(f"{name}_together" for name in TOGETHER))
 
 def summarize(scores: Sequence[Score]) -> list[Summary]:
     """One summary for each kind of comparison; failures have the kind "no reference", unless their kind is known."""
-    kinds = {True: "exact truth", False: "reference skeleton", None: "no reference"}
     summaries = []
-    for exact, kind in kinds.items():
+    for exact, kind in KINDS.items():
         group = [score for score in scores if score.exact is exact]
         done = [score for score in group if not score.failure]
         if group:

@@ -18,7 +18,7 @@ from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
 from voodoo.export.opensim import write_mot, write_sto
 from voodoo.export.result_file import SUFFIXES
-from voodoo.export.ros2 import write_bag
+from voodoo.export.ros2 import write_people_bag
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
 from voodoo.export.upright import Turn, upright
@@ -67,11 +67,6 @@ def check_target(path: Path) -> None:
 def is_folder(path: Path) -> bool:
     """Whether a name is that of a bag folder: the part after its last dot, if any, is not a file suffix (run.2026-05-01)."""
     return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
-
-
-def is_bag(path: Path) -> bool:
-    """Whether a name is that of a bag: an .mcap file or a folder."""
-    return (path.suffix == ".mcap" and not is_foxglove(path)) or (path != STDOUT and is_folder(path))
 
 
 def is_foxglove(path: Path) -> bool:
@@ -155,13 +150,31 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | 
         with on_stdout(path) as file:
             track.save(file)
         return
-    with appearing_whole(path) as place:
-        if path.suffix in ONE_PERSON:
+    if path.suffix in ONE_PERSON:
+        with appearing_whole(path) as place:
             ONE_PERSON[path.suffix](place, upright(track, root_frame, turn)[0], body)
-        elif is_foxglove(path):
-            write_foxglove(place, {"p1": (track, body)}, root_frame=root_frame, turn=turn)
+        return
+    write_persons(path, {"p1": (path.stem, track, body)}, root_frame=root_frame, turn=turn)
+
+
+def write_persons(
+    path: Path, people: Mapping[str, tuple[str, Track, Body]], *, root_frame: str, turn: Turn | None
+) -> None:
+    """Write a format that holds any number of persons: .glb, .mcap, or a ROS 2 bag folder.
+
+    Args:
+        path: see FORMATS.
+        people: REP-155 id -> name in .glb, track with limb poses, and body in the sizes it was tracked with.
+        root_frame: see `save`.
+        turn: see `save`.
+    """
+    tracks = {person: (track, body) for person, (_, track, body) in people.items()}
+    with appearing_whole(path) as place:
+        if is_foxglove(path):
+            write_foxglove(place, tracks, root_frame=root_frame, turn=turn)
         elif path.suffix == ".glb":
-            write_glb(place, {path.stem: (upright(track, root_frame, turn)[0], body)})
+            shown = {name: (upright(track, root_frame, turn)[0], body) for name, track, body in people.values()}
+            write_glb(place, shown)
         else:
             with bag_folder(place) as folder:
-                write_bag(folder, track, body, root_frame=root_frame, turn=turn)
+                write_people_bag(folder, tracks, root_frame=root_frame, turn=turn)

@@ -10,17 +10,22 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError
-from voodoo.export.people_rows import PeopleRows, read_rows, write_rows
+from voodoo.export.people_rows import PeopleRows, write_rows
 from voodoo.export.result_file import check_suffix
-from voodoo.export.track import Track, arrays_of, track_of_rows, tracks_of, write_arrays
+from voodoo.export.track import BY_FRAME, Track, arrays_of, read_persons, save_result
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
-from voodoo.unpacking import stored_arrays
-from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+def by_time(tracks: Mapping[int, Track]) -> tuple[npt.NDArray[np.int64], Track]:
+    """Number of the person (R,) and estimates of R rows, of persons with the same joints, ordered by time and number."""
+    persons = np.concatenate([np.full(len(track), one) for one, track in tracks.items()])
+    rows = Track.joined(list(tracks.values()))
+    order = np.lexsort((persons, rows.stamps))
+    return persons[order], rows.of_frames(order)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,22 +72,16 @@ class PeopleTrack:
         if not self.tracks:
             none = np.empty((0, 0))
             return PeopleRows(np.empty(0), np.empty(0, dtype=np.int64), (), np.empty(0), (), none[..., None], (), none)
-        persons = np.concatenate([np.full(len(track), one) for one, track in self.tracks.items()])
-        stamps = np.concatenate([track.stamps for track in self.tracks.values()])
-        order = np.lexsort((persons, stamps))
-        status = [word for track in self.tracks.values() for word in track.status]
-        first = next(iter(self.tracks.values()))
-        joined = {
-            name: np.concatenate([getattr(track, name) for track in self.tracks.values()])[order]
-            for name in ("residual", "joints", "angles")
-        }
+        persons, rows = by_time(self.tracks)
         return PeopleRows(
-            stamps=stamps[order],
-            persons=persons[order],
-            status=tuple(status[index] for index in order),
-            joint_names=first.joint_names,
-            angle_names=first.angle_names,
-            **joined,
+            stamps=rows.stamps,
+            persons=persons,
+            status=rows.status,
+            residual=rows.residual,
+            joint_names=rows.joint_names,
+            joints=rows.joints,
+            angle_names=rows.angle_names,
+            angles=rows.angles,
         )
 
     def unbroken(self, person: int, *, to_the_end: bool = False) -> Track:
@@ -102,18 +101,13 @@ class PeopleTrack:
             wide[place - first] = values
             return wide
 
+        arrays: dict[str, Any] = {name: spread(getattr(track, name)) for name in BY_FRAME}
+        arrays["stamps"] = self.stamps[first:end]
         return replace(
             track,
-            stamps=self.stamps[first:end],
             status=spread_words(track.status, SEARCHING),
             limb_status={limb: spread_words(words, "") for limb, words in track.limb_status.items()},
-            residual=spread(track.residual),
-            joints=spread(track.joints),
-            world_from_limb=spread(track.world_from_limb),
-            angles=spread(track.angles),
-            covariance=spread(track.covariance),
-            root_covariance=spread(track.root_covariance),
-            angle_sigma=spread(track.angle_sigma),
+            **arrays,
         )
 
     def save(self, path: str | Path) -> None:
@@ -125,13 +119,7 @@ class PeopleTrack:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        path = Path(path)
-        check_suffix(path)
-        with appearing_whole(path) as part:
-            if path.suffix == ".csv":
-                write_rows(part, [self.rows()])
-            else:
-                write_arrays(part, lambda: iter([self.arrays()]))
+        save_result(path, lambda part: write_rows(part, [self.rows()]), self.arrays)
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """All data as arrays, see `save`."""
@@ -155,11 +143,4 @@ class PeopleTrack:
         """
         path = Path(path)
         check_suffix(path)
-        if path.suffix == ".csv":
-            rows = read_rows(path)
-            persons = np.unique(rows.persons).tolist()
-            return cls(np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in persons})
-        with stored_arrays(path, "a result of voodoo track --people") as content:
-            if "persons" not in content:
-                raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
-            return cls(content["stamps"], tracks_of(content))
+        return cls(*read_persons(path))

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from voodoo.export.files import ONE_PERSON, bag_folder, check_target, is_bag, is_foxglove, on_stdout
-from voodoo.export.foxglove import write_foxglove
-from voodoo.export.glb import write_glb
+from voodoo.export.files import ONE_PERSON, check_target, is_table, on_stdout, save, write_persons
 from voodoo.export.people import PeopleTrack
-from voodoo.export.ros2 import person_id, write_people_bag
-from voodoo.export.upright import Turn, upright
+from voodoo.export.ros2 import person_id
+from voodoo.export.upright import Turn
 from voodoo.model.body import Body
-from voodoo.whole import appearing_whole
 
 
 def save_people(
@@ -39,24 +36,16 @@ def save_people(
         written = []
         for one in result.tracks:
             own = path.with_name(f"{path.stem}_{one}{path.suffix}")
-            track, _ = upright(result.unbroken(one), root_frame, turn)
-            with appearing_whole(own) as place:
-                ONE_PERSON[path.suffix](place, track, bodies[one])
+            save(result.unbroken(one), own, body=bodies[one], root_frame=root_frame, turn=turn)
             written.append(own)
         return written
-    if is_bag(path) or is_foxglove(path):
-        people = {person_id(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
-        with appearing_whole(path) as place:
-            if is_foxglove(path):
-                write_foxglove(place, people, root_frame=root_frame, turn=turn)
-            else:
-                with bag_folder(place) as folder:
-                    write_people_bag(folder, people, root_frame=root_frame, turn=turn)
-    elif path.suffix == ".glb":
-        shown = {one: upright(result.unbroken(one, to_the_end=True), root_frame, turn)[0] for one in result.tracks}
-        with appearing_whole(path) as place:
-            write_glb(place, {f"{path.stem}_{one}": (track, bodies[one]) for one, track in shown.items()})
-    else:
+    if is_table(path):
         with on_stdout(path) as file:
             result.save(file)
+        return [path]
+    people = {
+        person_id(one): (f"{path.stem}_{one}", result.unbroken(one, to_the_end=True), bodies[one])
+        for one in result.tracks
+    }
+    write_persons(path, people, root_frame=root_frame, turn=turn)
     return [path]

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError, columns_in, reading
+from voodoo.errors import VoodooError, columns_in, naming, reading
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import stored_arrays
 
@@ -70,50 +70,78 @@ def read_rows(path: Path) -> PeopleRows:
         VoodooError: another header, an invalid cell, decreasing stamps, or two rows of a person at one stamp.
     """
     check_stored(path, "a result of voodoo track --people", most=MOST_RECORDED)
-    with reading(path, "a result of voodoo track --people"), path.open(newline="", encoding="utf-8-sig") as file:
-        header, *rows = list(csv.reader(file)) or [[]]
-    first = next((i for i, cell in enumerate(header) if cell.endswith("_rad")), len(header))
-    names = tuple(cell.removesuffix("_x") for cell in header[4:first:3])
-    angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:])
-    if header != header_of(names, angle_names):
-        raise VoodooError(f"{path}: expected columns {', '.join(FIRST)}, NAME_x, ..., found {columns_in(header)}")
-    table = np.full((len(rows), len(header)), np.nan)
-    for index, row in enumerate(rows):
-        where = f"{path}, line {index + 2}"
-        if len(row) != len(header):
-            raise VoodooError(f"{where}: expected {len(header)} cells, found {len(row)}")
-        if row[2] not in STATUSES:
-            raise VoodooError(f"{where}: status: expected one of {', '.join(STATUSES)}, found {row[2]!r}")
+    with reading(path, "a result of voodoo track --people"), naming(path, VoodooError):
+        return read_cells(path, FIRST)[0]
+
+
+def read_cells(
+    path: Path, first: Sequence[str], *, more: bool = False
+) -> tuple[PeopleRows, dict[str, tuple[str, ...]]]:
+    """Read the rows of one person or several; see `header_of`.
+
+    Args:
+        path: the file.
+        first: the first columns.
+        more: whether other columns may follow.
+
+    Returns:
+        The rows, without the column `person` all of person 1; and the words in each of the other columns.
+
+    Raises:
+        VoodooError: see `read_rows`; without the name of the file.
+    """
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        header, *lines = list(csv.reader(file)) or [[]]
+    at, end = first.index("status"), len(first)
+    while end + 3 <= len(header) and header[end : end + 3] == [f"{header[end][:-2]}_{axis}" for axis in "xyz"]:
+        end += 3
+    last = next((i for i in range(end, len(header)) if not header[i].endswith("_rad")), len(header))
+    names = tuple(cell.removesuffix("_x") for cell in header[len(first) : end : 3])
+    angle_names = tuple(cell.removesuffix("_rad") for cell in header[end:last])
+    known = header if not more else header[:last]
+    if known != header_of(first, names, angle_names) or len(set(header)) != len(header):
+        raise VoodooError(f"expected columns {', '.join(first)}, NAME_x, ..., found {columns_in(header)}")
+    table = np.full((len(lines), last), np.nan)
+    for number, (line, row) in enumerate(zip(lines, table, strict=True), start=2):
+        if len(line) != len(header):
+            raise VoodooError(f"line {number}: expected {len(header)} cells, found {len(line)}")
         try:
-            table[index] = [float(cell or "nan") for cell in (*row[:2], "", *row[3:])]
+            row[:] = [float(cell or "nan") for cell in (*line[:at], "", *line[at + 1 : last])]
         except ValueError as error:
-            raise VoodooError(f"{where}: expected numbers, found {error}") from error
-    _check(path, table)
-    return PeopleRows(
+            raise VoodooError(f"line {number}: expected numbers, found {error}") from error
+    status, persons = tuple(line[at] for line in lines), np.ones(len(lines), dtype=np.int64)
+    if "person" in first:
+        _check(table, status)
+        persons = table[:, first.index("person")].astype(np.int64)
+    rows = PeopleRows(
         stamps=table[:, 0],
-        persons=table[:, 1].astype(np.int64),
-        status=tuple(row[2] for row in rows),
-        residual=table[:, 3],
+        persons=persons,
+        status=status,
+        residual=table[:, len(first) - 1],
         joint_names=names,
-        joints=table[:, 4:first].reshape(len(rows), len(names), 3),
+        joints=table[:, len(first) : end].reshape(len(lines), len(names), 3),
         angle_names=angle_names,
-        angles=table[:, first:],
+        angles=table[:, end:],
     )
+    return rows, {header[i]: tuple(line[i] for line in lines) for i in range(last, len(header))}
 
 
-def _check(path: Path, table: FloatArray) -> None:
+def _check(table: FloatArray, status: Sequence[str]) -> None:
     """Reject rows (N, columns) that are not a consistent result."""
+    if unknown := [index for index, word in enumerate(status) if word not in STATUSES]:
+        expected = f"status: expected one of {', '.join(STATUSES)}, found {status[unknown[0]]!r}"
+        raise VoodooError(f"line {unknown[0] + 2}: {expected}")
     stamps, persons = table[:, 0], table[:, 1]
     if not np.isfinite(stamps).all() or (np.diff(stamps) < 0.0).any():
-        raise VoodooError(f"{path}: stamp_s: expected finite numbers that do not fall, found others")
+        raise VoodooError("stamp_s: expected finite numbers that do not fall, found others")
     wrong = ~((persons >= 1) & (persons % 1.0 == 0.0))
     if wrong.any():
         line = int(np.flatnonzero(wrong)[0]) + 2
-        raise VoodooError(f"{path}, line {line}: person: expected an integer from 1, found {persons[line - 2]:g}")
+        raise VoodooError(f"line {line}: person: expected an integer from 1, found {persons[line - 2]:g}")
     if len(np.unique(table[:, :2], axis=0)) != len(table):
-        raise VoodooError(f"{path}: expected one row for a person and stamp, found several")
+        raise VoodooError("expected one row for a person and stamp, found several")
     if np.isinf(table).any():
-        raise VoodooError(f"{path}: expected finite numbers or empty cells, found others")
+        raise VoodooError("expected finite numbers or empty cells, found others")
 
 
 def write_rows(path: Path, parts: Iterable[PeopleRows]) -> None:
@@ -123,25 +151,29 @@ def write_rows(path: Path, parts: Iterable[PeopleRows]) -> None:
         header: list[str] = []
         for rows in parts:
             if not header and len(rows):
-                header = header_of(rows.joint_names, rows.angle_names)
+                header = header_of(FIRST, rows.joint_names, rows.angle_names)
                 writer.writerow(header)
             writer.writerows(_cells(rows))
         if not header:
-            writer.writerow(header_of((), ()))
+            writer.writerow(header_of(FIRST, (), ()))
 
 
 def _cells(rows: PeopleRows) -> Iterable[list[str]]:
     columns = (rows.stamps, rows.persons, rows.status, rows.residual, rows.joints, rows.angles)
     for stamp, person, status, residual, joints, angles in zip(*columns, strict=True):
         # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
-        numbers = ["" if np.isnan(value) else f"{value:.6f}" for value in (residual, *joints.ravel(), *angles)]
-        yield [repr(float(stamp)), str(int(person)), status, *numbers]
+        yield [repr(float(stamp)), str(int(person)), status, *cells((residual, *joints.ravel(), *angles))]
 
 
-def header_of(names: Sequence[str], angle_names: Sequence[str]) -> list[str]:
-    """The columns of such a file."""
+def cells(values: Iterable[float]) -> list[str]:
+    """Texts of numbers; empty if unknown."""
+    return ["" if np.isnan(value) else f"{value:.6f}" for value in values]
+
+
+def header_of(first: Sequence[str], names: Sequence[str], angle_names: Sequence[str]) -> list[str]:
+    """The columns of a result: the first ones, those of joints, those of joint angles."""
     places = [f"{name}_{axis}" for name in names for axis in "xyz"]
-    return [*FIRST, *places, *(f"{name}_rad" for name in angle_names)]
+    return [*first, *places, *(f"{name}_rad" for name in angle_names)]
 
 
 def is_people_file(path: Path) -> bool:

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, a_path, columns_in, reading
+from voodoo.errors import VoodooError, a_path, naming, reading
 from voodoo.export.collected import angle_sigmas_of, angles_of_estimates, covariances_of
-from voodoo.export.people_rows import PeopleRows, is_people_file, read_rows
+from voodoo.export.people_rows import PeopleRows, cells, header_of, is_people_file, read_cells, read_rows
 from voodoo.export.result_file import check_suffix
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
@@ -30,13 +30,16 @@ FORMAT_VERSION = 2
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
 BODIES, BODY_OF = "bodies", "body_of"
 """Arrays of a part that are not those of a result: texts of bodies, and the persons whose they are."""
+_FIRST = ("stamp_s", "status", "residual_m")
+"""The first columns of .csv."""
 _STATUS = "_status"
 """Suffix of the name of a limb's column in .csv."""
 _SIGMA = "_sigma_m"
 """Suffix of the name of a joint's column in .csv."""
 _UNKNOWN = ("angle_sigma", "covariance", "root_covariance")
 """Arrays that may be unknown in frames with a pose."""
-_BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
+_WORDS = ("status", "joint_names", "limb_names", "angle_names")
+BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,14 +88,10 @@ class Track:
     def __post_init__(self) -> None:
         """Check that the arrays are consistent, and that all frames with a pose status have a pose."""
         frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
-        if not self.angle_names:
-            object.__setattr__(self, "angles", np.empty((frames, 0)))
-        if not self.covariance.size:
-            object.__setattr__(self, "covariance", np.empty((frames, 0, 3, 3)))
-        if not self.angle_sigma.size:
-            object.__setattr__(self, "angle_sigma", np.empty((frames, 0)))
-        if not self.root_covariance.size:
-            object.__setattr__(self, "root_covariance", np.full((frames, 6, 6), np.nan))
+        missing = {"covariance": (0, 3, 3), "angle_sigma": (0,), "root_covariance": (6, 6), "angles": (0,)}
+        for name, size in missing.items():
+            if not (self.angle_names if name == "angles" else getattr(self, name).size):
+                object.__setattr__(self, name, np.full((frames, *size), np.nan))
         if len(self.status) != frames:
             raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
         for limb, words in self.limb_status.items():
@@ -143,6 +142,11 @@ class Track:
         """Which frames (F,) have a pose: all but the searching ones."""
         return np.array([status != SEARCHING for status in self.status], dtype=bool)
 
+    @property
+    def joint_sigma(self) -> FloatArray:
+        """Root mean square (F, J) of the standard deviations of each joint's x, y and z [m]; (F, 0) without covariances."""
+        return np.asarray(np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3.0))
+
     def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Track:
         """The track of some frames: a mask (F,), or their numbers."""
         numbers = np.arange(len(self))[chosen]
@@ -150,7 +154,7 @@ class Track:
             self,
             status=tuple(self.status[number] for number in numbers),
             limb_status={limb: tuple(words[number] for number in numbers) for limb, words in self.limb_status.items()},
-            **{name: getattr(self, name)[numbers] for name in _BY_FRAME},
+            **{name: getattr(self, name)[numbers] for name in BY_FRAME},
         )
 
     def __len__(self) -> int:
@@ -182,17 +186,14 @@ class Track:
         limb_names: tuple[str, ...] = (
             tuple(posed[0].world_from_limb) if posed else () if body is None else body.limb_names
         )
-        nowhere, unposed = np.full((len(joint_names), 3), np.nan), np.full((len(limb_names), 4, 4), np.nan)
-        joints, poses = [], []
+        joints = np.full((len(estimates), len(joint_names), 3), np.nan)
+        poses = np.full((len(estimates), len(limb_names), 4, 4), np.nan)
         for index, estimate in enumerate(estimates):
-            if str(estimate.status) == SEARCHING:
-                joints.append(nowhere)
-                poses.append(unposed)
-                continue
-            if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
-                raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
-            joints.append(np.array(list(estimate.joints.values()), dtype=np.float64))
-            poses.append(np.array(list(estimate.world_from_limb.values()), dtype=np.float64))
+            if str(estimate.status) != SEARCHING:
+                if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
+                    raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
+                joints[index] = np.reshape(list(estimate.joints.values()), (-1, 3))
+                poses[index] = np.reshape(list(estimate.world_from_limb.values()), (-1, 4, 4))
         angle_names, angles = angles_of_estimates(estimates, body)
         covariance, root_covariance = covariances_of(estimates, joint_names, limb_names)
         return cls(
@@ -205,9 +206,9 @@ class Track:
             status=tuple(str(estimate.status) for estimate in estimates),
             residual=np.array([estimate.residual for estimate in estimates], dtype=np.float64),
             joint_names=joint_names,
-            joints=np.array(joints, dtype=np.float64),
+            joints=joints,
             limb_names=limb_names,
-            world_from_limb=np.array(poses, dtype=np.float64),
+            world_from_limb=poses,
             limb_status={
                 limb: tuple(str(each.limb_status[limb]) if each.limb_status else "" for each in estimates)
                 for limb in limb_names
@@ -225,7 +226,7 @@ class Track:
         if not tracks:
             raise VoodooError("tracks: expected at least one, found none")
         arrays: dict[str, Any] = {}
-        for name in _BY_FRAME:
+        for name in BY_FRAME:
             parts = [getattr(track, name) for track in tracks]
             shape = max((part.shape[1:] for part in parts), key=lambda one: one[0] if one else 0)
             # Without covariances there are no columns.
@@ -243,13 +244,8 @@ class Track:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        path = Path(path)
-        check_suffix(path)
-        with appearing_whole(path) as part:
-            if path.suffix == ".csv":
-                write_csv(part, [self], sure=self.covariance.size > 0)
-            else:
-                write_arrays(part, lambda: iter([arrays_of(self)]))
+        sure = self.covariance.size > 0
+        save_result(path, lambda part: write_csv(part, [self], sure=sure), lambda: arrays_of(self))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
@@ -262,50 +258,29 @@ class Track:
         check_suffix(path)
         if is_people_file(path):
             return _only_person(path)
-        with reading(path, "a result of voodoo track"):
-            try:
-                return cls._read_csv(path) if path.suffix == ".csv" else cls._read_npz(path)
-            except VoodooError as error:
-                raise VoodooError(f"{path}: {error}") from error
+        with reading(path, "a result of voodoo track"), naming(path, VoodooError):
+            if path.suffix == ".csv":
+                rows, others = read_cells(path, _FIRST, more=True)
+                limbs = {name.removesuffix(_STATUS): words for name, words in others.items() if name.endswith(_STATUS)}
+                return replace(track_of_rows(rows, 1), limb_status=limbs)
+            with stored_arrays(path, "a result of voodoo track") as content:
+                return track_of(content)
 
-    @classmethod
-    def _read_csv(cls, path: Path) -> Track:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-        first = 3
-        while first + 3 <= len(header) and header[first : first + 3] == [
-            f"{header[first][:-2]}_{axis}" for axis in "xyz"
-        ]:
-            first += 3
-        last = next((i for i in range(first, len(header)) if not header[i].endswith("_rad")), len(header))
-        names = tuple(cell.removesuffix("_x") for cell in header[3:first:3])
-        angle_names = tuple(cell.removesuffix("_rad") for cell in header[first:last])
-        # Later versions add columns behind these, which are ignored.
-        limbs = {cell.removesuffix(_STATUS): i for i, cell in enumerate(header) if i >= last and cell.endswith(_STATUS)}
-        if header[:last] != _header(names, angle_names) or len(set(header)) != len(header):
-            raise VoodooError(f"expected columns stamp_s, status, residual_m, NAME_x, ..., found {columns_in(header)}")
-        for line, row in enumerate(rows, start=2):
-            if len(row) != len(header):
-                raise VoodooError(f"line {line}: expected {len(header)} cells, found {len(row)}")
-        joints = np.array([[float(cell or "nan") for cell in row[3:first]] for row in rows], dtype=np.float64)
-        angles = np.array([[float(cell or "nan") for cell in row[first:last]] for row in rows], dtype=np.float64)
-        return cls(
-            angle_names=angle_names,
-            angles=angles.reshape(len(rows), len(angle_names)),
-            stamps=np.array([float(row[0]) for row in rows], dtype=np.float64),
-            status=tuple(row[1] for row in rows),
-            residual=np.array([float(row[2] or "nan") for row in rows], dtype=np.float64),
-            joint_names=names,
-            joints=joints.reshape(len(rows), len(names), 3),
-            limb_names=(),
-            world_from_limb=np.empty((len(rows), 0, 4, 4)),
-            limb_status={limb: tuple(row[column] for row in rows) for limb, column in limbs.items()},
-        )
 
-    @classmethod
-    def _read_npz(cls, path: Path) -> Track:
-        with stored_arrays(path, "a result of voodoo track") as content:
-            return track_of(content)
+def save_result(path: str | Path, write: Callable[[Path], None], arrays: Callable[[], Arrays]) -> None:
+    """Write a result as .csv, by `write`, or as .npz of its arrays; the file appears only when it is complete.
+
+    Raises:
+        VoodooError: another suffix.
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    check_suffix(path)
+    with appearing_whole(path) as part:
+        if path.suffix == ".csv":
+            write(part)
+        else:
+            write_arrays(part, lambda: iter([arrays()]))
 
 
 def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
@@ -316,18 +291,17 @@ def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
             if not number:
                 limbs = [f"{limb}{_STATUS}" for limb in part.limb_status]
                 sigmas_of = [f"{name}{_SIGMA}" for name in part.joint_names if sure]
-                writer.writerow(_header(part.joint_names, part.angle_names) + limbs + sigmas_of)
+                writer.writerow(header_of(_FIRST, part.joint_names, part.angle_names) + limbs + sigmas_of)
             words = zip(*part.limb_status.values(), strict=True) if limbs else [()] * len(part)
             sigmas = np.full((len(part), len(sigmas_of)), np.nan)
             if part.covariance.size:
-                sigmas = np.sqrt(np.trace(part.covariance, axis1=2, axis2=3) / 3.0)
+                sigmas = part.joint_sigma
             for stamp, status, residual, joints, angles, support, sigma in zip(
                 part.stamps, part.status, part.residual, part.joints, part.angles, words, sigmas, strict=True
             ):
                 # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
-                row = [repr(float(stamp)), status]
-                row += [_cell(value) for value in (residual, *joints.ravel(), *angles)]
-                writer.writerow([*row, *support, *(_cell(value) for value in sigma)])
+                row = [repr(float(stamp)), status, *cells((residual, *joints.ravel(), *angles))]
+                writer.writerow([*row, *support, *cells(sigma)])
 
 
 def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
@@ -345,7 +319,7 @@ def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Array
             if name in (BODIES, BODY_OF):
                 continue
             array = part[name]
-            if name.rpartition("/")[2] in (*_BY_FRAME, "status", "limb_status"):
+            if name.rpartition("/")[2] in (*BY_FRAME, "status", "limb_status"):
                 count, row, kind = kinds.get(name, (0, array.shape[1:], array.dtype))
                 # Without covariances there are no columns.
                 kinds[name] = count + len(array), max(row, array.shape[1:]), np.result_type(kind, array.dtype)
@@ -368,10 +342,9 @@ def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Array
 
 def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
     """All data of a track as arrays of numbers and words, for .npz."""
-    words = ("status", "joint_names", "limb_names", "angle_names")
     limbs = np.array(list(track.limb_status.values()), dtype=np.str_)
-    return {name: np.array(getattr(track, name), dtype=np.str_) for name in words} | {
-        **{name: getattr(track, name) for name in _BY_FRAME},
+    return {name: np.array(getattr(track, name), dtype=np.str_) for name in _WORDS} | {
+        **{name: getattr(track, name) for name in BY_FRAME},
         "format_version": np.array(FORMAT_VERSION),
         "limb_status_names": np.array(list(track.limb_status), dtype=np.str_),
         "limb_status": limbs.reshape(len(track.limb_status), len(track)).T,
@@ -394,22 +367,9 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         raise VoodooError(
             f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
         )
-    return Track(
-        stamps=content["stamps"],
-        status=tuple(str(value) for value in content["status"]),
-        residual=content["residual"],
-        joint_names=tuple(str(value) for value in content["joint_names"]),
-        joints=content["joints"],
-        limb_names=tuple(str(value) for value in content["limb_names"]),
-        world_from_limb=content["world_from_limb"],
-        # Files of earlier versions have no angles.
-        angle_names=tuple(str(value) for value in content["angle_names"]) if "angle_names" in content else (),
-        angles=content["angles"] if "angles" in content else np.empty((0, 0)),
-        covariance=content.get("covariance", np.empty((0, 0, 3, 3))),
-        root_covariance=content.get("root_covariance", np.empty((0, 6, 6))),
-        angle_sigma=content.get("angle_sigma", np.empty((0, 0))),
-        **_optional_fields(content),
-    )
+    words = {name: tuple(map(str, content[name])) for name in _WORDS if name in content}
+    arrays = {name: content[name] for name in BY_FRAME if name in content}
+    return Track(**words, **arrays, **_optional_fields(content))  # type: ignore[arg-type]
 
 
 def track_of_rows(rows: PeopleRows, person: int) -> Track:
@@ -438,14 +398,20 @@ def tracks_of(content: Mapping[str, npt.NDArray[Any]]) -> dict[int, Track]:
     return tracks
 
 
+def read_persons(path: Path) -> tuple[FloatArray, dict[int, Track]]:
+    """The stamps in a result of several people, and the tracks by person; see `PeopleTrack.load`."""
+    if path.suffix == ".csv":
+        rows = read_rows(path)
+        return np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
+    with stored_arrays(path, "a result of voodoo track --people") as content:
+        if "persons" not in content:
+            raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
+        return content["stamps"], tracks_of(content)
+
+
 def _only_person(path: Path) -> Track:
     """The track in a result of several people that holds one."""
-    if path.suffix == ".npz":
-        with stored_arrays(path, "a result of voodoo track --people") as content:
-            tracks = tracks_of(content)
-    else:
-        rows = read_rows(path)
-        tracks = {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
+    _, tracks = read_persons(path)
     if len(tracks) != 1:
         found = ", ".join(str(one) for one in tracks) or "nobody"
         raise VoodooError(f"{path}: expected the result of one person, found persons {found}")
@@ -463,13 +429,3 @@ def _optional_fields(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
         "limb_status": {str(limb): tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)},
         "left_out": {str(reason): int(count) for reason, count in zip(reasons, counts, strict=True)},
     }
-
-
-def _cell(value: float) -> str:
-    """Text of a number; empty if unknown."""
-    return "" if np.isnan(value) else f"{value:.6f}"
-
-
-def _header(names: Sequence[str], angle_names: Sequence[str] = ()) -> list[str]:
-    places = [f"{name}_{axis}" for name in names for axis in "xyz"]
-    return ["stamp_s", "status", "residual_m", *places, *(f"{name}_rad" for name in angle_names)]

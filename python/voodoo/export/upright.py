@@ -10,6 +10,7 @@ import numpy as np
 
 from voodoo.export.track import FloatArray, Track
 from voodoo.model.standing import is_optical, standing_along
+from voodoo.model.transforms import pose_of
 from voodoo.recordings.marker_trajectories import Z_UP_FROM
 from voodoo.sensors.settings import LEVEL_FRAMES
 
@@ -47,9 +48,7 @@ def by_axes(root_frame: str, *, optical: bool | None = None) -> Turn:
     """
     if not (is_optical(root_frame) if optical is None else optical):
         return UNTURNED
-    pose = np.eye(4)
-    pose[:3, :3] = UPRIGHT_FROM_OPTICAL
-    return Turn(pose, f"by the axes of {root_frame}, a camera's; it leans as the camera does")
+    return Turn(pose_of(UPRIGHT_FROM_OPTICAL), f"by the axes of {root_frame}, a camera's; it leans as the camera does")
 
 
 def by_floor(floor: tuple[FloatArray, float], *, optical: bool) -> Turn:
@@ -62,9 +61,7 @@ def by_floor(floor: tuple[FloatArray, float], *, optical: bool) -> Turn:
     up = np.asarray(floor[0], dtype=np.float64)
     left = np.cross(up, (0.0, 0.0, 1.0) if optical else (1.0, 0.0, 0.0))
     left /= np.linalg.norm(left)
-    pose = np.eye(4)
-    pose[:3, :3] = np.cross(left, up), left, up
-    pose[2, 3] = -floor[1]
+    pose = pose_of([np.cross(left, up), left, up], (0.0, 0.0, -floor[1]))
     return Turn(pose, "by the floor that is seen, now z = 0")
 
 

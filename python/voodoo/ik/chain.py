@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import BodyError, MeasurementError
+from voodoo.errors import BodyError, MeasurementError, of_kind
 from voodoo.ik.image import Silhouette, core_views
 from voodoo.ik.options import Options
 from voodoo.ik.values import Bone, FloatArray, base_pose, listed_bones, listed_poses, named, numbers, vector
@@ -33,15 +33,13 @@ class Chain:
             BodyError: an unknown limb, or limbs that are not connected.
             MeasurementError: another value of root, or a single name for limbs.
         """
-        if not isinstance(body, Body):
-            raise BodyError(f"body: expected a voodoo.Body, found {type(body).__name__}")
+        self.body = of_kind("body", body, Body, BodyError)
         listed = not isinstance(limbs, str) and isinstance(limbs, Iterable)
         if not listed or not all(isinstance(name, str) for name in limbs):
             raise MeasurementError(f"limbs: expected a list of names, found {short(limbs)}")
         root = root if root is not None else ("fixed" if len(limbs) else "free")
         if not isinstance(root, str) or root not in ("free", "fixed"):
             raise MeasurementError(f'root: expected "free" or "fixed", found {short(root)}')
-        self.body = body
         self._core = _core.Chain(body.core, list(limbs), root == "free")
         self.angle_names: tuple[str, ...] = tuple(self._core.angle_names)
         self.limb_names: tuple[str, ...] = tuple(self._core.limb_names)

@@ -14,7 +14,7 @@ import voodoo._core as _core
 from voodoo.errors import MeasurementError
 from voodoo.ik.values import numbers
 from voodoo.model.camera import Camera
-from voodoo.model.transforms import rigid
+from voodoo.model.transforms import inverse, rigid
 
 _UNDISTORTED = 0.5
 _MIDDLE = 0.3
@@ -76,11 +76,7 @@ class Silhouette:
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
         observed = None if depth is None else _depths(depth, camera, person)
-        # It is rigid, so the inverse rotation is the transposed one.
-        inverse = np.eye(4)
-        inverse[:3, :3] = pose[:3, :3].T
-        inverse[:3, 3] = -pose[:3, :3].T @ pose[:3, 3]
-        self._core = _core.View(self.distance, self.thickness, observed, self.border, _pinhole(camera), inverse)
+        self._core = _core.View(self.distance, self.thickness, observed, self.border, _pinhole(camera), inverse(pose))
 
     @property
     def core(self) -> _core.View:

@@ -24,7 +24,6 @@ class FirstFrame(Recording):
         self.name = live.sources[0].name
         self.path = Path(self.name)
         self.root_frame = live.root_frame
-        self.start, self.reference = None, None
         self._live, self._frame = live, frame
 
     def __len__(self) -> int:
@@ -38,20 +37,10 @@ class FirstFrame(Recording):
     def info(self) -> RecordingInfo:
         """The sensors with measurements."""
         sensors = tuple(
-            SensorInfo(sensor, kind, self.root_frame, 1, float("nan"), "live")
+            SensorInfo.during(0.0, sensor, kind, self.root_frame, 1, "live")
             for sensor, kind in self._live.kinds.items()
         )
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="live",
-            frames=0,
-            start_stamp=self._frame.stamp,
-            duration=0.0,
-            rate_hz=float("nan"),
-            root_frame=self.root_frame,
-            sensors=sensors,
-        )
+        return self._described("live", sensors, start=self._frame.stamp, duration=0.0)
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""

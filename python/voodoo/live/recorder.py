@@ -55,7 +55,6 @@ class Recorder(Output):
         self._writer.open()
         self._topics: dict[str, Connection] = {}
         self._cameras: dict[str, Camera] = {}
-        self._poses: dict[str, FloatArray] = {}
         self._described: set[str] = set()
         self._at = 0
         self.frames = 0
@@ -84,7 +83,7 @@ class Recorder(Output):
             return
         name = item.sensor.strip("/").replace("/", "_").replace(" ", "_") or "sensor"
         frame = f"{name}_frame"
-        self._write_pose(frame, item.stamp, item.root_from_sensor)
+        self._write("/tf", transforms(self._root(), frame, item.stamp, item.root_from_sensor))
         header = _header(item.stamp, frame)
         if isinstance(item, DepthImage):
             self._write_camera(f"/{name}/depth/camera_info", header, item.camera)
@@ -106,9 +105,6 @@ class Recorder(Output):
         if self._cameras.get(topic) != camera:
             self._cameras[topic] = camera
             self._write(topic, camera_info(header, camera))
-
-    def _write_pose(self, frame: str, stamp: float, root_from_sensor: FloatArray) -> None:
-        self._write("/tf", transforms(self._root(), frame, stamp, root_from_sensor))
 
     def _write(self, topic: str, message: Any) -> None:  # noqa: ANN401
         if topic not in self._topics:
@@ -151,8 +147,6 @@ def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatAr
 
 def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
     """A sensor_msgs/CameraInfo."""
-    k = np.array([camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0])
-    p = np.array([camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0])
     return _new(
         "sensor_msgs/msg/CameraInfo",
         header=header,
@@ -160,9 +154,9 @@ def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
         width=camera.width,
         distortion_model=camera.model,
         d=np.array(camera.distortion, dtype=np.float64),
-        k=k,
+        k=camera.matrix.ravel(),
         r=np.eye(3).ravel(),
-        p=p,
+        p=np.pad(camera.matrix, ((0, 0), (0, 1))).ravel(),
         binning_x=0,
         binning_y=0,
         roi=_new("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),

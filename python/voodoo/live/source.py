@@ -21,10 +21,6 @@ class SourceEnded(VoodooError):
     """A finite source, such as a replayed recording, is at its end."""
 
 
-def _always() -> bool:
-    return True
-
-
 @dataclass(frozen=True)
 class Arrival:
     """A measurement that arrived and is not decoded yet.
@@ -46,7 +42,7 @@ class Arrival:
     measure: Callable[[], Measurement]
     drives: bool = False
     taken: float | None = None
-    ready: Callable[[], bool] = _always
+    ready: Callable[[], bool] = lambda: True
     patience: float = 0.0
 
 

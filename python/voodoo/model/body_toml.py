@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
-from voodoo.errors import BodyError
-from voodoo.model.joint import Joint, Strict, Vector, problems
+from voodoo.errors import BodyError, naming
+from voodoo.model.joint import Joint, Strict, Vector, valid
 from voodoo.model.toml_io import parse_toml
 
 
@@ -49,84 +48,48 @@ def core_body(text: str, *, source: str) -> _core.Body:
         BodyError: names the key, what was expected and what was found.
     """
     values = parse_toml(text, source=source, error=BodyError)
-    try:
+    with valid(source, BodyError, values):
         spec = _BodySpec.model_validate(values)
-    except ValidationError as error:
-        raise BodyError(f"{source}: {problems(values, error)}") from None
     limbs = []
     for limb in spec.limbs:
         shape = limb.shape
-        try:
+        with naming(f"{source}: limbs.{limb.name}.shape", BodyError):
             cylinder = TaperedEllipticCylinder(shape.length, shape.a0, shape.b0, shape.a1, shape.b1)
-        except BodyError as error:
-            raise BodyError(f"{source}: limbs.{limb.name}.shape: {error}") from None
         joint = None if limb.joint is None else limb.joint.parts()
         limbs.append((limb.name, limb.parent, cylinder, joint, limb.match_caps))
     sites = [(site.name, site.limb, site.position) for site in spec.sites]
-    try:
+    with naming(source, BodyError):
         return _core.Body(spec.name, limbs, sites)
-    except BodyError as error:
-        raise BodyError(f"{source}: {error}") from None
 
 
 def body_text(body: _core.Body) -> str:
     """A body as TOML; `core_body` reads it back unchanged up to rounding at 1e-9 m."""
-    import tomlkit
-
     name, limbs, sites = body.parts()
-    document = tomlkit.document()
-    document.add("name", tomlkit.item(name))
-    limb_tables = tomlkit.aot()
+    lines = [f"name = {_text(name)}"]
     for limb, parent, shape, joint, match_caps in limbs:
-        table = tomlkit.table()
-        table.add("name", limb)
-        if parent is not None:
-            table.add("parent", parent)
-        table.add("shape", _inline({key: _number(getattr(shape, key)) for key in ("length", "a0", "b0", "a1", "b1")}))
-        table.add("match_caps", list(match_caps))
+        sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
+        lines += _table("[limbs]", name=limb, parent=parent, shape=sizes, match_caps=match_caps)
         if joint is not None:
-            table.add("joint", _joint(joint))
-        limb_tables.append(table)
-    document.add("limbs", limb_tables)
-    if sites:
-        site_tables = tomlkit.aot()
-        for site, limb, position in sites:
-            table = tomlkit.table()
-            table.add("name", site)
-            table.add("limb", limb)
-            table.add("position", _vector(position))
-            site_tables.append(table)
-        document.add("sites", site_tables)
-    return tomlkit.dumps(document)
+            own, *places, semi_axes, weight, limits, motion = joint
+            on_parent, on_limb = ({"position": position, "rotation": rotation} for position, rotation in places)
+            numbers = {"semi_axes": semi_axes, "weight": weight, "motion": motion, "limits": limits}
+            lines += _table("limbs.joint", name=own, on_parent=on_parent, on_limb=on_limb, **numbers)
+    for site, limb, position in sites:
+        lines += _table("[sites]", name=site, limb=limb, position=position)
+    return "\n".join(lines) + "\n"
 
 
-def _joint(parts: Sequence[Any]) -> Any:  # noqa: ANN401 - tomlkit's table
-    import tomlkit
-
-    name, on_parent, on_limb, semi_axes, weight, limits, motion = parts
-    table = tomlkit.table()
-    table.add("name", name)
-    for key, (position, rotation) in (("on_parent", on_parent), ("on_limb", on_limb)):
-        table.add(key, _inline({"position": _vector(position), "rotation": _vector(rotation)}))
-    table.add("semi_axes", _vector(semi_axes))
-    table.add("weight", _number(weight))
-    table.add("motion", _number(motion))
-    if limits is not None:
-        table.add("limits", [_vector(pair) for pair in limits])
-    return table
+def _table(heading: str, **entries: object) -> list[str]:
+    """Lines of a table; entries that are None are left out."""
+    return ["", f"[{heading}]", *(f"{key} = {_text(value)}" for key, value in entries.items() if value is not None)]
 
 
-def _inline(values: dict[str, Any]) -> Any:  # noqa: ANN401 - tomlkit's table
-    import tomlkit
+def _text(value: Any) -> str:  # noqa: ANN401 - what a body has
+    """A value in TOML; tables are inline."""
+    if isinstance(value, str | bool):
+        import tomlkit
 
-    table = tomlkit.inline_table()
-    table.update(values)
-    return table
-
-
-def _number(value: float) -> float:
-    return round(float(value), 9) + 0.0
-
-
-def _vector(values: Sequence[float]) -> list[float]:
-    return [_number(value) for value in values]
+        return tomlkit.item(value).as_string()
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_text(entry)}" for key, entry in value.items()) + "}"
+    return f"[{', '.join(map(_text, value))}]" if hasattr(value, "__len__") else str(round(float(value), 9) + 0.0)

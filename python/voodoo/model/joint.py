@@ -2,19 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from voodoo.errors import BodyError
+from voodoo.errors import BodyError, VoodooError
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Number, Number, Number]
 Range = tuple[Number, Number]
 _ZERO = (0.0, 0.0, 0.0)
+
+
+@contextmanager
+def valid(
+    where: object,
+    error: type[VoodooError],
+    values: object = None,
+    *,
+    known: Collection[str] = (),
+    most: int | None = None,
+) -> Iterator[None]:
+    """Problems that pydantic finds inside become an error.
+
+    Args:
+        where: begins the message.
+        error: class of the error.
+        values: what is checked; items of its lists that have a name are called by it.
+        known: keys that an unknown one is compared with.
+        most: number of problems that are named; None: all.
+    """
+    try:
+        yield
+    except ValidationError as cause:
+        raise error(f"{where}: {'; '.join(_problems(values, cause, known)[:most])}") from None
 
 
 class Strict(BaseModel):
@@ -29,10 +54,8 @@ class _Part(Strict):
     if not TYPE_CHECKING:  # for type checkers, the fields are the arguments
 
         def __init__(self, **values: Any) -> None:  # noqa: ANN401 - checked here
-            try:
+            with valid(type(self).__name__, BodyError, values):
                 super().__init__(**values)
-            except ValidationError as error:
-                raise BodyError(f"{type(self).__name__}: {problems(values, error)}") from None
 
         # Not called for nested models, whose errors name the full key.
         __init__.__pydantic_base_init__ = True
@@ -80,8 +103,7 @@ class Joint(_Part):
         return (self.name, *places, self.semi_axes, self.weight, self.limits, self.motion)
 
 
-def problems(values: dict[str, Any], error: ValidationError) -> str:
-    """Errors of pydantic with their keys; items of lists with their names."""
+def _problems(values: object, error: ValidationError, known: Collection[str]) -> list[str]:
 
     def key(location: tuple[str | int, ...]) -> str:
         parts: list[str] = []
@@ -92,7 +114,12 @@ def problems(values: dict[str, Any], error: ValidationError) -> str:
             parts.append(str(name if isinstance(name, str) else part))
         return ".".join(parts)
 
-    return "; ".join(f"{key(item['loc'])}: {expectation(item)}" for item in error.errors())
+    said = []
+    for item in error.errors(include_url=False):
+        unknown = known and item["type"] == "extra_forbidden"
+        words = f"unknown key; known are {', '.join(known)}" if unknown else expectation(item)
+        said.append(f"{key(item['loc'])}: {words}" if item["loc"] else words)
+    return said
 
 
 _EXPECTED = {
@@ -108,6 +135,7 @@ _EXPECTED = {
     "string_too_short": "a word",
     "literal_error": "one of {expected}",
     "extra_forbidden": "a known key",
+    "model": "an object",
     "float": "a number",
     "int": "a whole number",
     "bool": "true or false",
@@ -159,6 +187,14 @@ def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     if found.dtype.kind not in "biufO":
         raise TypeError(f"{found.dtype} is no real number")
     return found.astype(np.float64, copy=False)
+
+
+def numbers_or_nan(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """An array of real numbers; of other values a single NaN, in one dimension."""
+    try:
+        return as_numbers(values)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([np.nan])
 
 
 def short(value: object) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 import cv2
 import numpy as np
@@ -17,13 +17,6 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 Axes: TypeAlias = Literal["rep103", "optical"]
 
 _NEAREST_M = 0.05
-
-
-class View(Protocol):
-    """Projects points of the root frame into an image."""
-
-    def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pixels (N, 2) of points (N, 3) [m], NaN for invisible points, and their depths (N,) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +34,7 @@ class CameraView:
     scale: float = 1
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See View; depth is along the optical axis."""
+        """Pixels (N, 2) of points (N, 3) [m], NaN for invisible points, and their depths (N,) [m] along the optical axis."""
         sensor_from_root = np.linalg.inv(self.root_from_sensor)
         points = points_root @ sensor_from_root[:3, :3].T + sensor_from_root[:3, 3]
         points[points[:, 2] < _NEAREST_M] = np.nan
@@ -66,11 +59,15 @@ class TopView:
     axes: Axes = "rep103"
 
     def project(self, points_root: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See View; depth counts downwards from the center."""
+        """Pixels (N, 2) of points (N, 3) [m], and their depths (N,) [m] downwards from the center."""
         x, y, z = (points_root - np.array(self.center)).T
         right, forward, down = (-y, x, -z) if self.axes == "rep103" else (x, z, y)
         pixels = np.column_stack([right, -forward]) / self.meters_per_pixel + (self.size - 1) / 2
         return pixels, down
+
+
+View: TypeAlias = CameraView | TopView
+"""Projects points of the root frame into an image."""
 
 
 def transform(a_from_b: FloatArray, points_b: FloatArray) -> FloatArray:

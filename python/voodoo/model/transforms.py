@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.model.joint import as_numbers
+from voodoo.model.joint import numbers_or_nan
 
 _OFF = 1e-4
 """Tolerance for the products of the rows of a rotation, as in the core."""
@@ -22,13 +22,22 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
     Raises:
         MeasurementError: another shape, not finite, or not a rotation and translation; names `name`.
     """
-    try:
-        pose = as_numbers(value)
-    except (TypeError, ValueError, OverflowError):
-        pose = np.empty(0)
+    pose = numbers_or_nan(value)
     if pose.shape != (4, 4) or not _turns_and_shifts(pose.tobytes()):
         raise MeasurementError(f"{name}: expected a rigid 4x4 transform, found {value!r}")
     return pose
+
+
+def pose_of(rotation: npt.ArrayLike, translation: npt.ArrayLike = (0.0, 0.0, 0.0)) -> npt.NDArray[np.float64]:
+    """The transform (4, 4) of a rotation (3, 3) and a translation (3,)."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, translation
+    return pose
+
+
+def inverse(a_from_b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """b_from_a (4, 4) of a rigid a_from_b: the inverse rotation is the transposed one."""
+    return pose_of(a_from_b[:3, :3].T, -a_from_b[:3, :3].T @ a_from_b[:3, 3])
 
 
 # Cached, because most sensors are static, and several steps of a frame check the same transform.

@@ -16,7 +16,7 @@ from voodoo.pipeline.starts.chosen import Starts
 from voodoo.sensors.adapters import Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sensor import KeypointReport
-from voodoo.sensors.rays import SiteRay, add_rays, agreed
+from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker
 from voodoo.tracker import Tracker
@@ -138,27 +138,20 @@ class FrontEnd:
             used = [item for item in alive if any(adapter.kind in use for adapter in adapters_of(item))]
             if self.search.search(recorded.stamp, used, self.settings):
                 self._begin()
-        frame = Frame(stamp=recorded.stamp)
-        for low, high in self.settings.exclude:
-            frame.exclude(low, high)
-        if self.settings.ground_z is not None:
-            frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
-        predicted = self.tracker.predict(recorded.stamp) if self.search.posed else {}
         context = Context(
             stamp=recorded.stamp,
             measurements=alive,
-            predicted=predicted,
+            predicted=self.tracker.predict(recorded.stamp) if self.search.posed else {},
             settings=self.settings,
             tracker=self.tracker,
             gate=self._gate,
             memory=self.memory,
         )
+        frame = Frame(stamp=recorded.stamp)
+        context.add_scene(frame)
         for item in alive:
             for adapter in adapters_of(item):
                 if adapter.kind in use and (self.search.posed or adapter.while_searching):
                     adapter.add(frame, item, context)
-        self.rays = context.rays
-        if self.settings.agreement > 0.0:
-            self.rays = agreed(self.rays, predicted=predicted, scale=self.settings.agreement)
-        add_rays(frame, self.rays, model=self.settings.model)
+        self.rays = context.add_rays(frame)
         return frame

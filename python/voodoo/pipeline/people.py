@@ -68,11 +68,6 @@ class PeopleFrontEnd:
         alive = self._alive = self._frozen.without(
             recorded.measurements, use=chosen.use, idle=lambda item: isinstance(item, ColorImage) and not colors_needed
         )
-        frame = Frame(stamp=recorded.stamp)
-        for low, high in chosen.exclude:
-            frame.exclude(low, high)
-        if chosen.ground_z is not None:
-            frame.set_ground(normal=(0.0, 0.0, 1.0), offset=chosen.ground_z)
         context = Context(
             stamp=recorded.stamp,
             measurements=alive,
@@ -82,6 +77,8 @@ class PeopleFrontEnd:
             gate=SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest),
             memory=self.memory,
         )
+        frame = Frame(stamp=recorded.stamp)
+        context.add_scene(frame)
         for item in alive:
             used = [adapter for adapter in adapters_of(item) if adapter.kind in chosen.use]
             for adapter in used:

@@ -19,7 +19,6 @@ from voodoo.sensors.adapters import Adapter, Context, Memory, adapters_of
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.people import assign_keypoints
 from voodoo.sensors.pixels import FloatArray
-from voodoo.sensors.rays import add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
 
 _SAME_M = 0.4
@@ -136,25 +135,21 @@ class PeopleOwn:
     ) -> Frame:
         chosen = self._settings
         person = self._persons.setdefault(number, self._new())
-        predicted = everybody_predicted[number]
-        frame = Frame(stamp=stamp)
         context = Context(
             stamp=stamp,
             measurements=[*items, *depths],
-            predicted=predicted,
+            predicted=everybody_predicted[number],
             settings=chosen,
             tracker=Followed(self._people, number),
             others=tuple(Followed(self._people, other) for other in everybody_predicted if other != number),
             gate=person.gate,
             memory=person.memory,
         )
+        frame = Frame(stamp=stamp)
         for item in items:
             for adapter in _own_adapters(item, chosen):
                 adapter.add(frame, item, context)
-        rays = context.rays
-        if chosen.agreement > 0.0:
-            rays = agreed(rays, predicted=predicted, scale=chosen.agreement)
-        add_rays(frame, rays, model=chosen.model)
+        context.add_rays(frame)
         return frame
 
 

@@ -42,12 +42,6 @@ class Search:
         self.found: FoundStart | None = None
         self._supported: float | None = None
 
-    def __copy__(self) -> Search:
-        """A copy; the finders' observations are shared."""
-        twin = object.__new__(Search)
-        vars(twin).update(vars(self))
-        return twin
-
     def search(self, stamp: float, measurements: Sequence[Any], settings: FrontEndSettings) -> bool:
         """Query the sources and reset the tracker to the first pose found; returns whether there is one.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import ConfigDict, Field, FiniteFloat
 
 from voodoo._core import Estimate
 from voodoo.config import Config
@@ -17,7 +17,7 @@ from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.joint import expectation, short
+from voodoo.model.joint import short, valid
 from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
 from voodoo.pipeline.front_end import FrontEnd
@@ -28,22 +28,19 @@ from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
+from voodoo.recordings.truth import FirstPose
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
 from voodoo.sensors.settings import FrontEndSettings, inputs_for
 from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
-Height = Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)]
 _ROUNDED_S = 1e-6
 _DEFAULT_M = 1.75
 """Stature of `Body.human()`."""
 
 
-Position = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-
-
-class Init(BaseModel):
+class Init(FirstPose):
     """First pose of the body, in the first frame or at a time: any subset of named positions that determines the pose.
 
     Args:
@@ -56,11 +53,8 @@ class Init(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    height_m: Height | None = None
     stamp_s: FiniteFloat | None = None
-    frame: str | None = None
     format_version: Annotated[int, Field(ge=1, le=1)] = 1
-    joints: Annotated[dict[str, Position], Field(min_length=1)]
 
     @classmethod
     def load(cls, path: Path) -> Init:
@@ -70,10 +64,8 @@ class Init(BaseModel):
             VoodooError: not readable, not JSON, or not of that form; names the file and the key.
         """
         content = read_stored(a_path(path, error=VoodooError), "a JSON file", most=MOST_METADATA)
-        try:
+        with valid(path, VoodooError, most=1):
             return cls.model_validate_json(content)
-        except ValidationError as error:
-            raise VoodooError(f"{path}: {_first_problem(error)}") from error
 
     def to_json(self) -> str:
         """JSON text that `load` reads, one joint per line."""
@@ -98,8 +90,8 @@ class Init(BaseModel):
             return self
         about = recording.info()
         pose = recording.root_from(str(self.frame), about.start_stamp if self.stamp_s is None else self.stamp_s)
-        moved = {name: tuple(pose[:3, :3] @ place + pose[:3, 3]) for name, place in self.joints.items()}
-        return type(self).model_validate({**self.model_dump(), "frame": recording.root_frame, "joints": moved})
+        moved = {"frame": recording.root_frame, "joints": self.moved(pose)}
+        return type(self).model_validate({**self.model_dump(), **moved})
 
     @classmethod
     def of(cls, recording: Recording) -> Init | None:
@@ -110,10 +102,8 @@ class Init(BaseModel):
         """
         if recording.start is None:
             return None
-        try:
+        with valid(f"{recording.name}, start", VoodooError, most=1):
             return cls.model_validate(dict(recording.start))
-        except ValidationError as error:
-            raise VoodooError(f"{recording.name}, start: {_first_problem(error)}") from error
 
 
 Automatic: TypeAlias = Literal["auto"]
@@ -291,10 +281,3 @@ def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] |
             '{"height_m": 1.76, "joints": {"l_shoulder": [x, y, z], "r_hip": [x, y, z], ...}} '
             f"in meters in the frame {recording.root_frame!r}"
         )
-
-
-def _first_problem(error: ValidationError) -> str:
-    """The first error of pydantic as "key: what was expected, found what"."""
-    problem = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in problem["loc"])
-    return f"{key}: {expectation(problem)}" if key else expectation(problem)

@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.errors import CameraError, RecordingError, installed, naming, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
+from voodoo.model.transforms import pose_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, refuse_blank
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, usable
 
 FRAME = "depth_camera_optical_frame"
 COLOR_FRAME = "rgb_camera_optical_frame"
@@ -60,7 +61,6 @@ class AzureKinectRecording(Recording):
     def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
         """Read the tracks, the calibration and the stamps; see the class."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
-        self.start, self.reference = None, None
         self._left_out = left_out
         with reading(path, _EXPECTED), _opened(path) as film:
             tags = {word: value for word, value in film.metadata.items() if word.startswith("K4A_")}
@@ -115,27 +115,18 @@ class AzureKinectRecording(Recording):
                     waiting.append(ColorImage("color", stamp, load, self._color, self._depth_from_color))
                     continue
                 number += 1
-                try:
-                    item = self._depth_image(stamp, bytes(packet))
-                except RecordingError as error:
-                    if self._left_out is None:
-                        raise
-                    self._left_out.add_error(error)
-                    continue
-                if self._left_out is not None:
-                    self._left_out.numbers["depth", stamp] = number
-                yield RecordedFrame(stamp, (*waiting, item))
-                waiting.clear()
+                make = partial(self._depth_image, stamp, bytes(packet))
+                item = usable(make, number, f"{self.path}, depth", self._left_out)
+                if item is not None:
+                    yield RecordedFrame(stamp, (*waiting, item))
+                    waiting.clear()
 
     def _depth_image(self, stamp: float, content: bytes) -> DepthImage:
         where, size = f"{self.path}, depth", (self._camera.height, self._camera.width)
         if len(content) != 2 * size[0] * size[1]:
             raise RecordingError(f"{where}: expected {2 * size[0] * size[1]} bytes, found {len(content)}")
         image = np.frombuffer(content, dtype=">u2").reshape(size).astype(np.uint16)
-        item = DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
-        if self._left_out is not None:
-            refuse_blank(item, where)
-        return item
+        return DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
 
     def info(self) -> RecordingInfo:
         """Summarize from tracks and calibration."""
@@ -143,18 +134,15 @@ class AzureKinectRecording(Recording):
         for sensor, stamps in self._stamps.items():
             camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
             detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
-            rate = mean_rate(len(stamps), stamps[-1] - stamps[0] if stamps else 0.0)
-            sensors.append(SensorInfo(sensor, sensor, frame, len(stamps), rate, detail))
+            span = stamps[-1] - stamps[0] if stamps else 0.0
+            sensors.append(SensorInfo.during(span, sensor, sensor, frame, len(stamps), detail))
         first, last = self._stamps["depth"][0], self._stamps["depth"][-1]
         return self._described("azure-kinect", sensors, start=first, duration=last - first, unused=self._unused)
 
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV
-    try:
-        import av
-    except ImportError:
-        advice = "which PyAV reads, found no PyAV: pip install 'voodoo-tracker[azure]'"
-        raise RecordingError(f"{path}: expected {_EXPECTED}, {advice}") from None
+    missing = f"{path}: expected {_EXPECTED}, which PyAV reads, found no PyAV: pip install 'voodoo-tracker[azure]'"
+    av = installed("av", missing, error=RecordingError)
     # Another demuxer might follow links in the file.
     return av.open(f"file:{path.absolute()}", format="matroska")
 
@@ -190,14 +178,12 @@ def _camera(path: Path, cameras: dict[str, Any], purpose: str, mode: str) -> Cam
     with reading(f"{path}, calibration", f"{purpose} with 14 parameters of its lens"):
         numbers = [float(number) for number in cameras[purpose]["Intrinsics"]["ModelParameters"]]
         cx, cy, fx, fy, k1, k2, k3, k4, k5, k6, _, _, p2, p1 = numbers
-        try:
+        with naming(f"{path}, calibration", CameraError, error=RecordingError):
             # The device's pixel coordinates begin at the corner of the first pixel, ours in its center.
             return Camera(
                 width, height, fx * wide, fy * high, cx * wide - left - 0.5, cy * high - top - 0.5,
                 (k1, k2, p1, p2, k3, k4, k5, k6), "rational_polynomial",
             )  # fmt: skip
-        except CameraError as error:
-            raise RecordingError(f"{path}, calibration: {error}") from error
 
 
 def _pose(path: Path, cameras: dict[str, Any], purpose: str) -> FloatArray:
@@ -207,9 +193,8 @@ def _pose(path: Path, cameras: dict[str, Any], purpose: str) -> FloatArray:
         RecordingError: the calibration has none, or it is not rigid.
     """
     with reading(f"{path}, calibration", f"{purpose} with a rigid transform from the depth camera"):
-        pose: FloatArray = np.eye(4)
-        pose[:3, :3] = np.reshape([float(number) for number in cameras[purpose]["Rt"]["Rotation"]], (3, 3))
-        pose[:3, 3] = [float(number) for number in cameras[purpose]["Rt"]["Translation"]]
+        turn, place = (list(map(float, cameras[purpose]["Rt"][name])) for name in ("Rotation", "Translation"))
+        pose = pose_of(np.reshape(turn, (3, 3)), place)
         off = np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max()
         if not off < 1e-3 or not np.isfinite(pose).all() or np.linalg.det(pose) < 0.0:
             raise ValueError(f"a rotation with products of rows off by {off:.2g}")

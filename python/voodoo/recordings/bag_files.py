@@ -7,7 +7,7 @@ import os
 from collections.abc import Collection, Iterator
 from functools import partial
 from pathlib import Path, PurePath
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader
@@ -23,26 +23,7 @@ from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking, count_zstd
 
 
-class BagFile(Protocol):
-    """What is read from a bag."""
-
-    connections: list[Connection]
-
-    def open(self) -> None:
-        """Read the index."""
-
-    def close(self) -> None:
-        """Close the files."""
-
-    @property
-    def metadata(self) -> ReaderMetadata:
-        """Times and number of messages."""
-
-    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:
-        """Messages in the order of their time, or as they were written if the clock was set back."""
-
-
-def bag_file(path: Path, unpacking: Unpacking) -> Any:  # noqa: ANN401 - rosbags declares other messages
+def bag_file(path: Path, unpacking: Unpacking) -> BagFile:
     """The reader of a bag.
 
     Args:
@@ -50,7 +31,7 @@ def bag_file(path: Path, unpacking: Unpacking) -> Any:  # noqa: ANN401 - rosbags
         unpacking: limits compressed data.
 
     Returns:
-        a BagFile.
+        A reader whose `messages` are in the order of their time, or as they were written if the clock was set back.
 
     Raises:
         RecordingError: another kind of file.
@@ -93,7 +74,7 @@ class Ros1File(Reader):
     def messages(  # type: ignore[override]
         self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """See BagFile.messages."""
+        """See bag_file."""
         first = -1 if start is None else start
         entries = [(entry, one) for one in connections for entry in self.indexes[one.id] if first <= entry.time]
         entries.sort(key=lambda item: (item[0].chunk_pos, item[0].offset))
@@ -184,3 +165,7 @@ class BagFolder(DirectoryReader):
                 return self._unpacking.unpack(data, "zstd")
         except RecordingError as error:
             return error
+
+
+BagFile: TypeAlias = Ros1File | BagFolder | McapFile | SqliteFile
+"""What bags are read by."""

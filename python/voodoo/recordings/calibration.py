@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError
+from voodoo.errors import CameraError, RecordingError, naming
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
-from voodoo.model.joint import short
+from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.camera_yaml import camera_tables
 from voodoo.recordings.pictures import picture_size
@@ -127,14 +127,12 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     distortion = table.get("distortion", [])
     if not isinstance(distortion, list):
         raise RecordingError(f"{where}: distortion: expected a list of numbers, found {short(distortion)}")
-    try:
+    with naming(where, CameraError, error=RecordingError):
         camera = Camera(
             **{key: table[key] for key in _CAMERA_KEYS},
             distortion=tuple(distortion),
             model=table.get("model", "plumb_bob"),
         )
-    except CameraError as error:
-        raise RecordingError(f"{where}: {error}") from error
     frame = table.get("sensor_frame", f"camera_{kind}_optical_frame")
     if not isinstance(frame, str):
         raise RecordingError(f"{where}: sensor_frame: expected a name, found {short(frame)}")
@@ -144,13 +142,10 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
     return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where), mirrored)
 
 
-def _pose(rows: object, where: str) -> FloatArray:
+def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here
     if rows is None:
         return np.eye(4)
-    try:
-        pose = np.array(rows, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        pose = np.empty(0)
+    pose = numbers_or_nan(rows)
     rigid = (
         pose.shape == (4, 4)
         and np.isfinite(pose).all()

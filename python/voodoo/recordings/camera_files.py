@@ -9,11 +9,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from voodoo.errors import CameraError, RecordingError
+from voodoo.errors import CameraError, RecordingError, naming
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
-from voodoo.model.joint import short
+from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.model.transforms import pose_of
 from voodoo.recordings.camera_yaml import camera_tables
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
@@ -73,7 +74,7 @@ def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
         raise RecordingError(f"{where}, matrix: expected no skew and a last row 0 0 1, found {matrix.tolist()}")
     coefficients = tuple(float(value) for value in _numbers(where, table, "distortions", None))
     fisheye = table.get("fisheye", False)
-    try:
+    with naming(where, CameraError, error=RecordingError):
         camera = Camera(
             width=round(float(size[0])),
             height=round(float(size[1])),
@@ -84,25 +85,18 @@ def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
             distortion=coefficients,
             model="equidistant" if fisheye is True else "plumb_bob" if len(coefficients) < 8 else "rational_polynomial",
         )
-    except CameraError as error:
-        raise RecordingError(f"{where}: {error}") from error
     turn = _numbers(where, table, "rotation", None)
     if turn.shape != (3, 3):
         turn = np.asarray(cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))[0], dtype=np.float64)
     elif not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) or np.linalg.det(turn) < 0.0:
         raise RecordingError(f"{where}, rotation: expected a rotation, found {short(table['rotation'])}")
-    pose = np.eye(4)
-    pose[:3, :3] = turn.T
-    pose[:3, 3] = -turn.T @ _numbers(where, table, "translation", (3,)) * meters_per_unit
+    pose = pose_of(turn.T, -turn.T @ _numbers(where, table, "translation", (3,)) * meters_per_unit)
     name = table.get("name", key)
     return PlacedCamera(str(name), camera, pose)
 
 
 def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> FloatArray:
-    try:
-        values = np.array(table[key], dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        values = np.array([np.nan])
+    values = numbers_or_nan(table[key])
     if not np.isfinite(values).all() or (shape is not None and values.shape != shape) or values.ndim == 0:
         expected = "a list of" if shape is None else "x".join(map(str, shape))
         raise RecordingError(f"{where}, {key}: expected {expected} finite numbers, found {short(table[key])}")

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from voodoo.errors import RecordingError
 from voodoo.model.camera import Camera
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.order import in_order
 from voodoo.recordings.pictures import decode_color
 from voodoo.stored import read_stored
@@ -20,15 +20,6 @@ FOLDER = "background"
 PICTURES = (".png", ".jpg", ".jpeg")
 MOST = 100
 """Maximum number of images read per camera, spread over all available ones."""
-
-
-def find_background(place: Path) -> Path | None:
-    """The folder `background/` beside `place`, in it, or one folder up."""
-    folder = place if place.is_dir() else place.parent
-    for candidate in (folder / FOLDER, folder.parent / FOLDER):
-        if candidate.is_dir():
-            return candidate
-    return None
 
 
 def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str, tuple[Path, ...]]:
@@ -53,45 +44,62 @@ def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str,
     return {sensor: tuple(files) for sensor, files in found.items()}
 
 
-def read_pictures(
-    files: Mapping[str, Sequence[Path]], cameras: Mapping[str, Camera], *, left_out: LeftOut | None
-) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
-    """Decode the images, at most MOST per camera.
+class EmptyScene:
+    """The images of the empty scene that belong to a recording: in a folder set by the user, else in `background/` beside it."""
 
-    Args:
-        files: of each sensor.
-        cameras: of each sensor; an image of another size is an error.
-        left_out: counts unreadable images, which are then left out; None: they are errors.
+    def __init__(self, place: Path, given: str | Path | None, cameras: Mapping[str, Sequence[str]]) -> None:
+        """List the files.
 
-    Raises:
-        RecordingError: it names the file.
-    """
-    read = {}
-    for sensor, paths in files.items():
-        camera, pictures = cameras[sensor], []
-        for path in paths[:: -(-len(paths) // MOST)]:
-            try:
-                pictures.append(decode_color(read_stored(path, "a picture"), path, (camera.width, camera.height)))
-            except RecordingError as error:
-                if left_out is None:
-                    raise
-                left_out.add("pictures of the empty scene", error)
-        if pictures:
-            read[sensor] = tuple(pictures)
-    return read
+        Args:
+            place: the recording; `background/` is beside it, in it, or one folder up.
+            given: the folder set by the user.
+            cameras: see `pictures_of`.
 
+        Raises:
+            RecordingError: the folder set by the user has no camera's images.
+        """
+        beside = place if place.is_dir() else place.parent
+        folders = (beside / FOLDER, beside.parent / FOLDER)
+        self._folder = next((one for one in folders if one.is_dir()), None) if given is None else Path(given)
+        self._files = {} if self._folder is None else pictures_of(self._folder, cameras)
+        if given is not None and not self._files:
+            names = [f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()]
+            listed = "; ".join(names) or "no camera"
+            raise RecordingError(
+                f"{given}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({listed}), found none"
+            )
 
-def no_pictures(folder: str | Path, cameras: Mapping[str, Sequence[str]]) -> RecordingError:
-    """The error for a folder set by the user that has no camera's images."""
-    listed = "; ".join(f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()) or "no camera"
-    return RecordingError(
-        f"{folder}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({listed}), found none"
-    )
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Description of the available images; () without a folder of images."""
+        if self._folder is None:
+            return ()
+        counts = [f"{sensor} {len(paths)}" for sensor, paths in self._files.items()]
+        return (
+            f"pictures of the empty scene in {self._folder}: {', '.join(counts) or 'none that belongs to a camera'}",
+        )
 
+    def read(
+        self, cameras: Mapping[str, Camera], *, left_out: LeftOut | None
+    ) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+        """Decode the images, at most MOST per camera.
 
-def scene_words(folder: Path | None, files: Mapping[str, Sequence[Path]]) -> tuple[str, ...]:
-    """Description of the available images of the empty scene; () without a folder of images."""
-    if folder is None:
-        return ()
-    listed = ", ".join(f"{sensor} {len(paths)}" for sensor, paths in files.items()) or "none that belongs to a camera"
-    return (f"pictures of the empty scene in {folder}: {listed}",)
+        Args:
+            cameras: of each sensor.
+            left_out: counts unreadable images, which are then left out; None: they are errors.
+
+        Returns:
+            Sensor -> images (H, W, 3) BGR.
+
+        Raises:
+            RecordingError: an image is unreadable, or of another size than calibrated.
+        """
+        read = {}
+        for sensor, paths in self._files.items():
+            camera, pictures = cameras[sensor], []
+            for path in paths[:: -(-len(paths) // MOST)]:
+                with leaving_out(left_out, "pictures of the empty scene"):
+                    pictures.append(decode_color(read_stored(path, "a picture"), path, (camera.width, camera.height)))
+            if pictures:
+                read[sensor] = tuple(pictures)
+        return read

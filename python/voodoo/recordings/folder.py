@@ -12,17 +12,16 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
-from voodoo.recordings.calibration import Calibration, read_calibration
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.calibration import Calibration, FolderCalibration, read_calibration
+from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
     SensorInfo,
-    mean_rate,
     number_option,
-    refuse_blank,
+    usable,
 )
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.truth import read_start, read_truth
@@ -108,7 +107,6 @@ class FolderRecording(Recording):
         file = path / "calibration.toml" if calibration is None else Path(calibration)
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
-        self.start, self.reference = None, None
         if not bare:
             self._read_beside()
         self._color: list[tuple[float, Path]] = []
@@ -139,29 +137,12 @@ class FolderRecording(Recording):
         measurements: list[Measurement] = []
         for number, (stamp, file) in enumerate(self._depth):
             while color is not None and upcoming is not None and upcoming[0] <= stamp:
-                measurements.append(_color_image(*upcoming, color))
+                measurements.append(color_image(*upcoming, color))
                 upcoming = next(colors, None)
-            try:
-                measurements.append(self._depth_image(stamp, file))
-            except RecordingError as error:
-                if self._left_out is None:
-                    raise
-                self._left_out.add_error(error)
-                continue
-            if self._left_out is not None:
-                self._left_out.numbers["depth", stamp] = number
-            yield RecordedFrame(stamp, tuple(measurements))
-            measurements.clear()
-
-    def _depth_image(self, stamp: float, file: Path) -> DepthImage:
-        place = self._calibration.depth
-        image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
-        scale = 1.0 / self._calibration.depth_factor
-        image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
-        item = DepthImage("depth", stamp, image, scale, place.camera, place.root_from_sensor)
-        if self._left_out is not None:
-            refuse_blank(item, file)
-        return item
+            item = usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out)
+            if item is not None:
+                yield RecordedFrame(stamp, (*measurements, item))
+                measurements.clear()
 
     def info(self) -> RecordingInfo:
         """Summarize from names and calibration."""
@@ -248,12 +229,8 @@ def _listing(
         stamp = written if moved is None else moved
         if number and (moved is None or stamp <= rising[-1][0]):
             reason = "with a repeated stamp" if stamp == rising[-1][0] else "with a stamp before the last one"
-            error = RecordingError(
-                f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}", reason=reason
-            )
-            if left_out is None:
-                raise error
-            left_out.add_error(error)
+            expected = f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}"
+            leave_out(left_out, RecordingError(expected, reason=reason))
         elif number:
             rising.append((stamp, file))
     return rising
@@ -284,7 +261,16 @@ def _read(file: Path) -> bytes:
     return read_stored(file, "a readable picture")
 
 
-def _color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+def depth_image(stamp: float, file: Path, calibration: FolderCalibration) -> DepthImage:
+    """The image in a file of depth/."""
+    place = calibration.depth
+    image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
+    image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
+    return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.root_from_sensor)
+
+
+def color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+    """The image in a file of rgb/, which is read when it is decoded."""
     size = (color.camera.width, color.camera.height)
     step = -1 if color.mirrored else 1
     load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
@@ -292,7 +278,7 @@ def _color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
 
 
 def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: Calibration) -> SensorInfo:
-    rate = mean_rate(len(entries), entries[-1][0] - entries[0][0])
+    span = entries[-1][0] - entries[0][0]
     detail = f"{calibration.camera.width}x{calibration.camera.height} {words}"
     name = "rgb" if kind == "color" else kind
-    return SensorInfo(name, kind, calibration.sensor_frame, len(entries), rate, detail)
+    return SensorInfo.during(span, name, kind, calibration.sensor_frame, len(entries), detail)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from copy import deepcopy
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -24,88 +24,6 @@ from voodoo.recordings.recording import Recording, RecordingInfo
 
 _CHECKED = 30
 """Number of frames at the start whose keypoints are compared with calibration and depth."""
-
-
-class Joined(Recording):
-    """A recording whose frames also hold the measurements of other recordings since the previous frame.
-
-    All must be of the same scene, in the same root frame and by the same clock. Start, reference and the times of the
-    frames are those of the first one.
-
-    Args:
-        first: provides the frames.
-        others: recordings that are added; their own start and reference are not used.
-        offset: [s] added to the stamps of the others.
-
-    Raises:
-        RecordingError: one of the others has no measurements during the first, which indicates another clock.
-    """
-
-    def __init__(self, first: Recording, others: Sequence[Recording], *, offset: float = 0.0) -> None:
-        """Check that they overlap in time."""
-        self.path, self.name, self.root_frame = first.path, first.name, first.root_frame
-        self.start, self.reference = first.start, first.reference
-        self.assumed = tuple(words for one in (first, *others) for words in one.assumed)
-        self._first, self._others, self._offset = first, tuple(others), offset
-        about = first.info()
-        low, high = about.start_stamp, about.start_stamp + about.duration
-        for other in others:
-            this = other.info()
-            begin = this.start_stamp + offset
-            if begin > high or begin + this.duration < low:
-                raise RecordingError(
-                    f"{other.path}: expected stamps between {low:.3f} and {high:.3f} s as in {first.path}, found "
-                    f"{begin:.3f} to {begin + this.duration:.3f} s; is an offset of the clock missing (--offset)?"
-                )
-
-    def __len__(self) -> int:
-        """Number of frames of the first recording."""
-        return len(self._first)
-
-    def __iter__(self) -> Iterator[RecordedFrame]:
-        """The frames of the first recording with the measurements of all."""
-        streams = [_Ahead(other, self._offset) for other in self._others]
-        for recorded in self._first:
-            added = tuple(item for stream in streams for item in stream.until(recorded.stamp))
-            # The measurement that defines the frame stays last.
-            yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
-
-    def root_from(self, frame: str, stamp: float) -> FloatArray:
-        """See Recording."""
-        return self._first.root_from(frame, stamp)
-
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
-        """Images of the empty scene of all recordings."""
-        return {name: observed for one in (*self._others, self._first) for name, observed in one.empty_scene().items()}
-
-    def info(self) -> RecordingInfo:
-        """The summary of the first, with the sensors of all."""
-        about = self._first.info()
-        sensors = tuple(sensor for other in self._others for sensor in other.info().sensors)
-        joined = ", ".join(str(other.path) for other in self._others)
-        return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, f"joined with {joined}"))
-
-
-class _Ahead:
-    """Reads the measurements of a recording in step with time."""
-
-    def __init__(self, recording: Recording, offset: float) -> None:
-        self._frames = iter(recording)
-        self._offset = offset
-        self._held: RecordedFrame | None = None
-
-    def until(self, stamp: float) -> tuple[Measurement, ...]:
-        """Measurements since the last call, up to `stamp`: the last of each sensor."""
-        found: tuple[Measurement, ...] = ()
-        while True:
-            held = self._held if self._held is not None else next(self._frames, None)
-            if held is None or held.stamp + self._offset > stamp + 1e-6:
-                self._held = held
-                return found
-            self._held = None
-            moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in held.measurements)
-            latest = {item.sensor for item in moved}
-            found = tuple(item for item in found if item.sensor not in latest) + moved
 
 
 class Around(Recording):
@@ -139,6 +57,82 @@ class Around(Recording):
             if sensor.name in cameras
         )
         return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, *notes))
+
+
+class Joined(Around):
+    """A recording whose frames also hold the measurements of other recordings since the previous frame.
+
+    All must be of the same scene, in the same root frame and by the same clock. Start, reference and the times of the
+    frames are those of the first one.
+
+    Args:
+        first: provides the frames.
+        others: recordings that are added; their own start and reference are not used.
+        offset: [s] added to the stamps of the others.
+
+    Raises:
+        RecordingError: one of the others has no measurements during the first, which indicates another clock.
+    """
+
+    def __init__(self, first: Recording, others: Sequence[Recording], *, offset: float = 0.0) -> None:
+        """Check that they overlap in time."""
+        super().__init__(first)
+        self.people, self.complete = None, False
+        self.assumed = tuple(words for one in (first, *others) for words in one.assumed)
+        self._others, self._offset = tuple(others), offset
+        about = first.info()
+        low, high = about.start_stamp, about.start_stamp + about.duration
+        for other in others:
+            this = other.info()
+            begin = this.start_stamp + offset
+            if begin > high or begin + this.duration < low:
+                raise RecordingError(
+                    f"{other.path}: expected stamps between {low:.3f} and {high:.3f} s as in {first.path}, found "
+                    f"{begin:.3f} to {begin + this.duration:.3f} s; is an offset of the clock missing (--offset)?"
+                )
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """The frames of the first recording with the measurements of all."""
+        streams = [_Ahead(other, self._offset) for other in self._others]
+        for recorded in self._recording:
+            added = tuple(item for stream in streams for item in stream.until(recorded.stamp))
+            # The measurement that defines the frame stays last.
+            yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
+
+    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+        """Images of the empty scene of all recordings."""
+        return {
+            name: observed for one in (*self._others, self._recording) for name, observed in one.empty_scene().items()
+        }
+
+    def info(self) -> RecordingInfo:
+        """The summary of the first, with the sensors of all."""
+        about = self._recording.info()
+        sensors = tuple(sensor for other in self._others for sensor in other.info().sensors)
+        joined = ", ".join(str(other.path) for other in self._others)
+        return replace(about, sensors=about.sensors + sensors, notes=(*about.notes, f"joined with {joined}"))
+
+
+class _Ahead:
+    """Reads the measurements of a recording in step with time."""
+
+    def __init__(self, recording: Recording, offset: float) -> None:
+        self._frames = iter(recording)
+        self._offset = offset
+        self._held: RecordedFrame | None = None
+
+    def until(self, stamp: float) -> tuple[Measurement, ...]:
+        """Measurements since the last call, up to `stamp`: the last of each sensor."""
+        found: tuple[Measurement, ...] = ()
+        while True:
+            held = self._held if self._held is not None else next(self._frames, None)
+            if held is None or held.stamp + self._offset > stamp + 1e-6:
+                self._held = held
+                return found
+            self._held = None
+            moved = tuple(replace(item, stamp=item.stamp + self._offset) for item in held.measurements)
+            latest = {item.sensor for item in moved}
+            found = tuple(item for item in found if item.sensor not in latest) + moved
 
 
 class WithKeypoints(Around):
@@ -196,18 +190,14 @@ class WithKeypoints(Around):
         """Check the keypoints of the first frames against calibration and depth."""
         instants: list[list[KeypointImage]] = []
         pairs: list[tuple[KeypointImage, DepthImage]] = []
-        before = deepcopy(vars(self._left_out)) if self._left_out is not None else {}
-        try:
+        # Reading the frames again reports what is damaged.
+        with nullcontext() if self._left_out is None else self._left_out.aside(), suppress(RecordingError):
             for recorded in islice(self, _CHECKED):
                 images = [item for item in recorded.measurements if isinstance(item, KeypointImage)]
                 depths = [item for item in recorded.measurements if isinstance(item, DepthImage)]
                 pairs += [(image, depths[-1]) for image in images if depths]
                 if len(images) == len(self._files) and any(image.people for image in images):
                     instants.append(sorted(images, key=lambda image: image.sensor))
-        except RecordingError:
-            pass  # reading the frames again reports it
-        if self._left_out is not None:
-            vars(self._left_out).update(before)
         check_on_depth("keypoints", pairs)
         return check_keypoints("keypoints", instants)
 

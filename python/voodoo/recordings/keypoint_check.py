@@ -140,7 +140,7 @@ def taken_layout(people: Sequence[FloatArray], asked: str | None) -> tuple[str, 
     return asked, (said,) if certain and shape != asked else ()
 
 
-def agreement(instants: Sequence[Instant], change: Change | None = None, *, only: int | None = None) -> Agreement:
+def agreement(instants: Sequence[Instant], change: Change = lambda at, _: at, *, only: int | None = None) -> Agreement:
     """How well the rays meet, after a change of the pixels; `only`: the rays of one camera with those of the others."""
     distances: list[FloatArray] = []
     spreads: list[float] = []
@@ -164,11 +164,9 @@ def agreement(instants: Sequence[Instant], change: Change | None = None, *, only
     return Agreement(float(np.median(gathered)), float(np.median(spreads)))
 
 
-def _rays(image: KeypointImage, rows: FloatArray, change: Change | None) -> tuple[FloatArray, FloatArray]:
+def _rays(image: KeypointImage, rows: FloatArray, change: Change) -> tuple[FloatArray, FloatArray]:
     """Origin (3,) and directions (K, 3) of one person's keypoints in the root frame; NaN where there is none."""
-    pixels = rows[:, :2]
-    if change is not None:
-        pixels = change(pixels, (image.camera.width, image.camera.height))
+    pixels = change(rows[:, :2], (image.camera.width, image.camera.height))
     ahead = np.column_stack([image.camera.undistorted(pixels), np.ones(len(rows))])
     ahead[rows[:, 2] < _CONFIDENT] = np.nan
     with np.errstate(over="ignore", invalid="ignore"):  # keypoints of damaged files are any numbers

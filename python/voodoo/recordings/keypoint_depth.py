@@ -39,7 +39,7 @@ def check_on_depth(where: object, pairs: Sequence[tuple[KeypointImage, DepthImag
     """
     pairs = [pair for pair in pairs if pair[0].people]
     views = [(image, _nearest(image, depth)) for image, depth in pairs[:: max(len(pairs) // _MOST, 1)][:_MOST]]
-    found = _standing_out(views, None)
+    found = _standing_out(views, lambda at, _: at)
     if found is None or found >= _OFF:
         return
     tried = [(_standing_out(views, change) or 0.0, words) for words, change in readings(views[0][0].camera)]
@@ -51,7 +51,7 @@ def check_on_depth(where: object, pairs: Sequence[tuple[KeypointImage, DepthImag
         )
 
 
-def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Change | None) -> float | None:
+def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Change) -> float | None:
     """Share of the limbs whose middle is nearer than the surface on one of their sides; None: too few limbs."""
     near, count = 0, 0
     for image, nearest in views:
@@ -59,8 +59,7 @@ def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Cha
         ends = np.array([(at[above], at[below]) for above, below in LIMBS if above in at and below in at])
         for rows in image.people:
             pixels = np.clip(rows[:, :2], -_FARTHEST_PX, _FARTHEST_PX)
-            if change is not None:
-                pixels = change(pixels, (image.camera.width, image.camera.height))
+            pixels = change(pixels, (image.camera.width, image.camera.height))
             a, b = pixels[ends[(rows[ends, 2] >= _CONFIDENT).all(axis=1)]].transpose(1, 0, 2)
             middle, along = (a + b) / 2.0, b - a
             across = np.column_stack([-along[:, 1], along[:, 0]]) / np.maximum(np.hypot(*along.T), 1e-9)[:, None]

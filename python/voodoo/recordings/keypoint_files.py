@@ -12,7 +12,7 @@ from voodoo.errors import RecordingError, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.joint import short
 from voodoo.recordings.keypoint_layouts import LAYOUTS, layout_of
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.stored import read_stored_text
 
 _MOST = 2**24
@@ -25,13 +25,9 @@ def read_people(file: Path, *, layout: str | None, left_out: LeftOut | None) -> 
     Raises:
         RecordingError: see read_openpose_json.
     """
-    try:
+    with leaving_out(left_out):
         return tuple(read_openpose_json(file, layout=layout))
-    except RecordingError as error:
-        if left_out is None:
-            raise
-        left_out.add_error(error)
-        return ()
+    return ()
 
 
 def read_openpose_json(path: str | Path, *, layout: str | None) -> list[FloatArray]:

@@ -9,7 +9,7 @@ would count one error twice.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -44,25 +44,13 @@ class Layout:
     midpoints: tuple[tuple[int, int, int], ...] = ()
 
 
-def _parts(left: Mapping[str, int], right: Mapping[str, int]) -> list[SiteKeypoints]:
-    rows = []
-    for prefix, indices in (("l_", left), ("r_", right)):
-        rows += [SiteKeypoints(prefix + name, {index: 1.0}, _JOINT_SPREAD[name]) for name, index in indices.items()]
-    return rows
-
-
-def _joints(first: str, start: int) -> tuple[dict[str, int], dict[str, int]]:
-    """Joints in pairs from `start`, as in COCO: left shoulder, right shoulder, left elbow, ..."""
-    names = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    even = {name: start + 2 * i for i, name in enumerate(names)}
-    odd = {name: start + 2 * i + 1 for i, name in enumerate(names)}
-    return (even, odd) if first == "left" else (odd, even)
-
-
-def _body_25(start: Mapping[str, int], *, toe: int) -> dict[str, int]:
-    arm, leg = start["arm"], start["leg"]
-    rows = {"shoulder": arm, "elbow": arm + 1, "wrist": arm + 2, "hip": leg, "knee": leg + 1, "ankle": leg + 2}
-    return {**rows, "toe": toe}
+def _pairs(*indices: tuple[int, int], names: Iterable[str] = _JOINT_SPREAD) -> list[SiteKeypoints]:
+    """Joints of both sides, by their keypoints on the left and on the right; the names may be more."""
+    return [
+        SiteKeypoints(prefix + name, {pair[side]: 1.0}, _JOINT_SPREAD[name])
+        for side, prefix in enumerate(("l_", "r_"))
+        for name, pair in zip(names, indices, strict=False)
+    ]
 
 
 def _ears(left: int, right: int) -> SiteKeypoints:
@@ -75,16 +63,17 @@ def _palm(side: str, wrist: int, little: int, index: int) -> SiteKeypoints:
     return SiteKeypoints(f"{side}_hand", {wrist: 0.4, little: 0.3, index: 0.3}, 0.02)
 
 
-_COCO_LEFT, _COCO_RIGHT = _joints("left", 5)
+_LEGS_FIRST = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+_COCO = ((5, 6), (7, 8), (9, 10), (11, 12), (13, 14), (15, 16))
 
 LAYOUTS: dict[str, Layout] = {
     # nose, eyes, ears (3, 4), then pairs from the shoulders to the ankles
-    "coco17": Layout(17, (*_parts(_COCO_LEFT, _COCO_RIGHT), _ears(3, 4))),
+    "coco17": Layout(17, (*_pairs(*_COCO), _ears(3, 4))),
     # OpenPose: its neck (1) and mid-hip (8) are computed from the shoulders and hips
     "body25": Layout(
         25,
         (
-            *_parts(_body_25({"arm": 5, "leg": 12}, toe=19), _body_25({"arm": 2, "leg": 9}, toe=22)),
+            *_pairs((5, 2), (6, 3), (7, 4), (12, 9), (13, 10), (14, 11), (19, 22)),
             _ears(18, 17),
         ),
         midpoints=((1, 2, 5), (8, 9, 12)),
@@ -93,7 +82,7 @@ LAYOUTS: dict[str, Layout] = {
     "body25b": Layout(
         25,
         (
-            *_parts({**_COCO_LEFT, "toe": 19}, {**_COCO_RIGHT, "toe": 22}),
+            *_pairs(*_COCO, (19, 22)),
             _ears(3, 4),
             SiteKeypoints("skullbase", {17: 1.0}, 0.05),
             SiteKeypoints("skull_tip", {18: 1.0}, 0.05),
@@ -103,10 +92,7 @@ LAYOUTS: dict[str, Layout] = {
     "blazepose33": Layout(
         33,
         (
-            *_parts(
-                {"shoulder": 11, "elbow": 13, "wrist": 15, "hip": 23, "knee": 25, "ankle": 27, "toe": 31},
-                {"shoulder": 12, "elbow": 14, "wrist": 16, "hip": 24, "knee": 26, "ankle": 28, "toe": 32},
-            ),
+            *_pairs((11, 12), (13, 14), (15, 16), (23, 24), (25, 26), (27, 28), (31, 32)),
             _ears(7, 8),
             _palm("l", 15, 17, 19),
             _palm("r", 16, 18, 20),
@@ -116,7 +102,7 @@ LAYOUTS: dict[str, Layout] = {
     "halpe26": Layout(
         26,
         (
-            *_parts({**_COCO_LEFT, "toe": 20}, {**_COCO_RIGHT, "toe": 21}),
+            *_pairs(*_COCO, (20, 21)),
             _ears(3, 4),
             SiteKeypoints("skull_tip", {17: 1.0}, 0.05),
             SiteKeypoints("vc7", {18: 1.0}, 0.05),
@@ -126,10 +112,7 @@ LAYOUTS: dict[str, Layout] = {
     "h36m17": Layout(
         17,
         (
-            *_parts(
-                {"hip": 4, "knee": 5, "ankle": 6, "shoulder": 11, "elbow": 12, "wrist": 13},
-                {"hip": 1, "knee": 2, "ankle": 3, "shoulder": 14, "elbow": 15, "wrist": 16},
-            ),
+            *_pairs((4, 1), (5, 2), (6, 3), (11, 14), (12, 15), (13, 16), names=_LEGS_FIRST),
             SiteKeypoints("humanoid_root", {0: 1.0}, 0.04),
             SiteKeypoints("vc7", {8: 1.0}, 0.05),
             SiteKeypoints("skull_tip", {10: 1.0}, 0.05),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import deepcopy
 
-from voodoo.errors import VoodooError
+from voodoo.errors import RecordingError, VoodooError
 
 
 class LeftOut:
@@ -45,11 +46,11 @@ class LeftOut:
     @contextmanager
     def aside(self) -> Iterator[None]:
         """What is read inside is read again, and not counted here."""
-        before = dict(self.counts), dict(self.first)
+        before = deepcopy(vars(self))
         try:
             yield
         finally:
-            self.counts, self.first = before
+            vars(self).update(before)
 
     def __len__(self) -> int:
         """Number of left-out measurements."""
@@ -63,3 +64,26 @@ class LeftOut:
     def __str__(self) -> str:
         """Counts and reasons in one line."""
         return self.words(self.counts)
+
+
+def leave_out(left_out: LeftOut | None, error: RecordingError, reason: str = "", count: int = 1) -> None:
+    """Count measurements that cannot be used; without `left_out`, their error is raised.
+
+    Args:
+        left_out: of the loader.
+        error: what is wrong with them.
+        reason: see `LeftOut.add`; by default that of the error.
+        count: number of measurements.
+    """
+    if left_out is None:
+        raise error
+    left_out.add(reason or error.reason, error, count)
+
+
+@contextmanager
+def leaving_out(left_out: LeftOut | None, reason: str = "") -> Iterator[None]:
+    """An error inside ends the block and is counted, see `leave_out`."""
+    try:
+        yield
+    except RecordingError as error:
+        leave_out(left_out, error, reason)

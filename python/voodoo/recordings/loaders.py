@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,72 +22,39 @@ class Loader:
     """Opener and file layout of one kind of recording.
 
     Args:
-        find: imports the opener; the libraries of other loaders are not needed.
+        module: module of this package; it is imported when it is needed, because it needs libraries that others do not.
+        name: name of the opener in it.
         expects: description of the files.
     """
 
-    find: Callable[[], Callable[..., Recording]]
+    module: str
+    name: str
     expects: str
 
     @property
     def open(self) -> Callable[..., Recording]:
         """Called with the path and the loader's options."""
-        return self.find()
-
-
-def _ros() -> Callable[..., Recording]:
-    from voodoo.recordings.ros import RosRecording
-
-    return RosRecording
-
-
-def _utd_mhad() -> Callable[..., Recording]:
-    from voodoo.recordings.utd_mhad import UtdMhadRecording
-
-    return UtdMhadRecording
-
-
-def _folder() -> Callable[..., Recording]:
-    from voodoo.recordings.folder import FolderRecording
-
-    return FolderRecording
-
-
-def _pose2sim() -> Callable[..., Recording]:
-    from voodoo.recordings.pose2sim import Pose2SimRecording
-
-    return Pose2SimRecording
-
-
-def _videos() -> Callable[..., Recording]:
-    from voodoo.recordings.videos import VideosRecording
-
-    return VideosRecording
-
-
-def _markers() -> Callable[..., Recording]:
-    from voodoo.recordings.marker_files import MarkerRecording
-
-    return MarkerRecording
-
-
-def _azure_kinect() -> Callable[..., Recording]:
-    from voodoo.recordings.azure_kinect import AzureKinectRecording
-
-    return AzureKinectRecording
+        opener: Callable[..., Recording] = getattr(import_module(f"voodoo.recordings.{self.module}"), self.name)
+        return opener
 
 
 LOADERS: dict[str, Loader] = {
-    "ros2": Loader(_ros, "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"),
-    "ros1": Loader(_ros, "a ROS 1 .bag, or a .zip of it"),
-    "utd-mhad": Loader(_utd_mhad, "a *_depth.mat of UTD-MHAD"),
-    "folder": Loader(
-        _folder, "a folder with depth images (depth/*.png in the TUM RGB-D layout, or *.png) and calibration.toml"
+    "ros2": Loader(
+        "ros", "RosRecording", "a ROS 2 bag: folder with metadata.yaml or bag/, .mcap or .db3, or a .zip of it"
     ),
-    "pose2sim": Loader(_pose2sim, "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
-    "videos": Loader(_videos, "a folder with Calib*.toml and videos/* or images/*/ of several cameras"),
-    "azure-kinect": Loader(_azure_kinect, "a .mkv of an Azure Kinect or Femto Bolt"),
-    "markers": Loader(_markers, "a .trc or .c3d file of markers"),
+    "ros1": Loader("ros", "RosRecording", "a ROS 1 .bag, or a .zip of it"),
+    "utd-mhad": Loader("utd_mhad", "UtdMhadRecording", "a *_depth.mat of UTD-MHAD"),
+    "folder": Loader(
+        "folder",
+        "FolderRecording",
+        "a folder with depth images (depth/*.png in the TUM RGB-D layout, or *.png) and calibration.toml",
+    ),
+    "pose2sim": Loader("pose2sim", "Pose2SimRecording", "a folder of Pose2Sim: Calib*.toml and keypoints/*_json"),
+    "videos": Loader(
+        "videos", "VideosRecording", "a folder with Calib*.toml and videos/* or images/*/ of several cameras"
+    ),
+    "azure-kinect": Loader("azure_kinect", "AzureKinectRecording", "a .mkv of an Azure Kinect or Femto Bolt"),
+    "markers": Loader("marker_files", "MarkerRecording", "a .trc or .c3d file of markers"),
 }
 
 

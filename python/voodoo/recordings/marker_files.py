@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from voodoo.errors import RecordingError, shortened
 from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
-from voodoo.model.joint import short
+from voodoo.model.joint import valid
 from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
 from voodoo.recordings.pose2sim import SITES
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start, mean_rate
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start
 
 FRAME = "world"
 _HIGH_M = 1.5
@@ -65,12 +65,8 @@ class MarkerMap(BaseModel):
             RecordingError: unreadable or of another format; names file and key.
         """
         tables = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
-        try:
+        with valid(path, RecordingError, most=1):
             return cls.model_validate(tables)
-        except ValidationError as error:
-            problem = error.errors(include_url=False)[0]
-            key = ".".join(str(part) for part in problem["loc"])
-            raise RecordingError(f"{path}: {key}: {problem['msg']}, found {short(problem['input'])}") from error
 
     def worn(self) -> dict[str, tuple[str, tuple[float, float, float]]]:
         """The markers on limbs, in the format of voodoo.sensors.markers.body_with_markers."""
@@ -117,7 +113,6 @@ class MarkerRecording(Recording):
         first = {name: at for name, at in self._at(0).items() if name not in self.map.limbs}
         start = Start(joints={name: (float(x), float(y), float(z)) for name, (x, y, z) in first.items()})
         self.start = None if bare or not first else start
-        self.reference = None
         doubts = self._doubts() if self.map.y_up is None else ()
         self.assumed = (*content.remarks, *half_told, *self._unnamed(content.names), *doubts)
 
@@ -176,8 +171,7 @@ class MarkerRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = float(self._stamps[-1] - self._stamps[0])
-        rate = mean_rate(len(self), duration)
         detail = f"{len(self._sites)} markers"
-        sensor = SensorInfo(self.path.name, "markers", FRAME, len(self), rate, detail)
+        sensor = SensorInfo.during(duration, self.path.name, "markers", FRAME, len(self), detail)
         notes = (f"up is {self._up} of the file", *self.assumed)
         return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration, notes=notes)

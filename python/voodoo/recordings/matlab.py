@@ -44,15 +44,12 @@ def read_mat(path: Path) -> dict[str, npt.NDArray[Any]]:
     unpacking = Unpacking()
     with reading(path, "a sound MATLAB file"):
         for kind, content in _elements(data[_HEADER:], order):
-            if kind == _COMPRESSED:
-                found |= dict(_matrices(unpacking.unpack(content, "zlib"), order))
-            elif kind == _MATRIX:
-                found |= dict(_matrices(_tagged(kind, content, order), order))
+            packed = kind == _COMPRESSED
+            inside = _elements(unpacking.unpack(content, "zlib"), order) if packed else [(kind, content)]
+            for one, body in inside:
+                if one == _MATRIX and body and (named := _matrix(body, order)) is not None:
+                    found[named[0]] = named[1]
     return found
-
-
-def _tagged(kind: int, content: bytes, order: str) -> bytes:
-    return struct.pack(order + "II", kind, len(content)) + content
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
@@ -71,14 +68,6 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
             raise ValueError(f"expected {length} bytes of an element, found {len(data) - start}")
         yield kind, data[start : start + length]
         at = after
-
-
-def _matrices(data: bytes, order: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    for kind, content in _elements(data, order):
-        if kind == _MATRIX and content:
-            named = _matrix(content, order)
-            if named is not None:
-                yield named
 
 
 def _matrix(data: bytes, order: str) -> tuple[str, npt.NDArray[Any]] | None:

@@ -75,13 +75,12 @@ def picture_size(data: bytes, source: object) -> tuple[int, int]:
     raise RecordingError(f"{source}: expected a JPEG with a size, found {len(data)} bytes without")
 
 
-def check_size(data: bytes, source: object, size: tuple[int, int]) -> None:
+def check_size(found: tuple[int, int], source: object, size: tuple[int, int]) -> None:
     """Check the size in the header of an image: a small file with 30,000 x 30,000 pixels would need gigabytes of memory.
 
     Raises:
         RecordingError: another size than expected, (width, height).
     """
-    found = picture_size(data, source)
     if found != size:
         raise RecordingError(
             f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {found[0]}x{found[1]}",
@@ -105,7 +104,7 @@ def decode_depth_png(data: bytes, source: object, size: tuple[int, int]) -> npt.
         check_png(data, source)
     elif len(data) < found.end() + size[0] * size[1] * (2 if int(found[3]) > 255 else 1):
         raise RecordingError(f"{source}: expected a complete PGM, found it cut off after {len(data)} bytes")
-    check_size(data, source, size)
+    check_size(picture_size(data, source), source, size)
     image = _decode(data, cv2.IMREAD_UNCHANGED, source)
     if image.ndim != 2 or image.dtype != np.uint16:
         bits, channels = 8 * image.itemsize, 1 if image.ndim == 2 else image.shape[2]
@@ -135,12 +134,9 @@ def decode_color(data: bytes, source: object, size: tuple[int, int]) -> npt.NDAr
         check_png(data, source)
     else:
         raise RecordingError(f"{source}: expected a JPEG or PNG, found bytes starting with {data[:8]!r}")
-    check_size(data, source, size)
+    check_size(picture_size(data, source), source, size)
     image = _decode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, source)
-    if (image.shape[1], image.shape[0]) != size:
-        raise RecordingError(
-            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {image.shape[1]}x{image.shape[0]}"
-        )
+    check_size((image.shape[1], image.shape[0]), source, size)
     return image.astype(np.uint8, copy=False)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from voodoo.errors import MeasurementError, RecordingError
+from voodoo.errors import MeasurementError, RecordingError, naming
 from voodoo.measurements import KeypointImage, RecordedFrame
 from voodoo.recordings.camera_files import read_camera_toml, tables_of
 from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
@@ -22,8 +22,6 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     Reference,
     SensorInfo,
-    Start,
-    mean_rate,
     number_option,
 )
 
@@ -83,10 +81,8 @@ class Pose2SimRecording(Recording):
         self.name = path.name
         self.root_frame = FRAME
         self._left_out = left_out
-        try:
+        with naming(path, MeasurementError, error=RecordingError):
             layout_of(layout or "body25b")
-        except MeasurementError as error:
-            raise RecordingError(f"{path}: {error}") from error
         self.rate = number_option(path, "rate", rate, "images per second > 0", most=1e4)
         scale = number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
         placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)
@@ -107,7 +103,7 @@ class Pose2SimRecording(Recording):
         self._files, self._notes = _rows_of(path, self._folders)
         self._check(layout)
         self.reference = None if bare else read_triangulation(path, self.rate)
-        self.start = None if self.reference is None else start_of(self.reference)
+        self.start = None if self.reference is None else self.reference.as_start()
 
     def __len__(self) -> int:
         """Number of images of each camera."""
@@ -158,14 +154,13 @@ class Pose2SimRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = (len(self) - 1) / self.rate
-        rate = mean_rate(len(self), duration)
         sensors = (
-            SensorInfo(
+            SensorInfo.during(
+                duration,
                 one.name,
                 "keypoints",
                 one.name,
                 len(self),
-                rate,
                 f"{self.layout} keypoints of {folder.relative_to(self.path)}",
             )
             for one, folder in zip(self.cameras, self._folders, strict=True)
@@ -288,13 +283,3 @@ def read_triangulation(path: Path, rate: float) -> Reference | None:
     names, positions = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP).of(SITES)
     # Rows are images; the file's own time starts at 1 / rate for image 0.
     return Reference(np.arange(len(positions)) / rate, names, positions, exact=False)
-
-
-def start_of(reference: Reference) -> Start:
-    """The first row of a reference as a start."""
-    joints = {}
-    for name, position in zip(reference.names, reference.positions[0], strict=True):
-        if np.isfinite(position).all():
-            x, y, z = (float(value) for value in position)
-            joints[name] = (x, y, z)
-    return Start(joints=joints)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
@@ -16,6 +16,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PeopleTruth
 
 
@@ -45,6 +46,15 @@ class Reference:
     positions: FloatArray
     exact: bool
 
+    def as_start(self, *, without: tuple[str, ...] = ()) -> Start:
+        """The first row as a start, without the joints whose names end in one of these words."""
+        joints = {}
+        for name, position in zip(self.names, self.positions[0], strict=True):
+            if not name.endswith(without) and np.isfinite(position).all():
+                x, y, z = (float(value) for value in position)
+                joints[name] = (x, y, z)
+        return Start(joints=joints)
+
     def __repr__(self) -> str:
         """One line with the counts."""
         kind = "exact" if self.exact else "estimated"
@@ -62,6 +72,11 @@ class SensorInfo:
     messages: int
     rate_hz: float
     detail: str
+
+    @classmethod
+    def during(cls, seconds: float, name: str, kind: str, frame: str, messages: int, detail: str) -> SensorInfo:
+        """A source whose last message was so long after the first one."""
+        return cls(name, kind, frame, messages, mean_rate(messages, seconds), detail)
 
 
 @dataclass(frozen=True)
@@ -139,8 +154,8 @@ class Recording(ABC):
     path: Path
     name: str
     root_frame: str
-    start: Start | None
-    reference: Reference | None
+    start: Start | None = None
+    reference: Reference | None = None
     people: PeopleTruth | None = None
     complete: bool = False
 
@@ -231,6 +246,21 @@ def refuse_blank(item: DepthImage, where: object) -> None:
         raise RecordingError(
             f"{where}, stamp {item.stamp:.6f}: expected depths, found a blank image", reason="that are blank"
         )
+
+
+def usable(make: Callable[[], DepthImage], number: int, where: object, left_out: LeftOut | None) -> DepthImage | None:
+    """A depth image by its number; of a damaged recording, in which also blank ones are left out, None for one that is.
+
+    Raises:
+        RecordingError: without `left_out`, that of `make`.
+    """
+    with leaving_out(left_out):
+        item = make()
+        if left_out is not None:
+            refuse_blank(item, where)
+            left_out.numbers[item.sensor, item.stamp] = number
+        return item
+    return None
 
 
 def number_option(path: Path, name: str, value: object, expected: str, *, most: float, zero: bool = False) -> float:

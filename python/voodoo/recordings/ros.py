@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +15,13 @@ from voodoo.errors import RecordingError, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
-from voodoo.recordings.empty_scene import find_background, no_pictures, pictures_of, read_pictures, scene_words
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.empty_scene import EmptyScene
+from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
     SensorInfo,
-    mean_rate,
     number_option,
     refuse_blank,
 )
@@ -111,7 +110,6 @@ class RosRecording(Recording):
         scale = number_option(path, "meters_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
-        self._info: RecordingInfo | None = None
         given = (
             None if unpacked_gb is None else number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
         )
@@ -140,9 +138,7 @@ class RosRecording(Recording):
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
         self._read_beside(place, bare=bare)
-        self._background = find_background(place) if background is None else Path(background)
-        if background is not None and not self._background_files():
-            raise no_pictures(background, self._names_of_cameras())
+        self._scene = EmptyScene(place, background, self._names_of_cameras())
 
     def __len__(self) -> int:
         """Number of messages on the topic that defines the frames."""
@@ -172,13 +168,9 @@ class RosRecording(Recording):
                     self._check_calibration(topic, message)
                 continue
             numbers[topic] += 1
-            try:
+            measured = None
+            with leaving_out(self._left_out):
                 measured = None if message is None else self._measured(topic, message, last, clock)
-            except RecordingError as error:
-                if self._left_out is None:
-                    raise
-                self._left_out.add_error(error)
-                measured = None
             if measured is None:
                 continue
             if self._left_out is not None:
@@ -207,10 +199,9 @@ class RosRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize; reads the first and last message of every topic in use, once."""
-        if self._info is None:
-            self._info = self._summary()
-        return self._info
+        return self._summary
 
+    @cached_property
     def _summary(self) -> RecordingInfo:
         sensors = []
         duration = 0.0
@@ -221,15 +212,15 @@ class RosRecording(Recording):
                 span = stamp_of(last, where) - source.first_stamp
             if source is self._driver:
                 duration = span
-            rate = mean_rate(source.messages, span)
-            sensors.append(SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail))
+            about = source.topic, source.kind, source.frame, source.messages, source.detail
+            sensors.append(SensorInfo.during(span, *about))
         return self._described(
             self.loader,
             sensors,
             start=self._driver.first_stamp,
             duration=duration,
             unused=tuple(self._unused),
-            notes=(*self.assumed, *scene_words(self._background, self._background_files())),
+            notes=(*self.assumed, *self._scene.words),
         )
 
     def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
@@ -244,7 +235,6 @@ class RosRecording(Recording):
 
     def _read_beside(self, place: Path, *, bare: bool) -> None:
         """Read reference and start from the files beside the bag; if damage is left out, files that do not fit are only noted."""
-        self.reference, self.start, self.people = None, None, None
         for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
             file = find_beside(place, name)
             try:
@@ -281,14 +271,9 @@ class RosRecording(Recording):
         )
 
     def _add_transforms(self, message: Message | None, *, static: bool) -> None:
-        try:
-            with reading(self.path, "a readable transform"):
-                if message is not None:
-                    self._tree.add(message, static=static)
-        except RecordingError as error:
-            if self._left_out is None:
-                raise
-            self._left_out.add("transforms that cannot be read", error)
+        with leaving_out(self._left_out, "transforms that cannot be read"), reading(self.path, "a readable transform"):
+            if message is not None:
+                self._tree.add(message, static=static)
 
     def _read_recorders_transforms(self) -> None:
         """Read the transforms of librealsense's recorder: the pose of each stream relative to the common reference."""
@@ -321,13 +306,10 @@ class RosRecording(Recording):
             if s.kind == "color"
         }
 
-    def _background_files(self) -> dict[str, tuple[Path, ...]]:
-        return {} if self._background is None else pictures_of(self._background, self._names_of_cameras())
-
     def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
         """See Recording."""
         cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
-        return read_pictures(self._background_files(), cameras, left_out=self._left_out)
+        return self._scene.read(cameras, left_out=self._left_out)
 
     def _connected(self, source: TopicSource, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver
@@ -351,21 +333,15 @@ class RosRecording(Recording):
     def _check_calibration(self, topic: str, message: Message) -> None:
         for source in self._sources.values():
             if source.info_topic == topic:
-                try:
-                    camera = camera_of(message, source.topic, f"{self.path}, topic {topic}")
-                except RecordingError as error:
-                    if self._left_out is None:
-                        raise
-                    self._left_out.add("calibrations that cannot be used", error)
-                    continue
-                if source.camera is not None and source.camera.model == "inverse_plumb_bob":
-                    camera = replace(camera, model="inverse_plumb_bob")
-                if camera != source.camera and self._left_out is not None:
-                    self._left_out.add("calibrations unlike the first", f"{self.path}, topic {topic}: {camera}")
-                elif camera != source.camera:
-                    raise RecordingError(
-                        f"{self.path}, topic {topic}: expected one calibration, found {camera} after {source.camera}"
-                    )
+                where = f"{self.path}, topic {topic}"
+                with leaving_out(self._left_out, "calibrations that cannot be used"):
+                    camera = camera_of(message, source.topic, where)
+                    if source.camera is not None and source.camera.model == "inverse_plumb_bob":
+                        camera = replace(camera, model="inverse_plumb_bob")
+                    if camera != source.camera and self._left_out is not None:
+                        self._left_out.add("calibrations unlike the first", f"{where}: {camera}")
+                    elif camera != source.camera:
+                        raise RecordingError(f"{where}: expected one calibration, found {camera} after {source.camera}")
 
     def _measurement(self, source: TopicSource, message: Message, stamp: float, where: str) -> Measurement:
         root_from_sensor = self._tree.lookup(self.root_frame, self._bag.frame_of(source.topic, message), stamp)

@@ -16,7 +16,7 @@ from rosbags.interfaces import Connection
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings import realsense
 from voodoo.recordings.bag_files import BagFile, BagFolder, bag_file
-from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.message_types import MessageTypes
 from voodoo.recordings.ros_messages import Message, frame_of
 from voodoo.stored import MOST_RECORDED, check_stored
@@ -99,22 +99,17 @@ class Bag:
             for topic, message in self._messages(topics):
                 counts[topic] += 1
                 if isinstance(message, RecordingError):
-                    if self._left_out is None:
-                        raise message
-                    self._left_out.add_error(message)
+                    leave_out(self._left_out, message)
                     message = None
                 yield topic, message
         except _Stopped as error:
-            if self._left_out is None:
-                raise RecordingError(str(error)) from error
-            self._left_out.add("rest of the file that cannot be read", error)
+            leave_out(self._left_out, RecordingError(str(error)), "rest of the file that cannot be read")
         announced = {topic.name: topic.messages for topic in self.topics}
         for name, count in counts.items():
             if count != announced[name]:
                 found = f"expected {announced[name]} messages on {name} as the bag's index says, found {count}"
-                if self._left_out is None:
-                    raise RecordingError(f"{self.path}: {found}")
-                self._left_out.add("that are not in the file", f"{self.path}: {found}", abs(announced[name] - count))
+                missing = RecordingError(f"{self.path}: {found}")
+                leave_out(self._left_out, missing, "that are not in the file", abs(announced[name] - count))
 
     def first(self, topic: str, *, good: Callable[[Message], object] | None = None) -> Message:
         """The first message of `topic`; if damage is left out, the first one accepted by `good`.
@@ -191,7 +186,7 @@ class Bag:
     def _open(self) -> Iterator[BagFile]:
         with self._naming():
             with reading(self.path, "a complete ROS bag"):
-                reader: BagFile = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
+                reader = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
                 reader.open()
             try:
                 yield reader

@@ -9,10 +9,10 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import CameraError, RecordingError, reading
+from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
-from voodoo.recordings.pictures import decode_color, decode_depth_png
+from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png
 from voodoo.recordings.rvl import decode_rvl
 
 Message: TypeAlias = Any
@@ -97,12 +97,10 @@ def camera_of(info: Message, topic: str, source: str) -> Camera:
             f"and a region of interest at ({region.x_offset}, {region.y_offset})"
         )
     rectified = "rect" in base_topic(topic).rsplit("/", 1)[-1]
-    try:
+    with naming(source, CameraError, error=RecordingError):
         return Camera.from_camera_info(
             width=info.width, height=info.height, k=k, d=d, model=info.distortion_model, p=p, rectified=rectified
         )
-    except CameraError as error:
-        raise RecordingError(f"{source}: {error}") from error
 
 
 def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:
@@ -117,7 +115,7 @@ def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[An
             f"{source}: expected a depth encoding ({', '.join(DEPTH_ENCODINGS)}), found {message.encoding!r}"
         )
     rows = _rows(message, dtype.itemsize, source)
-    _check_size(message.width, message.height, camera, source)
+    check_size((message.width, message.height), source, (camera.width, camera.height))
     order: Literal["<", ">"] = ">" if message.is_bigendian else "<"
     image: npt.NDArray[Any] = np.ascontiguousarray(rows).view(dtype.newbyteorder(order)).astype(dtype, copy=False)
     return image
@@ -147,7 +145,7 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
         steps = image.astype(np.float64) - b
         with np.errstate(divide="ignore"):
             image = np.where((image > 0) & (steps > 0.0), a / steps, np.nan).astype(np.float32)
-    _check_size(image.shape[1], image.shape[0], camera, source)
+    check_size((image.shape[1], image.shape[0]), source, (camera.width, camera.height))
     return image
 
 
@@ -162,7 +160,7 @@ def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.
         raise RecordingError(
             f"{source}: expected a color encoding ({', '.join(COLOR_CHANNELS)}), found {message.encoding!r}"
         )
-    _check_size(message.width, message.height, camera, source)
+    check_size((message.width, message.height), source, (camera.width, camera.height))
     image = _rows(message, channels, source).reshape(message.height, message.width, channels)
     if channels == 1:
         return np.repeat(image, 3, axis=2)
@@ -247,11 +245,3 @@ def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uin
             f"found {len(message.data)} bytes in rows of {step}"
         )
     return np.lib.stride_tricks.as_strided(message.data, (height, expected), (step, 1))
-
-
-def _check_size(width: int, height: int, camera: Camera, source: str) -> None:
-    if (width, height) != (camera.width, camera.height):
-        raise RecordingError(
-            f"{source}: expected {camera.width}x{camera.height} px as calibrated, found {width}x{height}",
-            reason="of another size than calibrated",
-        )

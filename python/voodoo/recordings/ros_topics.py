@@ -69,7 +69,10 @@ class TopicFinder:
         """Store the choices."""
         self.bag = bag
         self.unused: list[tuple[str, str]] = []
-        self._choices = choices
+        self._choices = {
+            kind: [names] if isinstance(names, str) else None if names is None else list(names)
+            for kind, names in choices.items()
+        }
         self._camera_info_topic = camera_info_topic
         self._topics = {topic.name: topic for topic in bag.topics}
         self._first: dict[str, Message] = {}
@@ -103,8 +106,7 @@ class TopicFinder:
         return sources
 
     def _chosen(self, kind: TopicKind) -> list[str]:
-        choice = self._choices[kind]
-        names = [choice] if isinstance(choice, str) else list(choice or ())
+        names = self._choices[kind] or []
         for name in names:
             topic = self._topics.get(name)
             if topic is None or topic.type not in _TYPES[kind] or topic.messages == 0:
@@ -118,11 +120,7 @@ class TopicFinder:
 
     def _free(self, kind: TopicKind) -> list[str]:
         """Topics of the types of a kind that the user chose for no kind."""
-        chosen = {
-            name
-            for choice in self._choices.values()
-            for name in ([choice] if isinstance(choice, str) else choice or ())
-        }
+        chosen = {name for names in self._choices.values() for name in names or ()}
         return [t.name for t in self.bag.topics if t.type in _TYPES[kind] and t.messages and t.name not in chosen]
 
     def _automatic(self, kind: TopicKind) -> list[str]:

@@ -146,9 +146,6 @@ class SqliteFile:
             raise ValueError("expected the tables messages and topics, found none")
         self._tables = tables
 
-    def _columns(self, table: str) -> set[str]:
-        return {row[1] for row in self._rows("SELECT * FROM pragma_table_xinfo(?)", (table,))}
-
     def _read_topics(self) -> None:
         definitions: dict[str, MessageDefinition] = {}
         if "message_definitions" in self._tables:
@@ -192,7 +189,7 @@ class SqliteFile:
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
     ) -> Iterator[Item]:
-        """See BagFile.messages; those in a damaged part of the file are errors."""
+        """See bag_file; those in a damaged part of the file are errors."""
         wanted = {item.id: item for item in connections}
         places = ",".join("?" * len(wanted))
         rows = self._rows(

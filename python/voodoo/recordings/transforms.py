@@ -12,6 +12,7 @@ import numpy as np
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.rotations import turned_between
+from voodoo.model.transforms import inverse, pose_of
 from voodoo.recordings.ros_messages import Message
 from voodoo.recordings.set_back import SetBack
 
@@ -31,30 +32,18 @@ def matrix(translation: Message, rotation: Message, source: object) -> FloatArra
     if not np.isfinite(t).all() or not abs(norm - 1.0) < 0.01:
         raise RecordingError(f"{source}: expected a finite translation and a unit quaternion, found {t} and {q}")
     x, y, z, w = (float(value) for value in q / norm)
-    result = np.eye(4)
-    result[:3, :3] = [
+    turn = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    result[:3, 3] = t
-    return result
-
-
-def inverse(a_from_b: FloatArray) -> FloatArray:
-    """b_from_a (4, 4) of a rigid a_from_b."""
-    result = np.eye(4)
-    result[:3, :3] = a_from_b[:3, :3].T
-    result[:3, 3] = -a_from_b[:3, :3].T @ a_from_b[:3, 3]
-    return result
+    return pose_of(turn, t)
 
 
 def between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
     """Interpolated rigid transform (4, 4) at a fraction, 0 to 1: linear translation, constant angular velocity."""
-    result = np.eye(4)
-    result[:3, :3] = turned_between(first[:3, :3], second[:3, :3], fraction)
-    result[:3, 3] = (1.0 - fraction) * first[:3, 3] + fraction * second[:3, 3]
-    return result
+    place = (1.0 - fraction) * first[:3, 3] + fraction * second[:3, 3]
+    return pose_of(turned_between(first[:3, :3], second[:3, :3], fraction), place)
 
 
 class _Edge:
@@ -147,19 +136,21 @@ class TransformTree:
 
     def covers(self, root: str, frame: str, stamp: float) -> bool:
         """Whether every changing transform between two frames is known up to a stamp [s]; False if there is no chain."""
-        try:
-            edges = [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
-        except RecordingError:
-            return False
-        return all(edge.constant or (bool(edge.stamps) and edge.stamps[-1] >= stamp) for edge in edges)
+        edges = self._chain(root, frame)
+        return edges is not None and all(
+            edge.constant or (bool(edge.stamps) and edge.stamps[-1] >= stamp) for edge in edges
+        )
 
     def reaches(self, root: str, frame: str) -> bool:
         """Whether transforms lead from `root` to `frame`."""
+        return self._chain(root, frame) is not None
+
+    def _chain(self, root: str, frame: str) -> list[_Edge] | None:
+        """The transforms between two frames; None if they are not connected."""
         try:
-            self.path(root, frame)
+            return [self._edge(a, b)[0] for a, b in pairwise(self.path(root, frame))]
         except RecordingError:
-            return False
-        return True
+            return None
 
     def path(self, root: str, frame: str) -> list[str]:
         """Frames from `root` to `frame`, both included.
@@ -186,20 +177,10 @@ class TransformTree:
             result.append(previous[result[-1]])
         return result[::-1]
 
-    def constant(self, root: str, frame: str) -> bool:
-        """Whether root_from_frame is constant."""
-        path = self.path(root, frame)
-        return all(self._edge(a, b)[0].constant for a, b in pairwise(path))
-
     def moves(self, root: str, frame: str) -> bool:
         """Whether a frame moves in another one by more than the drift of a standing robot; False if not connected."""
-        if not {root, frame} <= self._neighbors.keys():
-            return False
-        try:
-            path = self.path(root, frame)
-        except RecordingError:
-            return False
-        return any(self._edge(a, b)[0].moves() for a, b in pairwise(path))
+        edges = self._chain(root, frame)
+        return edges is not None and any(edge.moves() for edge in edges)
 
     def lookup(self, root: str, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) at `stamp`.

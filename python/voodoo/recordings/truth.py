@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from pydantic import BaseModel, Field, FiniteFloat
 
-from voodoo.errors import RecordingError, reading
+from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
-from voodoo.model.joint import short
+from voodoo.model.joint import valid
 from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.recording import Reference, Start
 from voodoo.stored import MOST_METADATA, read_stored_text
@@ -24,6 +23,19 @@ RootFromTruth: TypeAlias = Callable[[float], FloatArray]
 """(4, 4) from the frame of truth.csv to the root frame at a stamp [s]."""
 RootFromStart: TypeAlias = Callable[[str | None], FloatArray]
 """(4, 4) from the frame named in init.json, or that of truth.csv, to the root frame."""
+
+
+class FirstPose(BaseModel):
+    """The entries of init.json that pose and size a body, see `voodoo.pipeline.start.Init`."""
+
+    height_m: Annotated[FiniteFloat, Field(gt=0.3, lt=3.0)] | None = None
+    frame: str | None = None
+    joints: Annotated[dict[str, tuple[FiniteFloat, FiniteFloat, FiniteFloat]], Field(min_length=1)]
+
+    def moved(self, pose: FloatArray) -> dict[str, tuple[float, float, float]]:
+        """The joints in another frame, by the transform (4, 4) to it."""
+        places = {name: (pose[:3, :3] @ place + pose[:3, 3]).tolist() for name, place in self.joints.items()}
+        return {name: (x, y, z) for name, (x, y, z) in places.items()}
 
 
 def find_beside(bag: Path, name: str) -> Path | None:
@@ -58,26 +70,10 @@ def read_start(path: Path, root_from: RootFromStart) -> Start:
     Raises:
         RecordingError: not JSON, another format, or a frame without a transform.
     """
-    with reading(path, "a JSON file"):
-        content = json.loads(read_stored_text(path, "a JSON file", most=MOST_METADATA))
-    if not isinstance(content, dict) or not isinstance(content.get("joints"), dict) or not content["joints"]:
-        raise RecordingError(f"{path}: expected an object with the joints of the first frame, found {short(content)}")
-    frame = content.get("frame")
-    if frame is not None and not isinstance(frame, str):
-        raise RecordingError(f"{path}: frame: expected a name, found {short(frame)}")
-    root_from_base = root_from(frame)
-    joints = {}
-    for name, value in content["joints"].items():
-        numbers = isinstance(value, list) and len(value) == 3 and all(isinstance(v, (int, float)) for v in value)
-        # An integer in JSON may be larger than any float.
-        if not numbers or not all(abs(v) <= sys.float_info.max for v in value):
-            raise RecordingError(f"{path}: joint {name}: expected [x, y, z] in meters, found {short(value)}")
-        x, y, z = (float(v) for v in root_from_base[:3, :3] @ np.array(value, dtype=np.float64) + root_from_base[:3, 3])
-        joints[str(name)] = (x, y, z)
-    start = Start(joints=joints)
-    height = content.get("height_m")
-    if height is not None:
-        if not isinstance(height, (int, float)) or not 0.3 < height < 3.0:
-            raise RecordingError(f"{path}: height_m: expected a stature in meters, found {short(height)}")
-        start["height_m"] = float(height)
+    content = read_stored_text(path, "a JSON file", most=MOST_METADATA)
+    with valid(path, RecordingError, most=1):
+        written = FirstPose.model_validate_json(content, strict=True)
+    start = Start(joints=written.moved(root_from(written.frame)))
+    if written.height_m is not None:
+        start["height_m"] = written.height_m
     return start

@@ -22,8 +22,6 @@ from voodoo.recordings.recording import (
     RecordingInfo,
     Reference,
     SensorInfo,
-    Start,
-    mean_rate,
 )
 
 CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=160.5, cy=119.0)
@@ -76,7 +74,8 @@ class UtdMhadRecording(Recording):
         self._depth: npt.NDArray[np.uint16] = depth
         skeleton = path.parent.parent / "Skeleton" / f"{self.name}_skeleton.mat"
         self.reference = _read_skeleton(skeleton, len(self)) if not bare and skeleton.is_file() else None
-        self.start = None if self.reference is None else _start(self.reference)
+        # A body without feet has no toes.
+        self.start = None if self.reference is None else self.reference.as_start(without=("_toe",))
 
     def __len__(self) -> int:
         """Number of depth images."""
@@ -92,10 +91,9 @@ class UtdMhadRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize."""
         duration = (len(self) - 1) / RATE_HZ
-        rate = mean_rate(len(self), duration)
         return self._described(
             "utd-mhad",
-            [SensorInfo("depth", "depth", FRAME, len(self), rate, "320x240 16UC1, person cut out")],
+            [SensorInfo.during(duration, "depth", "depth", FRAME, len(self), "320x240 16UC1, person cut out")],
             duration=duration,
             notes=(
                 "stamps are nominal (30 Hz); the true rate may be near 19 Hz",
@@ -125,13 +123,3 @@ def _read_skeleton(path: Path, frames: int) -> Reference:
     positions = skeleton[kept].transpose(2, 0, 1).astype(np.float64) * (-1.0, -1.0, 1.0)
     positions[(positions == 0.0).all(axis=2)] = np.nan  # the SDK's "not tracked"
     return Reference(np.arange(frames) / RATE_HZ, NAMES, positions, exact=False)
-
-
-def _start(reference: Reference) -> Start:
-    """First frame of the reference without the toes, which a body without feet does not have."""
-    joints = {}
-    for name, position in zip(reference.names, reference.positions[0], strict=True):
-        if not name.endswith("_toe") and np.isfinite(position).all():
-            x, y, z = (float(value) for value in position)
-            joints[name] = (x, y, z)
-    return Start(joints=joints)

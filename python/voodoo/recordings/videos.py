@@ -12,24 +12,16 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml
-from voodoo.recordings.empty_scene import (
-    FOLDER,
-    find_background,
-    no_pictures,
-    pictures_of,
-    read_pictures,
-    scene_words,
-)
+from voodoo.recordings.empty_scene import FOLDER, EmptyScene
 from voodoo.recordings.films import VIDEOS, PictureFolder, Pictures, Video, pictures_in
 from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.order import in_order, matched
-from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation, start_of
+from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation
 from voodoo.recordings.recording import (
     Recording,
     RecordingInfo,
     SensorInfo,
-    mean_rate,
     number_option,
 )
 from voodoo.recordings.together import together
@@ -100,13 +92,11 @@ class VideosRecording(Recording):
                 self._cameras.append(Video(source, sensor, camera, rate))
         self.assumed = tuple(dict.fromkeys(clock.notes))
         self._notes: tuple[str, ...] = ()
-        self._background = find_background(path) if background is None else Path(background)
-        if background is not None and not self._background_files():
-            raise no_pictures(background, self._names())
+        names = {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}
+        self._scene = EmptyScene(path, background, names)
         self._read_beside(bare=bare)
 
     def _read_beside(self, *, bare: bool) -> None:
-        self.start, self.reference = None, None
         if bare:
             return
         truth, start = (find_beside(self.path, name) for name in ("truth.csv", "init.json"))
@@ -118,7 +108,7 @@ class VideosRecording(Recording):
         if start is not None:
             self.start = read_start(start, lambda frame: self.root_from(frame or FRAME, 0.0))
         elif self.reference is not None and not self.reference.exact:
-            self.start = start_of(self.reference)
+            self.start = self.reference.as_start()
         if self.reference is not None and not self.reference.exact:
             self._notes = ("the reference is triangulated from keypoints: another tracker's opinion",)
 
@@ -131,16 +121,10 @@ class VideosRecording(Recording):
         pictures = heapq.merge(*self._cameras, key=lambda item: item.stamp)
         return together(pictures, self._cameras[0].sensor)
 
-    def _names(self) -> dict[str, tuple[str, ...]]:
-        return {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}
-
-    def _background_files(self) -> dict[str, tuple[Path, ...]]:
-        return {} if self._background is None else pictures_of(self._background, self._names())
-
     def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
         """See Recording."""
         cameras = {one.sensor: one.camera for one in self._cameras}
-        return read_pictures(self._background_files(), cameras, left_out=self._left_out)
+        return self._scene.read(cameras, left_out=self._left_out)
 
     def info(self) -> RecordingInfo:
         """Summarize."""
@@ -149,9 +133,9 @@ class VideosRecording(Recording):
         sensors = []
         for one in self._cameras:
             words = f"{one.camera.width}x{one.camera.height} pictures"
-            each = mean_rate(len(one.stamps), one.stamps[-1] - one.stamps[0])
-            sensors.append(SensorInfo(one.sensor, "color", one.placed.name, len(one.stamps), each, words))
-        notes = (*self.assumed, *self._notes, *scene_words(self._background, self._background_files()))
+            span = one.stamps[-1] - one.stamps[0]
+            sensors.append(SensorInfo.during(span, one.sensor, "color", one.placed.name, len(one.stamps), words))
+        notes = (*self.assumed, *self._notes, *self._scene.words)
         return self._described("videos", sensors, start=float(stamps[0]), duration=duration, notes=notes)
 
 

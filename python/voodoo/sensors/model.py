@@ -127,7 +127,6 @@ TIME_OF_FLIGHT = RangeNoise(constant=0.008, linear=0.004)
 """A SwissRanger-like camera (K06 III-A: "within a few centimeters" up to 7.5 m)."""
 STRUCTURED_LIGHT = RangeNoise(quadratic=0.0015)
 """A Kinect-like camera: 1.5 mm z^2."""
-LIDAR_CAMERA = RangeNoise(constant=0.0025, linear=0.001)
 PLANAR_LASER = RangeNoise(constant=0.030)
 """A beam is accurate to 1 cm; the rest is the difference between the model's legs and the trousers."""
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.model.camera import Camera
-from voodoo.model.transforms import rigid
+from voodoo.model.transforms import pose_of, rigid
 from voodoo.sensors.model import RangeNoise, stereo_noise
 from voodoo.sensors.pixels import FloatArray
 
@@ -106,8 +106,7 @@ class StereoPair:
         self.camera = Camera(left.width, left.height, float(p[0, 0]), float(p[1, 1]), float(p[0, 2]), float(p[1, 2]))
         self.baseline = float(np.linalg.norm(pose[:3, 3]))
         self.noise = stereo_noise(focal=self.camera.fx, baseline=self.baseline, disparity_sigma=disparity_sigma)
-        self._left_from_rectified = np.eye(4)
-        self._left_from_rectified[:3, :3] = np.asarray(turn_left).T
+        self._left_from_rectified = pose_of(np.asarray(turn_left).T)
         self._nearest, self._farthest = nearest, farthest
         least = int(self.camera.fx * self.baseline / farthest)
         most = int(np.ceil(self.camera.fx * self.baseline / nearest))

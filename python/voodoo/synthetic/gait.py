@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from voodoo.ik.chain import Chain
 from voodoo.model.body import Body
+from voodoo.model.transforms import pose_of
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -67,10 +68,8 @@ def pose_at(
     index = min(int(np.searchsorted(times, time, side="right")), len(times) - 1)
     speed = (lengths[index] - lengths[index - 1]) / max(times[index] - times[index - 1], 1e-9) if index else 0.0
     chain = Chain(body)
-    root = np.eye(4)
     c, s = math.cos(facing), math.sin(facing)
-    root[:3, :3] = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
-    root[:3, 3] = (x, y, _hip_height(chain))
+    root = pose_of([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], (x, y, _hip_height(chain)))
     swing = min(speed, 1.0)
     angles = np.array([_angle(name, math.tau * walked / _STRIDE_M, swing) for name in chain.angle_names])
     return chain.forward(angles, world_from_base=root)

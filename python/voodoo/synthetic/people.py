@@ -15,7 +15,7 @@ from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.recordings.people_truth import PeopleTruth
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, reference_words
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
 from voodoo.synthetic.boxes import Box, room_depth
 from voodoo.synthetic.gait import Stop, pose_at
 from voodoo.synthetic.render import render_depth
@@ -131,7 +131,6 @@ class MadeUpRecording(Recording):
     def __init__(self, scene: Scene) -> None:
         """Render all frames."""
         self.path, self.name, self.root_frame = Path(scene.name), scene.name, scene.root_frame
-        self.start = self.reference = None
         self.scene = scene
         self._stamps = np.arange(round(scene.seconds * scene.rate_hz)) / scene.rate_hz
         self._poses = [np.asarray(scene.root_from_sensor(float(stamp)), dtype=np.float64) for stamp in self._stamps]
@@ -201,18 +200,7 @@ class MadeUpRecording(Recording):
             SensorInfo(name, kind, "camera_optical_frame", len(self), rate, f"{size} {words}")
             for name, kind, words in kinds
         )
-        return RecordingInfo(
-            name=self.name,
-            path=self.path,
-            loader="synthetic",
-            frames=len(self),
-            start_stamp=0.0,
-            duration=float(self._stamps[-1]),
-            rate_hz=rate,
-            root_frame=self.root_frame,
-            sensors=sensors,
-            reference=reference_words(None, self.people),
-        )
+        return self._described("synthetic", sensors, duration=float(self._stamps[-1]))
 
 
 def paint(label: npt.NDArray[np.uint8], people: Sequence[Walker], seed: tuple[int, int]) -> npt.NDArray[np.uint8]:

@@ -16,7 +16,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.export.skeleton import mean_interval
 from voodoo.export.track import FloatArray, Track
 
@@ -49,12 +49,7 @@ def report_page(name: str, tracks: Mapping[str, Track], *, film: Path | None = N
     Raises:
         VoodooError: Plotly is not installed, stamps that do not increase, or a film that cannot be read.
     """
-    try:
-        import plotly  # noqa: F401
-    except ImportError:
-        raise VoodooError(
-            "a report needs Plotly, which is not installed: pip install 'voodoo-tracker[report]'"
-        ) from None
+    installed("plotly", "a report needs Plotly, which is not installed: pip install 'voodoo-tracker[report]'")
     parts = [f"<!DOCTYPE html><html lang=en><meta charset=utf-8><title>{escape(name)}</title>"]
     parts += [f"<body style='font:15px sans-serif;margin:1.5em'><h1>{escape(name)}</h1>"]
     if film is not None:
@@ -125,8 +120,7 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
         names, text = list(track.limb_status), list(track.limb_status.values())
         look: dict[str, Any] = {"colorscale": scale, "zmin": -0.5, "zmax": 3.5, "showscale": False}
         figure.add_trace(go.Heatmap(x=times, y=names, z=codes, text=text, hoverinfo="x+y+text", **look), row=1, col=2)
-    sigma = np.sqrt(np.trace(track.covariance, axis1=2, axis2=3) / 3.0)
-    joints = track.joint_names[: sigma.shape[1]]
+    joints = track.joint_names[: track.joint_sigma.shape[1]]
     angles, unsure = np.degrees(track.angles), np.degrees(track.angle_sigma)
     for number, (name, column) in enumerate(zip(track.angle_names, angles.T, strict=True)):
         color = _COLORS[number % len(_COLORS)]
@@ -140,7 +134,7 @@ def _figure(track: Track) -> Any:  # noqa: ANN401 - Plotly
             figure.add_trace(go.Scatter(x=there, y=edge, hoverinfo="skip", showlegend=False, **band), row=2, col=2)
             how |= {"customdata": around, "hovertemplate": "%{y:.1f} ± %{customdata:.1f}"}
         figure.add_trace(go.Scatter(x=times, y=column, name=name, **how), row=2, col=2)
-    for name, column in zip(joints, sigma.T, strict=True):
+    for name, column in zip(joints, track.joint_sigma.T, strict=True):
         figure.add_trace(go.Scatter(x=times, y=column, name=name, mode="lines", showlegend=False), row=3, col=2)
     figure.add_trace(go.Scatter(x=times, y=track.residual, mode="lines", showlegend=False), row=4, col=2)
     shown = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_SHOWN)).round().astype(int))

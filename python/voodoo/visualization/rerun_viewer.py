@@ -18,7 +18,7 @@ import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.children import children
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.limb_mesh import limb_mesh
@@ -65,7 +65,9 @@ class Viewer:
 
     def __init__(self, *, save: str | Path | None = None, name: str = "voodoo", serve: str | None = None) -> None:
         """Open the file or the viewer."""
-        self._rr = _rerun()
+        self._rr = installed(
+            "rerun", "the viewer needs Rerun, which is not installed: pip install 'voodoo-tracker[view]'"
+        )
         if save is not None and Path(save).suffix != ".rrd":
             raise VoodooError(f"{save}: expected a name that ends in .rrd, found {Path(save).suffix!r}")
         how = {} if save is None else _large_chunks(self._rr)
@@ -322,13 +324,3 @@ def _large_chunks(rr: ModuleType) -> dict[str, Any]:
     config = rr.ChunkBatcherConfig.DEFAULT()
     config.flush_tick, config.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
     return {"batcher_config": config}
-
-
-def _rerun() -> ModuleType:
-    try:
-        import rerun
-    except ImportError as error:
-        raise VoodooError(
-            "the viewer needs Rerun, which is not installed: pip install 'voodoo-tracker[view]'"
-        ) from error
-    return rerun

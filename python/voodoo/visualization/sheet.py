@@ -3,40 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from voodoo.visualization.ink import INK, Picture
 
 
 def side_by_side(pictures: Sequence[Picture]) -> Picture:
     """Images in a row, scaled to the height of the first one."""
-    height = pictures[0].shape[0]
-    row = [
-        picture
-        if picture.shape[0] == height
-        else cv2.resize(
-            picture,
-            (round(picture.shape[1] * height / picture.shape[0]), height),
-            interpolation=cv2.INTER_AREA,
-        )
-        for picture in pictures
-    ]
-    return np.asarray(np.hstack(row), dtype=np.uint8)
+    return np.asarray(np.hstack(_fitted(pictures, 0)), dtype=np.uint8)
 
 
 def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
     """Images in rows of `columns`, all rows scaled to the width of the first one."""
     rows = [side_by_side(pictures[start : start + columns]) for start in range(0, len(pictures), columns)]
-    width = rows[0].shape[1]
-    fitted = [
-        row
-        if row.shape[1] == width
-        else cv2.resize(row, (width, round(row.shape[0] * width / row.shape[1])), interpolation=cv2.INTER_AREA)
-        for row in rows
-    ]
-    return np.asarray(np.vstack(fitted), dtype=np.uint8)
+    return np.asarray(np.vstack(_fitted(rows, 1)), dtype=np.uint8)
+
+
+def _fitted(pictures: Sequence[Picture], axis: int) -> list[npt.NDArray[Any]]:
+    """Images scaled to the size of the first one along an axis: 0 height, 1 width."""
+    size = pictures[0].shape[axis]
+    fitted = []
+    for picture in pictures:
+        height, width = (round(side * size / picture.shape[axis]) for side in picture.shape[:2])
+        fitted.append(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+    return fitted
 
 
 def contact_sheet(pictures: Sequence[Picture], *, columns: int, width: int = 1600, gap: int = 6) -> Picture:

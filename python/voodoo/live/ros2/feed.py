@@ -6,7 +6,6 @@ import math
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 
 from voodoo.errors import RecordingError, reading
@@ -47,14 +46,6 @@ ROOT_PATIENCE_S = 1.0
 """How long the first frame waits for a chain of transforms to one of STANDING."""
 
 
-@dataclass
-class _Calibrated:
-    """The calibration of an image topic, and the message it was made from."""
-
-    key: tuple[object, ...]
-    camera: Camera
-
-
 class RosFeed:
     """Turns messages into arrivals.
 
@@ -93,7 +84,9 @@ class RosFeed:
         self._newest = -math.inf
         self._root = root_frame if sensor_pose is None else sensor_pose[0]
         self._since: float | None = None
-        self._cameras: dict[str, _Calibrated] = {}
+        self._cameras: dict[
+            str, tuple[Camera, tuple[object, ...]]
+        ] = {}  # and the fields of the message it was made from
         self.expects_transforms = True
         for kind in (*MEASURED, CAMERA_INFO, TF):
             STORE.get_msgdef(kind)  # otherwise the first message of a type takes tens of milliseconds
@@ -175,11 +168,10 @@ class RosFeed:
                 continue
             key = (message.width, message.height, message.distortion_model, message.binning_x, message.binning_y)
             key += tuple(values.tobytes() for values in (message.k, message.d, message.p))
-            known = self._cameras.get(image)
-            if known is not None and known.key == key:
+            if self._cameras.get(image, (None, None))[1] == key:
                 continue
             try:
-                self._cameras[image] = _Calibrated(key, camera_of(message, image, f"{topic}"))
+                self._cameras[image] = camera_of(message, image, f"{topic}"), key
             except RecordingError as error:
                 self._cameras.pop(image, None)
                 raise Fault("calibration unusable", str(error)) from error
@@ -225,8 +217,7 @@ class RosFeed:
         if self._pose is not None and topic == self._topics[0]:
             return self._pose[1]
         try:
-            with self._lock:
-                return self._tree.lookup(self.root_frame, frame, stamp)
+            return self.root_from(frame, stamp)
         except RecordingError as error:
             raise Fault(kind_of(error, "transform missing"), f"{topic}, stamp {stamp:.6f}: {error}") from error
 
@@ -238,12 +229,11 @@ class RosFeed:
         if measured == "points":
             with _whole(message):
                 return PointCloud(topic, stamp, cloud_points(message, where), pose)
-        known = self._cameras.get(topic)
-        if known is None:
+        if topic not in self._cameras:
             raise Fault(
                 "calibration missing", f"{where}: expected a calibration on {self.info_topic(topic)}, found none"
             )
-        camera = known.camera
+        camera, _ = self._cameras[topic]
         if measured == "color":
             decode = partial(color_image, message, camera, where, compressed=kind == COMPRESSED)
             return ColorImage(topic, stamp, decode, camera, pose)

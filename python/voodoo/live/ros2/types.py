@@ -11,7 +11,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.export.ros2 import STORE
 
 _BASE = {
@@ -27,13 +27,8 @@ def idl() -> Any:  # noqa: ANN401 - a module that may not be installed
     Raises:
         VoodooError: it is not installed.
     """
-    try:
-        import cyclonedds.idl
-    except ImportError as error:
-        raise VoodooError(
-            "ROS 2 topics need Cyclone DDS, which is not installed: pip install 'voodoo-tracker[ros2]'"
-        ) from error
-    return cyclonedds.idl
+    missing = "ROS 2 topics need Cyclone DDS, which is not installed: pip install 'voodoo-tracker[ros2]'"
+    return installed("cyclonedds.idl", missing)
 
 
 def dds_name(kind: str) -> str:
@@ -50,16 +45,11 @@ def ros_name(name: str) -> str:
     return f"{parts[0]}/msg/{parts[3][:-1]}"
 
 
-def _deserialize(kind: Any, data: bytes, has_header: bool = True, use_version_2: bool | None = None) -> Any:  # noqa: ANN401
+def _deserialize(kind: Any, data: bytes, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - with options of the library
     return message_of(kind, data)
 
 
-def _serialize(
-    message: Any,  # noqa: ANN401
-    buffer: Any = None,  # noqa: ANN401
-    endianness: Any = None,  # noqa: ANN401
-    use_version_2: bool | None = None,
-) -> bytes:
+def _serialize(message: Any, *_: Any, **__: Any) -> bytes:  # noqa: ANN401 - with options of the library
     return bytes(message.data_as_sent)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +12,9 @@ from voodoo.errors import RecordingError
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Faults
 from voodoo.live.source import Arrival, Source, SourceGone
-from voodoo.measurements import ColorImage, DepthImage
 from voodoo.recordings.calibration import FolderCalibration, read_calibration
 from voodoo.recordings.folder import FrameClock as NameClock
-from voodoo.recordings.pictures import decode_color, decode_depth_png
-from voodoo.stored import read_stored
+from voodoo.recordings.folder import color_image, depth_image
 
 _POLL_S = 0.005
 _PATIENCE_S = 0.5
@@ -109,27 +106,21 @@ class GrowingSource(Source):
     def _arrival(self, kind: str, path: Path, since: float, now: float) -> list[Arrival] | None:
         """The arrival of a file; none if it is unusable, None while it may still be being written."""
         assert self._calibration is not None
-        place = self._calibration.depth if kind == "depth" else self._calibration.color
-        if place is None:
+        color = self._calibration.color
+        if kind == "rgb" and color is None:
             return []
-        size = (place.camera.width, place.camera.height)
         try:
             stamp = NameClock(self._rate).of([path])[0]
-            data = read_stored(path, "a picture")
-            if kind == "rgb":
-                image = ColorImage(
-                    "rgb", stamp, partial(decode_color, data, path, size), place.camera, place.root_from_sensor
-                )
+            if kind == "rgb" and color is not None:
+                image = color_image(stamp, path, color)
                 _ = image.image
                 return [Arrival("rgb", "color", stamp, lambda: image)]
-            depth = decode_depth_png(data, path, size)
+            item = depth_image(stamp, path, self._calibration)
         except (RecordingError, OSError) as error:
             if now - since < _PATIENCE_S:
                 return None
             self._faults.add_error(error, now, "damaged picture") if isinstance(error, RecordingError) else None
             return []
-        scale = 1.0 / self._calibration.depth_factor
-        item = DepthImage("depth", stamp, depth, scale, place.camera, place.root_from_sensor)
         return [Arrival("depth", "depth", stamp, lambda: item, drives=True)]
 
     def close(self) -> None:

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import CameraError, VoodooError
+from voodoo.errors import CameraError, VoodooError, naming
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Faults
 from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
+from voodoo.model.transforms import pose_of
 from voodoo.recordings.calibration import read_calibration
 
 _SIZE, _RATE = (640, 480), 30
@@ -216,7 +217,7 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
     if lens not in _LENSES:
         raise VoodooError(f"{source}: expected a lens of {', '.join(_LENSES)}, found {lens}")
     model = _LENSES[lens]
-    try:
+    with naming(source, CameraError, error=VoodooError):
         return Camera(
             intrinsics.width,
             intrinsics.height,
@@ -227,18 +228,13 @@ def camera_of(intrinsics: Any, source: str) -> Camera:  # noqa: ANN401
             tuple(coefficients[:4] if model == "equidistant" else coefficients),
             model,  # type: ignore[arg-type]
         )
-    except CameraError as error:
-        raise VoodooError(f"{source}: {error}") from error
 
 
 def _pose(extrinsics: Any) -> FloatArray:  # noqa: ANN401
     """(4, 4) of `pyrealsense2.extrinsics`, whose rotation is stored by columns."""
-    pose = np.eye(4)
     turn = np.array(extrinsics.rotation, dtype=np.float64).reshape(3, 3).T
     u, _, v = np.linalg.svd(turn)  # single precision is no rotation for the tracker
-    pose[:3, :3] = u @ v
-    pose[:3, 3] = extrinsics.translation
-    return pose
+    return pose_of(u @ v, extrinsics.translation)
 
 
 def _library() -> Any:  # noqa: ANN401

@@ -20,7 +20,7 @@ from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import RangeNoise
 from voodoo.sensors.pixels import FloatArray
-from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.rays import SiteRay, add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
@@ -90,6 +90,21 @@ class Context:
     memory: Memory
     others: Sequence[Followed] = ()
     rays: list[SiteRay] = field(default_factory=list)
+
+    def add_scene(self, frame: Frame) -> None:
+        """Add what is known of the scene: boxes without a person, and the floor."""
+        for low, high in self.settings.exclude:
+            frame.exclude(low, high)
+        if self.settings.ground_z is not None:
+            frame.set_ground(normal=(0.0, 0.0, 1.0), offset=self.settings.ground_z)
+
+    def add_rays(self, frame: Frame) -> list[SiteRay]:
+        """Add the collected rays to a frame; returns them with the trust by which they agree."""
+        rays, scale = self.rays, self.settings.agreement
+        if scale > 0.0:
+            rays = agreed(rays, predicted=self.predicted, scale=scale)
+        add_rays(frame, rays, model=self.settings.model)
+        return rays
 
     @cached_property
     def estimate(self) -> Estimate:

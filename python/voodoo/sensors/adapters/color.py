@@ -39,6 +39,11 @@ class _Known:
         observed = self.lens.apply(image)
         return np.ascontiguousarray(observed[:, :, 1]) if self.gray else observed
 
+    def add(self, frame: Frame, item: ColorImage) -> None:
+        """Add an image with its own stamp."""
+        place: dict[str, Any] = {"camera": self.lens.camera, "world_from_sensor": item.root_from_sensor}
+        frame.add_color(self.picture(item.image), **place, stamp=item.stamp, source=item.sensor)
+
 
 class ColorAdapter(Adapter[ColorImage]):
     """Pictures as a pinhole camera would have taken them; `Memory` keeps what is known of each camera under "color"."""
@@ -62,13 +67,7 @@ class ColorAdapter(Adapter[ColorImage]):
             if empty is not None:
                 context.tracker.set_background(item.sensor, [known.picture(picture) for picture in empty])
             context.memory.put(self.kind, item.sensor, known)
-        frame.add_color(
-            known.picture(item.image),
-            camera=known.lens.camera,
-            world_from_sensor=item.root_from_sensor,
-            stamp=item.stamp,
-            source=item.sensor,
-        )
+        known.add(frame, item)
 
     def draw(self, item: ColorImage, canvas: Canvas, memory: Memory) -> None:
         """The border of what is the body by its colors, and the edges along its contour, where the settings ask for it."""
@@ -79,12 +78,7 @@ class ColorAdapter(Adapter[ColorImage]):
         finite = np.isfinite(lines.sigmas)
         edges = (lines.places + lines.offsets[:, None] * lines.normals)[finite]
         frame = Frame(item.stamp)
-        frame.add_color(
-            known.picture(item.image),
-            camera=known.lens.camera,
-            world_from_sensor=item.root_from_sensor,
-            source=item.sensor,
-        )
+        known.add(frame, item)
         likely = known.tracker.segment(frame)[item.sensor]
         size = (item.camera.width, item.camera.height)
         mask = cv2.resize((likely > LIKELY).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0

@@ -49,10 +49,6 @@ class KeypointReport:
     unseen: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
 
-    def __copy__(self) -> KeypointReport:
-        """Returns itself, because it is immutable."""
-        return self
-
 
 @dataclass(frozen=True)
 class KeypointSensor:

@@ -14,8 +14,7 @@ from voodoo.errors import MeasurementError
 from voodoo.measurements import DepthImage
 from voodoo.model.projection import CameraView
 from voodoo.sensors.depth import depth_points, meters
-from voodoo.sensors.silhouettes.masks import Mask, filled, without_specks
-from voodoo.sensors.silhouettes.sites import known_place
+from voodoo.sensors.silhouettes.masks import Mask, filled, known_place, without_specks
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 

@@ -8,6 +8,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.errors import MeasurementError
+from voodoo.measurements import FloatArray
+
 Mask: TypeAlias = npt.NDArray[np.bool_]
 """(height, width)."""
 _HOLE_PX = 40
@@ -28,3 +31,15 @@ def filled(mask: Mask) -> Mask:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - closed, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] <= _HOLE_PX
     return np.asarray((closed != 0) | small[labels], dtype=bool)
+
+
+def known_place(site: str, position: npt.ArrayLike) -> FloatArray:
+    """The position (3,) [m] of a known site, checked.
+
+    Raises:
+        MeasurementError: it is not three finite numbers.
+    """
+    place = np.asarray(position, dtype=np.float64).reshape(-1)
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise MeasurementError(f"known[{site}]: expected three finite numbers, found {position!r}")
+    return place

@@ -10,8 +10,7 @@ import numpy as np
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.projection import CameraView
-from voodoo.sensors.silhouettes.masks import Mask
-from voodoo.sensors.silhouettes.sites import known_place
+from voodoo.sensors.silhouettes.masks import Mask, known_place
 
 _BESIDE_M, _TRUNK_M, _GIRTH_M = 0.35, 0.15, 0.12
 """How far the person extends beyond known sites [m]: beyond any, beyond those of the trunk, beyond the bones of the limbs."""

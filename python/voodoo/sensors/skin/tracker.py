@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +23,6 @@ from voodoo.people import Followed
 from voodoo.sensors.body_view import BodyView
 from voodoo.sensors.pixels import FloatArray, checked_camera
 from voodoo.sensors.rays import SiteRay
-from voodoo.sensors.skin.regions import Candidate
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.tracker import Tracker
 
@@ -31,6 +31,23 @@ ByteImage = npt.NDArray[np.uint8]
 
 
 _NOWHERE = np.full(3, np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A pixel where a head or hand may be.
+
+    Args:
+        pixel: (u, v).
+        region: label of its region.
+        area: of that region [px].
+        hand: False for the center of a region longer than a hand, which may be a face but not a hand.
+    """
+
+    pixel: tuple[float, float]
+    region: int
+    area: int
+    hand: bool = True
 
 
 class SkinTracker:

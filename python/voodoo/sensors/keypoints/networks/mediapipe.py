@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import ConfigError
+from voodoo.errors import ConfigError, installed
 
 _MOST = 6
 """Persons that a pose landmarker may find in an image."""
@@ -34,12 +34,8 @@ class MediaPipe:
 
     def __init__(self, model: str) -> None:
         """Load the network."""
-        try:
-            import mediapipe
-        except ImportError:
-            advice = "pip install 'voodoo-tracker[mediapipe]'"
-            raise ConfigError(f"mediapipe: expected the package, found none; {advice}") from None
-        self._mediapipe: Any = mediapipe
+        missing = "mediapipe: expected the package, found none; pip install 'voodoo-tracker[mediapipe]'"
+        self._mediapipe = mediapipe = installed("mediapipe", missing, error=ConfigError)
         self._landmarker: Any = None
         if model:
             from mediapipe.tasks.python import BaseOptions, vision

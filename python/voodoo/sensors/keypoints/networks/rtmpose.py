@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import ConfigError
+from voodoo.errors import ConfigError, installed
 
 _MODES = ("lightweight", "balanced", "performance")
 _LAYOUTS = {17: "coco17", 26: "halpe26"}
@@ -30,10 +30,8 @@ class RtmPose:
 
     def __init__(self, words: str) -> None:
         """Load the networks."""
-        try:
-            import rtmlib
-        except ImportError:
-            raise ConfigError("rtmpose: expected rtmlib, found none; pip install 'voodoo-tracker[rtmpose]'") from None
+        missing = "rtmpose: expected rtmlib, found none; pip install 'voodoo-tracker[rtmpose]'"
+        rtmlib = installed("rtmlib", missing, error=ConfigError)
         mode, files = words or "balanced", [Path(word) for word in words.split(",")]
         how: dict[str, Any] = {"mode": mode}
         if mode not in _MODES:
