@@ -1,10 +1,12 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::{HumanModel, Joint, Limb, Site};
 
+use crate::arrays::frozen;
 use crate::errors::{IntoPy, exception};
 use crate::shape::PyShape;
 
@@ -125,6 +127,16 @@ impl PyBody {
     /// The parts that `new` takes, rotations as vectors.
     fn parts(&self) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
         self.parts_with(readable)
+    }
+
+    #[doc = stub!("Body.sizes")]
+    fn sizes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let limbs = self.0.limbs();
+        let sizes = |limb: &Limb| {
+            let shape = &limb.shape;
+            [shape.length(), shape.a0(), shape.b0(), shape.a1(), shape.b1()]
+        };
+        frozen(py, limbs.iter().flat_map(sizes).collect(), &[limbs.len(), 5])
     }
 
     /// For pickle and copy.

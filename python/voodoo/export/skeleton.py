@@ -7,6 +7,7 @@ rest.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
@@ -49,35 +50,46 @@ class Bone:
 def bones(body: Body) -> tuple[Bone, ...]:
     """The bones of a body at rest, parents first."""
     result: list[Bone] = []
-    poses: list[tuple[FloatArray, FloatArray]] = []
-    _, limbs, _ = body.core.parts()
-    names = [limb[0] for limb in limbs]
-    axes = [place[1] for limb in limbs if limb[3] is not None for place in limb[3][1:3]]
-    from_joints = iter([_turn(*axis) for axis in axes])
-    for name, parent, shape, joint, _ in limbs:
-        if joint is None or parent is None:
-            turn, shift, place, above, joint_name = np.eye(3), np.zeros(3), np.zeros(3), None, name
-        else:
-            above = names.index(parent)
-            joint_name, on_parent, on_limb = joint[:3]
-            parent_turn, parent_shift = poses[above]
-            parent_from_joint, limb_from_joint = next(from_joints), next(from_joints)
-            turn = parent_turn @ parent_from_joint @ limb_from_joint.T
-            place = np.asarray(on_limb[0], dtype=np.float64)
-            shift = parent_turn @ np.asarray(on_parent[0]) + parent_shift - turn @ place
-        poses.append((turn, shift))
-        head = turn @ place + shift
+    shifts: list[FloatArray] = []
+    _, limbs, _ = body.parts
+    design = _design(body)
+    for (name, _, shape, joint, _), (above, joint_name, *_), turn in zip(limbs, design, _at_rest(design), strict=True):
+        place, shift = np.zeros(3), np.zeros(3)
+        if above is not None:
+            place = np.asarray(joint[2][0], dtype=np.float64)
+            shift = result[above].rest @ np.asarray(joint[1][0]) + shifts[above] - turn @ place
+        shifts.append(shift)
         tip = turn @ np.array([0.0, 0.0, shape.length]) + shift
-        result.append(Bone(name, above, joint_name, head, tip, turn, place))
+        result.append(Bone(name, above, joint_name, turn @ place + shift, tip, turn, place))
     return tuple(result)
 
 
-@lru_cache(maxsize=256)
-def _turn(x: float, y: float, z: float) -> FloatArray:
-    """Cached, because the axes of joints stay while lengths are refined in every frame."""
-    turn = matrix_of_turn((x, y, z))
-    turn.setflags(write=False)
-    return turn
+_Design: TypeAlias = tuple[tuple[int | None, str, tuple[float, ...], tuple[float, ...]], ...]
+
+
+def _design(body: Body) -> _Design:
+    """What stays while sizes are refined: of each limb the parent, the joint's name, and its axes on both sides."""
+    _, limbs, _ = body.parts
+    numbers = {limb[0]: index for index, limb in enumerate(limbs)}
+    return tuple(
+        (None, name, (), ())
+        if joint is None or parent is None
+        else (numbers[parent], joint[0], tuple(joint[1][1]), tuple(joint[2][1]))
+        for name, parent, _, joint, _ in limbs
+    )
+
+
+@lru_cache(maxsize=64)
+def _at_rest(design: _Design) -> FloatArray:
+    """standing_from_limb orientations (L, 3, 3)."""
+    turns: list[FloatArray] = []
+    for above, _, on_parent, on_limb in design:
+        turns.append(
+            np.eye(3) if above is None else turns[above] @ matrix_of_turn(on_parent) @ matrix_of_turn(on_limb).T
+        )
+    result: FloatArray = np.array(turns)
+    result.setflags(write=False)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,15 +142,61 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     if track.limb_names != body.limb_names:
         found = ", ".join(track.limb_names) or "none (a .csv has no limb poses; use .npz)"
         raise VoodooError(f"track: expected poses of the limbs {', '.join(body.limb_names)}, found {found}")
-    parts = bones(body)
-    turn = track.world_from_limb[:, :, :3, :3]
-    rest = np.array([bone.rest for bone in parts])
-    places = np.array([bone.head_in_limb for bone in parts])
-    heads = np.einsum("flij,lj->fli", turn, places) + track.world_from_limb[:, :, :3, 3]
-    for index, bone in enumerate(parts):
-        if bone.parent is not None and bone.joint in track.joint_names:
-            heads[:, index] = track.joints[:, track.joint_names.index(bone.joint)]
-    return Skeleton(parts, track.stamps, turn @ rest.transpose(0, 2, 1), heads)
+    plan = _plan(_design(body), track.joint_names)
+    return _placed(bones(body), plan, track.stamps, track.world_from_limb, track.joints, [body])
+
+
+def skeleton_of_people(
+    bodies: Sequence[Body], stamps: FloatArray, poses: FloatArray, joint_names: tuple[str, ...], joints: FloatArray
+) -> Skeleton:
+    """As `skeleton`, of one instant: persons take the place of frames.
+
+    Args:
+        bodies: P of one design, each in its sizes.
+        stamps: (P,) [s].
+        poses: world_from_limb (P, L, 4, 4).
+        joint_names: J names of joints and sites.
+        joints: (P, J, 3) [m].
+
+    Returns:
+        The skeleton; its `bones` may be in the sizes of another body.
+    """
+    design = _design(bodies[0])
+    if design not in _known:
+        _known.clear()  # programs have one design
+        _known[design] = bones(bodies[0])
+    return _placed(_known[design], _plan(design, joint_names), stamps, poses, joints, bodies)
+
+
+_known: dict[_Design, tuple[Bone, ...]] = {}
+_Plan: TypeAlias = tuple[FloatArray, list[int], list[int], list[int]]
+
+
+@lru_cache(maxsize=64)
+def _plan(design: _Design, joint_names: tuple[str, ...]) -> _Plan:
+    """limb_from_standing orientations at rest (L, 3, 3); limbs whose joint has a position of its own, and its number; limbs whose
+    joint has none."""
+    jointed = [(index, joint) for index, (above, joint, *_) in enumerate(design) if above is not None]
+    seen = [(index, joint_names.index(joint)) for index, joint in jointed if joint in joint_names]
+    other = [index for index, joint in jointed if joint not in joint_names]
+    return _at_rest(design).transpose(0, 2, 1), [index for index, _ in seen], [site for _, site in seen], other
+
+
+def _placed(
+    parts: tuple[Bone, ...],
+    plan: _Plan,
+    stamps: FloatArray,
+    poses: FloatArray,
+    joints: FloatArray,
+    bodies: Sequence[Body],
+) -> Skeleton:
+    back, seen, sites, other = plan
+    turn, heads = poses[:, :, :3, :3], poses[:, :, :3, 3].copy()
+    heads[:, seen] = joints[:, sites]
+    if other:
+        places = np.array([[body.parts[1][index][3][2][0] for index in other] for body in bodies])
+        heads[:, other] += (turn[:, other] @ places[..., None])[..., 0]
+    return Skeleton(parts, stamps, turn @ back, heads)
 
 
 def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
