@@ -123,11 +123,6 @@ class Ros2Sink(Output):
     def _write_people(self, step: Step, people: Shown) -> None:
         there, frame = people.present, people.frame
         numbers = [people.numbers[index] for index in there]
-        for number in numbers:
-            size = float(step.bodies[number].core.sizes()[:, 0].sum())
-            if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
-                self._write(description(step.bodies[number], person_id(number)))
-                self._described[number] = size
         ids = tuple(map(person_id, numbers))
         names, parents, *_ = people.frames
         above = () if frame == self._root() else (self._root(), frame, *root_on_parent(people.turn.pose))
@@ -148,6 +143,11 @@ class Ros2Sink(Output):
             self._send(f"{BODIES}/{person}/joint_states", JOINTS, step.stamp, joints)
             if np.isfinite(sure[index]).all():
                 self._send(f"{BODIES}/{person}/pose", POSE, step.stamp, pose)
+        for number in numbers:  # last: it takes milliseconds
+            size = float(step.bodies[number].core.sizes()[:, 0].sum())
+            if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
+                self._write(description(step.bodies[number], person_id(number)))
+                self._described[number] = size
 
     def _send(self, topic: str, kind: str, stamp: float, made: Callable[[], tuple[Template, FloatArray]]) -> None:
         """Fill a template with numbers and publish it, if somebody subscribes."""
