@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 READER_LEFT = 141
@@ -34,18 +33,15 @@ class Escaped:
 
     def write(self, text: str) -> int:
         """Write a text."""
-        with self._read():
-            return int(self.stream.write(escaped(text)))
+        return int(self._read(self.stream.write, escaped(text)))
 
     def flush(self) -> None:
         """Write what is buffered."""
-        with self._read():
-            self.stream.flush()
+        self._read(self.stream.flush)
 
-    @contextmanager
-    def _read(self) -> Iterator[None]:
+    def _read(self, call: Callable[..., Any], *words: str) -> Any:  # noqa: ANN401
         try:
-            yield
+            return call(*words)
         except BrokenPipeError:
             # What is left in the buffer would fail again at the end.
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())

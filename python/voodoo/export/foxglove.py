@@ -138,17 +138,8 @@ class Channels:
 
 
 class FoxgloveRow(NamedTuple):
-    """A person in a frame.
-
-    Attributes:
-        person: REP-155 id.
-        names: of frames, see HumanFrames.
-        parents: theirs.
-        limbs: names.
-        joints: number of joints and sites.
-        on_parents: see HumanFrames.
-        shapes: see `shapes_of`.
-    """
+    """A person in a frame: REP-155 id, names and parents of `HumanFrames`, names of limbs, number of joints and sites, and the
+    numbers of `HumanFrames.on_parents` and `shapes_of`."""
 
     person: str
     names: tuple[str, ...]

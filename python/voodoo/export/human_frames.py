@@ -43,7 +43,7 @@ class HumanFrames(NamedTuple):
 
 def human_frames(joint_names: tuple[str, ...], joints: FloatArray, posed: Skeleton) -> HumanFrames:
     """Frames of poses with joints (F, J, 3)."""
-    names, parents, limbs, *ends = _plan(joint_names, tuple((bone.name, bone.parent) for bone in posed.bones))
+    names, parents, limbs, *ends = _plan(joint_names, posed.limbs)
     points = np.concatenate([posed.heads, joints], axis=1)
     return HumanFrames(names, parents, posed.rotations[:, limbs], (points[:, ends[0]] + points[:, ends[1]]) / 2.0)
 

@@ -22,7 +22,7 @@ def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
     positive, knees to negative angles. The rest of their rotation is not in the angle (it is in /tf). The waist
     is 0: the torso is one limb.
     """
-    names, parents, children, columns, signs, shifted = _plan(tuple(bone.name for bone in posed.bones))
+    names, parents, children, columns, signs, shifted = _plan(posed.body.limb_names)
     # All joints at once: of a single frame, calls take the time.
     turns = quaternions(posed.rotations[:, parents].swapaxes(2, 3) @ posed.rotations[:, children])
     found = [_wrapped(2.0 * np.arctan2(turns[..., 1], turns[..., 3]))]

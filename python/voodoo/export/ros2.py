@@ -127,9 +127,7 @@ def write_people_bag(
 class _Human:
     """The messages of one person."""
 
-    def __init__(
-        self, track: Track, body: Body, person: str, root_frame: str, turn: Turn | None = None, *, bare: bool = False
-    ) -> None:
+    def __init__(self, track: Track, body: Body, person: str, root_frame: str, turn: Turn | None = None) -> None:
         if not root_frame:
             raise VoodooError("root_frame: expected a name, found none")
         track, self.root = upright(track, root_frame, turn)
@@ -139,7 +137,7 @@ class _Human:
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
         self._displayed = track.found
-        if self._displayed.any() and not bare:
+        if self._displayed.any():
             posed = skeleton(track, body).of_frames(self._displayed)
             frames = human_frames(track.joint_names, track.joints[self._displayed], posed)
             self._joints, angles = joint_angles(posed)
@@ -166,14 +164,10 @@ class _Human:
             if np.isfinite(sure).all():
                 messages[f"{self.topic}/pose"] = pose_message(at, self.root, rows[0].tolist(), sure)
         if markers:
-            messages |= self.markers(index)
+            header = _header(at, self.root)
+            drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
+            messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
-
-    def markers(self, index: int) -> dict[str, Any]:
-        """Topic -> message of the markers of a frame."""
-        header = _header(round(float(self.track.stamps[index]) * 1e9), self.root)
-        drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
-        return {f"{self.topic}/markers": _new("visualization_msgs/msg/MarkerArray", markers=drawn)}
 
 
 def root_on_parent(pose: FloatArray) -> list[float]:
@@ -386,19 +380,9 @@ def instant(
     Raises:
         VoodooError: a stamp before zero.
     """
-    return _Human(_one(estimate, body), body, person, root_frame, turn).messages(0, markers=markers)
-
-
-def markers(
-    estimate: Estimate, body: Body, *, root_frame: str, person: str, turn: Turn | None = None
-) -> dict[str, Any]:
-    """Topic -> message of the markers of `instant`; without a pose they are deleted."""
-    return _Human(_one(estimate, body), body, person, root_frame, turn, bare=True).markers(0)
-
-
-def _one(estimate: Estimate, body: Body) -> Track:
     # Angles are not needed; if nobody was found, the names come from the body.
-    return Track.of([estimate], body=None if estimate.joints else body)
+    track = Track.of([estimate], body=None if estimate.joints else body)
+    return _Human(track, body, person, root_frame, turn).messages(0, markers=markers)
 
 
 def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition

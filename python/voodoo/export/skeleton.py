@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -18,7 +18,6 @@ import numpy.typing as npt
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.rotations import matrix_of_turn
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 _MOVES_M = 1e-4
@@ -51,45 +50,17 @@ def bones(body: Body) -> tuple[Bone, ...]:
     """The bones of a body at rest, parents first."""
     result: list[Bone] = []
     shifts: list[FloatArray] = []
-    _, limbs, _ = body.parts
-    design = _design(body)
-    for (name, _, shape, joint, _), (above, joint_name, *_), turn in zip(limbs, design, _at_rest(design), strict=True):
-        place, shift = np.zeros(3), np.zeros(3)
-        if above is not None:
-            place = np.asarray(joint[2][0], dtype=np.float64)
+    _, limbs, _ = body.core.parts()
+    names = body.limb_names
+    for (name, parent, shape, joint, _), turn, place in zip(limbs, *body.core.at_rest(), strict=True):
+        above, shift = None, np.zeros(3)
+        if joint is not None and parent is not None:
+            above = names.index(parent)
             shift = result[above].rest @ np.asarray(joint[1][0]) + shifts[above] - turn @ place
         shifts.append(shift)
         tip = turn @ np.array([0.0, 0.0, shape.length]) + shift
-        result.append(Bone(name, above, joint_name, turn @ place + shift, tip, turn, place))
+        result.append(Bone(name, above, joint[0] if joint else name, turn @ place + shift, tip, turn, place))
     return tuple(result)
-
-
-_Design: TypeAlias = tuple[tuple[int | None, str, tuple[float, ...], tuple[float, ...]], ...]
-
-
-def _design(body: Body) -> _Design:
-    """What stays while sizes are refined: of each limb the parent, the joint's name, and its axes on both sides."""
-    _, limbs, _ = body.parts
-    numbers = {limb[0]: index for index, limb in enumerate(limbs)}
-    return tuple(
-        (None, name, (), ())
-        if joint is None or parent is None
-        else (numbers[parent], joint[0], tuple(joint[1][1]), tuple(joint[2][1]))
-        for name, parent, _, joint, _ in limbs
-    )
-
-
-@lru_cache(maxsize=64)
-def _at_rest(design: _Design) -> FloatArray:
-    """standing_from_limb orientations (L, 3, 3)."""
-    turns: list[FloatArray] = []
-    for above, _, on_parent, on_limb in design:
-        turns.append(
-            np.eye(3) if above is None else turns[above] @ matrix_of_turn(on_parent) @ matrix_of_turn(on_limb).T
-        )
-    result: FloatArray = np.array(turns)
-    result.setflags(write=False)
-    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +68,7 @@ class Skeleton:
     """A track on its bones: F frames, L bones.
 
     Args:
-        bones: the body at rest.
+        body: whose bones they are; persons of one instant may have other sizes each.
         stamps: (F,) [s].
         rotations: (F, L, 3, 3) world_from_bone: the identity when the body stands at rest and looks along x.
         heads: (F, L, 3) where each bone is joined to its parent [m]: the track's own joint of that name, else the place on the
@@ -106,14 +77,25 @@ class Skeleton:
     Rotations and heads of searching frames are NaN.
     """
 
-    bones: tuple[Bone, ...]
+    body: Body
     stamps: FloatArray
     rotations: FloatArray
     heads: FloatArray
 
+    @cached_property
+    def bones(self) -> tuple[Bone, ...]:
+        """The body at rest."""
+        return bones(self.body)
+
+    @cached_property
+    def limbs(self) -> tuple[tuple[str, int | None], ...]:
+        """Name of each bone, and the number of its parent."""
+        names = self.body.limb_names
+        return tuple((limb.name, None if limb.parent is None else names.index(limb.parent)) for limb in self.body.limbs)
+
     def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Skeleton:
         """The skeleton of some frames: a mask (F,), or their numbers."""
-        return Skeleton(self.bones, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])
+        return Skeleton(self.body, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])
 
     def offsets(self) -> FloatArray:
         """(F, L, 3) where each bone is joined to its parent, in the parent bone's frame [m]; zero for the root."""
@@ -142,61 +124,27 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     if track.limb_names != body.limb_names:
         found = ", ".join(track.limb_names) or "none (a .csv has no limb poses; use .npz)"
         raise VoodooError(f"track: expected poses of the limbs {', '.join(body.limb_names)}, found {found}")
-    plan = _plan(_design(body), track.joint_names)
-    return _placed(bones(body), plan, track.stamps, track.world_from_limb, track.joints, [body])
+    return skeleton_of([body], track.stamps, track.world_from_limb, track.joint_names, track.joints)
 
 
-def skeleton_of_people(
+def skeleton_of(
     bodies: Sequence[Body], stamps: FloatArray, poses: FloatArray, joint_names: tuple[str, ...], joints: FloatArray
 ) -> Skeleton:
-    """As `skeleton`, of one instant: persons take the place of frames.
-
-    Args:
-        bodies: P of one design, each in its sizes.
-        stamps: (P,) [s].
-        poses: world_from_limb (P, L, 4, 4).
-        joint_names: J names of joints and sites.
-        joints: (P, J, 3) [m].
-
-    Returns:
-        The skeleton; its `bones` may be in the sizes of another body.
-    """
-    design = _design(bodies[0])
-    if design not in _known:
-        _known.clear()  # programs have one design
-        _known[design] = bones(bodies[0])
-    return _placed(_known[design], _plan(design, joint_names), stamps, poses, joints, bodies)
-
-
-_known: dict[_Design, tuple[Bone, ...]] = {}
-_Plan: TypeAlias = tuple[FloatArray, list[int], list[int], list[int]]
+    """The skeleton of F poses (F, L, 4, 4) with joints (F, J, 3) of a body, or of persons of one instant with a body each."""
+    rest, _ = bodies[0].core.at_rest()
+    places = np.array([body.core.at_rest()[1] for body in bodies])
+    turn = poses[:, :, :3, :3]
+    heads = (turn @ places[..., None])[..., 0] + poses[:, :, :3, 3]
+    limbs, sites = _sites(bodies[0].limb_joints, joint_names)
+    heads[:, limbs] = joints[:, sites]
+    return Skeleton(bodies[0], stamps, turn @ rest.transpose(0, 2, 1), heads)
 
 
 @lru_cache(maxsize=64)
-def _plan(design: _Design, joint_names: tuple[str, ...]) -> _Plan:
-    """limb_from_standing orientations at rest (L, 3, 3); limbs whose joint has a position of its own, and its number; limbs whose
-    joint has none."""
-    jointed = [(index, joint) for index, (above, joint, *_) in enumerate(design) if above is not None]
-    seen = [(index, joint_names.index(joint)) for index, joint in jointed if joint in joint_names]
-    other = [index for index, joint in jointed if joint not in joint_names]
-    return _at_rest(design).transpose(0, 2, 1), [index for index, _ in seen], [site for _, site in seen], other
-
-
-def _placed(
-    parts: tuple[Bone, ...],
-    plan: _Plan,
-    stamps: FloatArray,
-    poses: FloatArray,
-    joints: FloatArray,
-    bodies: Sequence[Body],
-) -> Skeleton:
-    back, seen, sites, other = plan
-    turn, heads = poses[:, :, :3, :3], poses[:, :, :3, 3].copy()
-    heads[:, seen] = joints[:, sites]
-    if other:
-        places = np.array([[body.parts[1][index][3][2][0] for index in other] for body in bodies])
-        heads[:, other] += (turn[:, other] @ places[..., None])[..., 0]
-    return Skeleton(parts, stamps, turn @ back, heads)
+def _sites(joints: tuple[str | None, ...], names: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Limbs whose joint to the parent has a position of its own, and the number of that."""
+    limbs = [index for index, joint in enumerate(joints) if joint in names]
+    return limbs, [names.index(joint) for joint in joints if joint in names]
 
 
 def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
@@ -206,7 +154,7 @@ def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
     such frame; where there is none at all the body stands at rest.
     """
     if not found.any():
-        still = Skeleton(posed.bones, posed.stamps, np.empty_like(posed.rotations), np.empty_like(posed.heads))
+        still = Skeleton(posed.body, posed.stamps, np.empty_like(posed.rotations), np.empty_like(posed.heads))
         still.rotations[:] = np.eye(3)
         still.heads[:] = np.array([bone.head for bone in posed.bones])
         return still

@@ -54,7 +54,7 @@ class FoxgloveSink(Output):
         people, rows = shown(step, self._root()), []
         if people is not None and len(people.present):
             names, parents, *_ = people.frames
-            limbs = tuple(bone.name for bone in people.posed.bones)
+            limbs = people.posed.body.limb_names
             shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
             rows = [
                 FoxgloveRow(

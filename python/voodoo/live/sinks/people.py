@@ -14,7 +14,8 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.export.human_frames import HumanFrames, human_frames
 from voodoo.export.joint_angles import joint_angles
-from voodoo.export.skeleton import FloatArray, Skeleton, skeleton_of_people
+from voodoo.export.ros2 import body_covariances
+from voodoo.export.skeleton import FloatArray, Skeleton, skeleton_of
 from voodoo.export.upright import SUFFIX, Turn, by_axes
 from voodoo.live.follow import Step
 from voodoo.model.body import Body
@@ -22,19 +23,9 @@ from voodoo.model.body import Body
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Persons P of a step who have a pose.
-
-    Args:
-        stamp: [s].
-        frame: frame of everything, with z up: the root frame, unless that is a camera's.
-        turn: how the root frame was turned.
-        numbers: P numbers.
-        estimates: P estimates, in the root frame.
-        bodies: P bodies.
-        joints: (P, J, 3) [m].
-        limb_poses: (P, L, 4, 4).
-        posed: with persons in the place of frames.
-    """
+    """Persons P of a step who have a pose: stamp [s]; frame with z up of everything, and how the root frame was turned to it;
+    numbers; estimates in the root frame; bodies; joints (P, J, 3) [m]; limb poses (P, L, 4, 4); and a skeleton that has persons
+    in the place of frames."""
 
     stamp: float
     frame: str
@@ -66,6 +57,14 @@ class Shown:
         """See joint_angles."""
         return joint_angles(self.posed)
 
+    @cached_property
+    def covariances(self) -> FloatArray:
+        """Covariances (P, 6, 6) of the poses of their frames "body"; NaN where unknown."""
+        root, unknown = self.posed.body.limb_names[0], np.full((6, 6), np.nan)
+        turned = np.kron(np.eye(2), self.turn.pose[:3, :3]) if self.turn.words else np.eye(6)
+        found = np.array([one.limb_covariance.get(root, unknown) for one in self.estimates])
+        return body_covariances(turned @ found @ turned.T, self.frames.places[:, 0] - self.limb_poses[:, 0, :3, 3])
+
 
 _made: WeakKeyDictionary[Step, dict[str, Shown | None]] = WeakKeyDictionary()
 _lock = Lock()
@@ -92,7 +91,7 @@ def _shown(step: Step, root_frame: str) -> Shown | None:
         joints, poses = joints @ turn.pose[:3, :3].T + turn.pose[:3, 3], turn.pose @ poses
     bodies = [step.bodies[number] for number in numbers]
     stamps = np.full(len(numbers), step.stamp)
-    posed = skeleton_of_people(bodies, stamps, poses, tuple(estimates[0].joint_names), joints)
+    posed = skeleton_of(bodies, stamps, poses, tuple(estimates[0].joint_names), joints)
     return Shown(step.stamp, frame, turn, numbers, estimates, bodies, joints, poses, posed)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,11 +19,10 @@ from voodoo.export.ros2 import (
     STRING,
     TF,
     TRACKED,
-    body_covariances,
     cdr,
     description,
+    instant,
     joint_message,
-    markers,
     person_id,
     pose_message,
     root_on_parent,
@@ -88,6 +86,7 @@ class Ros2Sink(Output):
         self._displayed: set[int] = set()
         self._bodies: dict[int, Body] = {}
         self._described: dict[int, float] = {}
+        self._templates: dict[str, tuple[object, Template]] = {}
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", TF, 100)
@@ -108,54 +107,76 @@ class Ros2Sink(Output):
         people = shown(step, self._root())
         observed = set() if people is None else {people.numbers[index] for index in people.present}
         if people is not None and observed:
-            self._write_people(step, people)
+            self._write_people(people)
         for number in self._displayed | observed:
             # They take as long as everything else together; those of persons who left are deleted once.
-            if self._publish_on(f"{BODIES}/{person_id(number)}/markers", _MARKERS, 10).subscribers:
+            topic = f"{BODIES}/{person_id(number)}/markers"
+            if self._publish_on(topic, _MARKERS, 10).subscribers:
                 estimate = step.estimates[number] if number in observed else nobody(step.stamp)
                 how: Any = {"root_frame": self._root(), "person": person_id(number), "turn": step.turn}
-                self._write(markers(estimate, step.bodies.get(number) or self._bodies[number], **how))
+                made = instant(estimate, step.bodies.get(number) or self._bodies[number], **how)
+                self._write({topic: made[topic]})
         self._displayed = observed
         self._bodies = {number: step.bodies[number] for number in observed}
         ids = tuple(map(person_id, sorted(observed)))
-        self._send(TRACKED, IDS, step.stamp, lambda: (_tracked(ids, self._root()), _NONE))
-
-    def _write_people(self, step: Step, people: Shown) -> None:
-        there, frame = people.present, people.frame
-        numbers = [people.numbers[index] for index in there]
-        ids = tuple(map(person_id, numbers))
-        names, parents, *_ = people.frames
-        above = () if frame == self._root() else (self._root(), frame, *root_on_parent(people.turn.pose))
         self._send(
-            *("/tf", TF, step.stamp),
-            lambda: (_transforms(ids, frame, above, names, parents), people.on_parents[there]),
+            *(TRACKED, IDS, step.stamp, (ids, self._root())),
+            lambda: _NONE,
+            lambda _: tracked(STAMP_S, ids, root_frame=self._root())[TRACKED],
         )
-        sure = _covariances(people)
+
+    def _write_people(self, people: Shown) -> None:
+        there, frame, (names, parents, *_) = people.present, people.frame, people.frames
+        ids = tuple(person_id(people.numbers[index]) for index in there)
+        above = () if frame == self._root() else ((self._root(), frame, root_on_parent(people.turn.pose)),)
+
+        def transforms(numbers: list[float]) -> Any:  # noqa: ANN401
+            placed = [row for person in ids for row in placed_names(names, parents, person, frame)]
+            rows = [(*row, numbers[7 * index : 7 * index + 7]) for index, row in enumerate(placed)]
+            return transforms_message(STAMP_NS, [*above, *rows])
+
+        self._send("/tf", TF, people.stamp, (ids, frame, repr(above)), lambda: people.on_parents[there], transforms)
         for index, person in zip(there.tolist(), ids, strict=True):
-
-            def joints(index: int = index, person: str = person) -> tuple[Template, FloatArray]:
-                names, angles = people.angles
-                return _joints(person, names), angles[index]
-
-            def pose(index: int = index, person: str = person) -> tuple[Template, FloatArray]:
-                return _pose(person, frame), np.concatenate([people.on_parents[index, 0], sure[index].ravel()])
-
-            self._send(f"{BODIES}/{person}/joint_states", JOINTS, step.stamp, joints)
-            if np.isfinite(sure[index]).all():
-                self._send(f"{BODIES}/{person}/pose", POSE, step.stamp, pose)
-        for number in numbers:  # last: it takes milliseconds
-            size = float(step.bodies[number].core.sizes()[:, 0].sum())
+            self._write_person(people, index, person)
+        for index, person in zip(there.tolist(), ids, strict=True):  # last: it takes milliseconds
+            number, body = people.numbers[index], people.bodies[index]
+            size = float(body.core.sizes()[:, 0].sum())
             if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
-                self._write(description(step.bodies[number], person_id(number)))
+                self._write(description(body, person))
                 self._described[number] = size
 
-    def _send(self, topic: str, kind: str, stamp: float, made: Callable[[], tuple[Template, FloatArray]]) -> None:
-        """Fill a template with numbers and publish it, if somebody subscribes."""
+    def _write_person(self, people: Shown, index: int, person: str) -> None:
+        topic, sure = f"{BODIES}/{person}", people.covariances[index]
+        self._send(
+            *(f"{topic}/joint_states", JOINTS, people.stamp, person),
+            lambda: people.angles[1][index],
+            lambda angles: joint_message(STAMP_NS, person, people.angles[0], angles),
+        )
+        if np.isfinite(sure).all():
+            self._send(
+                *(f"{topic}/pose", POSE, people.stamp, people.frame),
+                lambda: np.concatenate([people.on_parents[index, 0], sure.ravel()]),
+                lambda numbers: pose_message(STAMP_NS, people.frame, numbers[:7], numbers[7:]),
+            )
+
+    def _send(
+        self,
+        topic: str,
+        kind: str,
+        stamp: float,
+        key: object,
+        numbers: Callable[[], FloatArray],
+        message: Callable[[list[float]], Any],
+    ) -> None:
+        """Publish a message, which is made again when its key changes, with numbers at a time, if somebody subscribes."""
         publication = self._publish_on(topic, kind, 10)
         if publication.subscribers:
-            template, numbers = made()
-            at = struct.pack("<iI", *divmod(round(stamp * 1e9), 1_000_000_000))
-            publication.write(template.filled(numbers.ravel(), at))
+            values = numbers().ravel()
+            key = key, len(values)
+            if self._templates.get(topic, (None,))[0] != key:
+                made = Template(lambda found: cdr(message(found)), len(values), kind="<f8", stamp=_stamp(STAMP_NS))
+                self._templates[topic] = key, made
+            publication.write(self._templates[topic][1].filled(values, _stamp(round(stamp * 1e9))))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
@@ -170,48 +191,6 @@ class Ros2Sink(Output):
             self._publish_on(topic, kind, depth).write(bytes(STORE.serialize_cdr(message, kind)))
 
 
-_STAMP = struct.pack("<iI", *divmod(STAMP_NS, 1_000_000_000))
-
-
-@lru_cache(maxsize=16)
-def _transforms(
-    people: tuple[str, ...], root: str, above: tuple[Any, ...], names: tuple[str, ...], parents: tuple[int, ...]
-) -> Template:
-    placed = [row for person in people for row in placed_names(names, parents, person, root)]
-
-    def encode(numbers: list[float]) -> bytes:
-        rows = [(*both, numbers[7 * index : 7 * index + 7]) for index, both in enumerate(placed)]
-        return cdr(transforms_message(STAMP_NS, [*([(*above[:2], above[2:])] if above else []), *rows]))
-
-    return Template(encode, 7 * len(placed), kind="<f8", stamp=_STAMP)
-
-
-@lru_cache(maxsize=64)
-def _joints(person: str, joints: tuple[str, ...]) -> Template:
-    return Template(
-        lambda angles: cdr(joint_message(STAMP_NS, person, joints, angles)), len(joints), kind="<f8", stamp=_STAMP
-    )
-
-
-@lru_cache(maxsize=64)
-def _pose(person: str, root: str) -> Template:
-    def encode(numbers: list[float]) -> bytes:
-        return cdr(pose_message(STAMP_NS, root, numbers[:7], numbers[7:]))
-
-    return Template(encode, 7 + 36, kind="<f8", stamp=_STAMP)
-
-
-@lru_cache(maxsize=16)
-def _tracked(people: tuple[str, ...], root: str) -> Template:
-    message = cdr(tracked(STAMP_S, people, root_frame=root)[TRACKED])
-    return Template(lambda _: message, 0, kind="<f8", stamp=_STAMP)
-
-
-def _covariances(people: Shown) -> FloatArray:
-    """Covariances (P, 6, 6) of the poses of "body"."""
-    root, unknown = people.posed.bones[0].name, np.full((6, 6), np.nan)
-    found = np.array([one.limb_covariance.get(root, unknown) for one in people.estimates])
-    if people.turn.words:
-        turned = np.kron(np.eye(2), people.turn.pose[:3, :3])
-        found = turned @ found @ turned.T
-    return body_covariances(found, people.frames.places[:, 0] - people.limb_poses[:, 0, :3, 3])
+def _stamp(nanoseconds: int) -> bytes:
+    """A stamp in CDR."""
+    return struct.pack("<iI", *divmod(nanoseconds, 1_000_000_000))

@@ -9,8 +9,8 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 from contextlib import suppress
-from functools import lru_cache, partial
-from itertools import pairwise
+from functools import lru_cache
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -31,8 +31,8 @@ _TURN = np.pi / 2.0
 """At rest our arms hang; those of a VRM avatar point to the sides, a quarter turn about the forward axis."""
 _ARM = ("upperarm", "forearm", "hand")
 _NEEDED = ("Hips", "Head", *(f"{side}Upper{limb}" for side in ("Left", "Right") for limb in ("Arm", "Leg")))
-_TOGETHER, _HEAD = 15, 3
-"""Messages a datagram, which fits into one packet of Ethernet; those before the bones."""
+_TOGETHER = 15
+"""Messages a datagram: it fits into one packet of Ethernet."""
 
 
 class VmcSink(Output):
@@ -68,7 +68,7 @@ class VmcSink(Output):
         except OSError as error:
             raise VoodooError(f"{address}: expected the name or address of a host, found: {error.strerror}") from error
         self._start: float | None = None
-        self._datagrams: dict[tuple[str, ...], list[tuple[slice, Template]]] = {}
+        self._templates: dict[tuple[str, ...], tuple[Template, list[int]]] = {}
 
     def publish(self, step: Step) -> None:
         """See Output.
@@ -83,32 +83,25 @@ class VmcSink(Output):
         if people is not None and len(people.present):
             first = min(people.present.tolist(), key=lambda index: people.numbers[index])
             names, numbers = bones_of(people.posed, first, self.name)
-        if names not in self._datagrams:
-            self._datagrams = {names: self._templates(names)}
-        numbers = np.concatenate([[step.stamp - self._start], numbers.ravel()])
-        for part, datagram in self._datagrams[names]:
-            self._send(datagram.filled(numbers[part]))
+        if names not in self._templates:
+            lengths = map(len, self._datagrams(names, [0.0] * (1 + numbers.size)))
+            whole = Template(lambda given: b"".join(self._datagrams(names, given)), 1 + numbers.size, kind=">f4")
+            self._templates = {names: (whole, [0, *accumulate(lengths)])}
+        template, ends = self._templates[names]
+        sent = template.filled(np.concatenate([[step.stamp - self._start], numbers.ravel()]))
+        for first, end in pairwise(ends):
+            self._send(sent[first:end])
 
-    def _templates(self, names: tuple[str, ...]) -> list[tuple[slice, Template]]:
-        """Datagrams of these bones, and which of the numbers (time, then seven of each bone) they hold."""
-        ends = [
-            0,
-            *(1 + 7 * min(count, len(names)) for count in range(_TOGETHER - _HEAD, len(names) + _TOGETHER, _TOGETHER)),
-        ]
-        return [
-            (slice(*pair), Template(partial(self._encoded, names, pair[0]), pair[1] - pair[0], kind=">f4"))
-            for pair in pairwise(ends)
-        ]
+    def _datagrams(self, names: tuple[str, ...], numbers: list[float]) -> list[bytes]:
+        """Messages of the time and of bones, whose seven numbers each follow it."""
+        messages: list[tuple[str | float, ...]] = [("/OK", int(bool(names))), ("/T", numbers[0])]
+        messages += [("/Root/Pos", "root", *(0.0,) * 6, 1.0)] if names else []
+        messages += [("/Bone/Pos", name, *numbers[7 * at + 1 : 7 * at + 8]) for at, name in enumerate(names)]
+        return [self._bundle(messages[first : first + _TOGETHER]) for first in range(0, len(messages), _TOGETHER)]
 
-    def _encoded(self, names: tuple[str, ...], first: int, numbers: list[float]) -> bytes:
-        bundle, rows = self._bundle_of(0), list[tuple[str | float, ...]]()
-        if not first:
-            rows = [("/OK", int(bool(names))), ("/T", numbers[0])]
-            rows += [("/Root/Pos", "root", *(0.0,) * 6, 1.0)] if names else []
-            first, numbers = 1, numbers[1:]
-        bones = names[first // 7 :][: len(numbers) // 7]
-        rows += [("/Bone/Pos", bone, *numbers[7 * index : 7 * index + 7]) for index, bone in enumerate(bones)]
-        for path, *values in rows:
+    def _bundle(self, messages: list[tuple[str | float, ...]]) -> bytes:
+        bundle = self._bundle_of(0)
+        for path, *values in messages:
             message = self._message_of(f"/VMC/Ext{path}")
             for value in values:
                 message.add_arg(value)
@@ -137,7 +130,7 @@ def bones_of(posed: Skeleton, index: int, address: str) -> tuple[tuple[str, ...]
     Raises:
         VoodooError: the body lacks bones without which an avatar does not move.
     """
-    chosen, names, parents, arms = _avatar(tuple((bone.name, bone.parent) for bone in posed.bones), address)
+    chosen, names, parents, arms = _avatar(posed.limbs, address)
     turns, heads = posed.rotations[index] @ arms, posed.heads[index]
     # The root is on the origin of the world.
     turns, heads = np.concatenate([turns, np.eye(3)[None]]), np.concatenate([heads, np.zeros((1, 3))])

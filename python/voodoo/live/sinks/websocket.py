@@ -135,7 +135,7 @@ def message_of(step: Step, root_frame: str) -> str:
     people = shown(step, root_frame)
     if people is None:
         return _format(upright_frame(step, root_frame), (), (), ()) % repr(step.stamp)
-    limbs = tuple((bone.name, bone.parent) for bone in people.posed.bones)
+    limbs = people.posed.limbs
     # Whole numbers of 10 um and of 1e-6 are written several times as fast as others.
     bones = np.concatenate([1e5 * people.posed.heads, 1e6 * quaternions(people.posed.rotations)], axis=2)
     rows = np.concatenate([1e5 * people.joints.reshape(len(bones), -1), bones.reshape(len(bones), -1)], axis=1)
