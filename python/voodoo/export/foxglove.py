@@ -163,9 +163,10 @@ def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray
     low = a0 / a + b0 / b  # of the mean of both ends
     sizes = np.array([a, b, length, low, 2.0 - low]).transpose(1, 2, 0)
     middles = limb_poses[..., :3, 3] + limb_poses[..., :3, 2] * length[..., None] / 2.0
-    count = len(limb_poses)
-    rows = [middles, quaternions(limb_poses[..., :3, :3]), np.broadcast_to(sizes, (count, *sizes.shape[1:]))]
-    return np.concatenate([np.concatenate(rows, axis=2).reshape(count, -1), joints.reshape(count, -1)], axis=1)
+    count, limbs = limb_poses.shape[:2]
+    rows = [middles, quaternions(limb_poses[..., :3, :3]), np.broadcast_to(sizes, (count, limbs, 5))]
+    cylinders = np.concatenate(rows, axis=2).reshape(count, 12 * limbs)
+    return np.concatenate([cylinders, joints.reshape(count, 3 * joints.shape[1])], axis=1)
 
 
 def _timestamp(seconds: int, nanoseconds: int) -> bytes:
