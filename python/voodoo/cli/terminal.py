@@ -29,7 +29,7 @@ class Escaped:
 
     def __init__(self, stream: Any) -> None:  # noqa: ANN401 - any object like a text file
         """Write nothing yet."""
-        self.stream = stream.stream if isinstance(stream, Escaped) else stream
+        self.stream: Any = stream.stream if isinstance(stream, Escaped) else stream
 
     def write(self, text: str) -> int:
         """Write a text."""

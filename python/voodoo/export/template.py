@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-STAMP_S, STAMP_NS = 1_234_567_890.5, 1_234_567_890_500_000_000
-"""Time in a message that becomes a template; exact in double precision."""
+STAMP_NS = 1_234_567_890_500_000_000
+"""Time in a message that becomes a template."""
 _FIRST = 1_000_000.0
 """Numbers in such a message count up from here: exact in single precision, and found in its bytes."""
 

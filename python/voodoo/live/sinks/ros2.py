@@ -29,7 +29,7 @@ from voodoo.export.ros2 import (
     tracked,
     transforms_message,
 )
-from voodoo.export.template import STAMP_NS, STAMP_S, Template
+from voodoo.export.template import STAMP_NS, Template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
@@ -41,7 +41,6 @@ from voodoo.pipeline.search import nobody
 ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
-_NONE: FloatArray = np.empty(0)
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -118,12 +117,8 @@ class Ros2Sink(Output):
                 self._write({topic: made[topic]})
         self._displayed = observed
         self._bodies = {number: step.bodies[number] for number in observed}
-        ids = tuple(map(person_id, sorted(observed)))
-        self._send(
-            *(TRACKED, IDS, step.stamp, (ids, self._root())),
-            lambda: _NONE,
-            lambda _: tracked(STAMP_S, ids, root_frame=self._root())[TRACKED],
-        )
+        ids = [person_id(number) for number in sorted(observed)]
+        self._write(tracked(step.stamp, ids, root_frame=self._root()))
 
     def _write_people(self, people: Shown) -> None:
         there, frame, (names, parents, *_) = people.present, people.frame, people.frames
