@@ -1,9 +1,10 @@
-"""What live sinks cost: time of a frame of four people with all of them, and how late poses are beside receivers that hang.
+"""What live sinks cost: processor time of a frame of four people with each and all, and how late poses are beside receivers that
+hang.
 
     python benches/sinks.py [--seconds 4] [--rounds 3]
 
-On one core; receivers are processes of the last one. Sessions with and without sinks take turns. A sink whose library is
-missing is named.
+On one core; receivers are processes of the last one, and take everything but the markers of ROS 2. Sessions with and without
+sinks take turns. A sink whose library is missing is named.
 """
 
 from __future__ import annotations
@@ -30,6 +31,17 @@ from voodoo.synthetic.people import MadeUpRecording, Scene, Walker
 from voodoo.synthetic.stories import base_from_camera
 
 OSC = "import socket as s; p = s.socket(type=s.SOCK_DGRAM); p.bind(('127.0.0.1', 39540))\nwhile p.recv(65536): pass"
+ROS = """
+from voodoo.live.ros2.dds import Node
+node, heard = Node(), {}
+while True:
+    for topic, offer in node.offers().items():
+        if topic not in heard and not topic.endswith("markers"):
+            heard[topic] = node.subscribe(topic, offer)
+    node.wait(0.2)
+    for one in heard.values():
+        one.take()
+"""
 CLIENT = """
 import json, sys, websockets.sync.client as c
 with c.connect(sys.argv[1], subprotocols=["foxglove.sdk.v1"] if sys.argv[2:] else None, max_size=None) as client:
@@ -78,37 +90,49 @@ def session(recording: MadeUpRecording, outputs: Sequence[Output], told: list[st
 
 
 def cost(recording: MadeUpRecording, rounds: int) -> None:
-    """Print the time of a frame with and without sinks."""
+    """Print the time of a frame without sinks, with each, and with all."""
     last = {(os.cpu_count() or 1) - 1}
-    receivers = [subprocess.Popen([sys.executable, "-c", OSC], preexec_fn=lambda: os.sched_setaffinity(0, last))]
-    outputs = []
+    os.environ |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "94"}
+    receivers: list[subprocess.Popen[bytes]] = []
+
+    def receive(code: str, *words: str) -> None:
+        command = [sys.executable, "-c", code, *words]
+        receivers.append(subprocess.Popen(command, preexec_fn=lambda: os.sched_setaffinity(0, last)))
+
+    outputs: dict[str, list[Output]] = {"without": []}
     for address in ("ros2://", "vmc://127.0.0.1:39540", "ws://:0", "foxglove://:0"):
         try:
-            outputs.append(sink_of(address, root_frame=lambda: "base_link", on_message=lambda words: None))
+            sink = sink_of(address, root_frame=lambda: "base_link", on_message=lambda words: None)
         except VoodooError as error:
             print(f"without {address}: {error}")
-        if outputs and outputs[-1].name == address and hasattr(outputs[-1], "port"):
-            words = [f"ws://127.0.0.1:{outputs[-1].port}", *["foxglove"] * address.startswith("fox")]
-            command = [sys.executable, "-c", CLIENT, *words]
-            receivers.append(subprocess.Popen(command, preexec_fn=lambda: os.sched_setaffinity(0, last)))
+            continue
+        outputs[address] = [sink]
+        if hasattr(sink, "port"):
+            receive(CLIENT, f"ws://127.0.0.1:{sink.port}", *["foxglove"] * address.startswith("fox"))
+        else:
+            receive(ROS if address == "ros2://" else OSC)
+    outputs["all"] = [sink for one in outputs.values() for sink in one]
     time.sleep(2.0)
     os.sched_setaffinity(0, {0})
-    tracked: dict[bool, list[float]] = {True: [], False: []}
-    used: dict[bool, list[float]] = {True: [], False: []}
-    for number in range(2 * rounds):
-        on, steps = number % 2 == 0, list[Step]()
-        began = time.process_time()
-        beside = [Watched(one.name, one.publish, prompt=one.prompt) for one in outputs if on]
-        report = session(recording, [Watched("steps", steps.append), *beside], []).report()
-        used[on].append((time.process_time() - began) / len(steps))
-        tracked[on] += [step.seconds for step in steps[len(steps) // 3 :]]  # everybody is found
-        if on:
+    tracked: dict[str, list[float]] = {name: [] for name in outputs}
+    used: dict[str, list[float]] = {name: [] for name in outputs}
+    for name in [*outputs] * rounds:
+        steps, at = list[Step](), list[float]()
+        taken = Watched("steps", lambda step, steps=steps, at=at: (steps.append(step), at.append(time.process_time())))
+        beside = [Watched(one.name, one.publish, prompt=one.prompt) for one in outputs[name]]
+        report = session(recording, [taken, *beside], []).report()
+        first = len(steps) // 3  # everybody is found
+        used[name].append(1e3 * (at[-1] - at[first]) / (len(steps) - first - 1))
+        tracked[name] += [1e3 * step.seconds for step in steps[first:]]
+        if name == "all":
             print(f"{len(steps[-1].estimates)} people; poses missed: {report['late_outputs']}")
-    # A quarter of the frames had the core for themselves, whatever else the machine does.
-    without, with_ = (1e3 * float(np.percentile(tracked[on], 25)) for on in (False, True))
-    less, more = (1e3 * float(np.median(used[on])) for on in (False, True))
-    print(f"tracking a frame: {without:.2f} ms without, {with_:.2f} ms with all: {100 * (with_ / without - 1):+.1f} %")
-    print(f"processor time of a frame, all threads: {less:.2f} ms without, {more:.2f} ms with all")
+    for name, times in used.items():
+        # A quarter of the frames had the core for themselves, whatever else the machine does.
+        track, least = np.percentile(tracked[name], 25), min(times)
+        more = 100.0 * (np.median(np.array(times) / used["without"]) - 1.0)
+        print(
+            f"{name}: tracking {track:.2f} ms a frame; processor, all threads, {least:.2f} ms, {more:+.1f} % in turns"
+        )
     for receiver in receivers:
         receiver.kill()
 
@@ -144,6 +168,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=4.0)
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
+    sys.setswitchinterval(5e-4)  # as `voodoo live` does
     recording = four_people(arguments.seconds)
     lateness(recording, arguments.rounds)
     cost(recording, arguments.rounds)

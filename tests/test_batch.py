@@ -10,7 +10,9 @@ import os
 import sys
 import time
 from dataclasses import replace
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -268,6 +270,17 @@ def test_a_recording_that_takes_too_long_has_failed(job, monkeypatch):
         do(replace(job, limit_s=0.1))
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
+
+
+@pytest.mark.parametrize("missing", ["cryptography", "distributed", "fsspec", "pyarrow"])
+def test_a_missing_package_is_named_before_anything_is_written(tmp_path, monkeypatch, missing):
+    for name in ("cryptography", "distributed", "fsspec", "pyarrow"):
+        monkeypatch.setitem(sys.modules, name, None if name == missing else ModuleType(name))
+        if name != missing:
+            monkeypatch.setattr(sys.modules[name], "__spec__", ModuleSpec(name, None))
+    done = CliRunner().invoke(app, ["batch", str(sample_path()), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1 and not list(tmp_path.iterdir())
+    assert f"found no {missing}; pip install 'voodoo-tracker[batch]'" in done.stderr
 
 
 def test_what_is_missing_is_reported_before_the_work(tmp_path, monkeypatch):

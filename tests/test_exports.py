@@ -18,7 +18,7 @@ from measurement_data import data_folder
 from voodoo.errors import BodyError, VoodooError
 from voodoo.export import write_bag, write_bvh, write_trc
 from voodoo.export.files import check_target, save
-from voodoo.export.human_frames import frame_poses
+from voodoo.export.human_frames import human_frames
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
@@ -489,10 +489,10 @@ def test_all_formats_report_the_same_joints(tmp_path, recorded):
         "r_ankle": "r_ankle",
         "l_shoulder": "l_shoulder",
     }
-    frames = [frame_poses(track, skeleton(track, body), index, "voodoo") for index in (0, 45, 89)]
-    for row, found in zip((0, 45, 89), frames, strict=True):
+    frames = human_frames(track.joint_names, track.joints, skeleton(track, body))
+    for row in (0, 45, 89):
         for frame, joint in names.items():
-            place = found[f"{frame}_voodoo"][1][:3, 3]
+            place = frames.places[row, frames.names.index(frame)]
             assert np.abs(place - track.joints[row, track.joint_names.index(joint)]).max() < 1e-9, frame
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,6 +87,19 @@ def test_a_file_read_by_mcap_has_the_pose(tmp_path):
         assert cylinder.size.x * cylinder.bottom_scale / 2 == pytest.approx(limb.shape.a0, rel=0.2)
     spheres = [(one.pose.position.x, one.pose.position.y, one.pose.position.z) for one in entity.spheres]
     np.testing.assert_allclose(spheres, track.joints[found[0]], atol=1e-6)
+
+
+@needs_foxglove
+def test_a_file_of_nobody_has_empty_scenes(tmp_path):
+    body = voodoo.Body.human()
+    track = track_of(body)
+    nothing = {name: np.full_like(getattr(track, name), np.nan) for name in ("joints", "world_from_limb", "residual")}
+    nobody = replace(track, status=("searching",) * len(track), limb_status={}, **nothing)
+    save(nobody, tmp_path / "pose.foxglove.mcap", body=body, root_frame="odom")
+    topics = decoded(tmp_path / "pose.foxglove.mcap")
+    assert set(topics) == {"/people"} and [len(message.entities) for _, message in topics["/people"]] == [0] * len(
+        track
+    )
 
 
 @needs_foxglove

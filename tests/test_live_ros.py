@@ -9,7 +9,7 @@ import pytest
 
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
-from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr
+from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, instant
 from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
@@ -282,6 +282,40 @@ def test_what_is_published_has_the_stamps_of_the_data():
     node.unheard.add(f"{body}/markers")
     unheard = publish(step.estimate.stamp + 0.3, step.estimate)
     assert set(sent) - set(unheard) == {f"{body}/markers", "/human_description_p1"}, "made for nobody"
+
+
+@pytest.mark.parametrize("root", ["odom", "camera_depth_optical_frame"])
+def test_several_people_are_published_as_a_bag_has_them(root):
+    """The numbers that are filled in are those of messages that are made one by one."""
+    node = FakeNode()
+    output = Ros2Sink(root_frame=lambda: root, node=node)
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    steps = [step for step, _ in zip(track(recording, tracker), range(12), strict=False)]
+    people, body = {1: steps[3].estimate, 4: steps[11].estimate}, tracker.body
+    bodies = {1: body, 4: body.scaled(1.1)}
+    for stamp in (7.25, 8.5):  # the same persons again
+        output.publish(Step(LiveFrame(stamp, (), 0, 0.0, 0.0, False), people, bodies, 0.0))
+        sent = node.take()
+        (transforms,) = sent["/tf"]
+        assert sent[TRACKED][0].ids == ["p1", "p4"] and sent[TRACKED][0].header.stamp.nanosec == (stamp % 1) * 1e9
+        expected = []
+        for number, estimate in people.items():
+            made = instant(estimate, bodies[number], root_frame=root, person=f"p{number}")
+            joints, pose = (f"/humans/bodies/p{number}/{name}" for name in ("joint_states", "pose"))
+            assert sent[joints][0].name == made[joints].name
+            np.testing.assert_allclose(sent[joints][0].position, made[joints].position, atol=1e-12)
+            np.testing.assert_allclose(sent[pose][0].pose.covariance, made[pose].pose.covariance, rtol=1e-9, atol=1e-15)
+            assert sent[pose][0].header.frame_id == made[pose].header.frame_id
+            expected += [
+                one for one in made["/tf"].transforms if one.child_frame_id not in {e.child_frame_id for e in expected}
+            ]
+        for found, one in zip(transforms.transforms, expected, strict=True):
+            assert (found.child_frame_id, found.header.frame_id) == (one.child_frame_id, one.header.frame_id)
+            assert (found.header.stamp.sec, found.header.stamp.nanosec) == (int(stamp), (stamp % 1) * 1e9)
+            for part, axes in (("translation", "xyz"), ("rotation", "xyzw")):
+                here, there = ([getattr(getattr(each.transform, part), axis) for axis in axes] for each in (found, one))
+                np.testing.assert_allclose(here, there, atol=1e-12)
 
 
 def test_a_whole_recording_goes_through_the_bus():

@@ -1,10 +1,13 @@
 """Live poses to receivers of others on this machine: VMC by python-osc's server, JSON by clients of websockets."""
 
+import importlib.util
 import json
 import re
 import socket
 import threading
 import time
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -39,6 +42,10 @@ def step_of(track, body, index=0, *, number=1, status="tracking", stamp=None):
         stamp=stamp,
         status=status,
         residual=float("nan") if status == "lost" else 0.01,
+        joint_names=track.joint_names,
+        joint_positions=track.joints[index],
+        limb_names=track.limb_names,
+        limb_poses=track.world_from_limb[index],
         joints=dict(zip(track.joint_names, track.joints[index], strict=True)),
         world_from_limb=dict(zip(track.limb_names, track.world_from_limb[index], strict=True)),
         limb_status=dict.fromkeys(track.limb_names, "measured"),
@@ -137,7 +144,7 @@ class Paced:
         self.session = Session(self.live, lambda frame: self, outputs=outputs)
 
     def step(self, frame):  # as of a Follower
-        return step_of(self.track, self.body, stamp=frame.stamp)
+        return replace(step_of(self.track, self.body, stamp=frame.stamp), frame=frame)
 
     def send(self, count, every=0.01):
         """Hand frames over; those the session tracked."""
@@ -220,6 +227,76 @@ def test_receivers_that_hang_die_and_return_hold_nobody_and_are_named_once(monke
     assert time.monotonic() - began < 1.0 and good.closed and dies.closed and prompt.closed
     assert rig.messages[6:] == ["hangs: did not take the last pose"]
     hangs.free.set()
+
+
+class Timed(Output):
+    """Notes how late poses are."""
+
+    name, prompt = "timed", True
+
+    def __init__(self):
+        self.late = {}
+
+    def publish(self, step):
+        self.late[step.stamp] = time.time() - step.frame.taken
+
+
+class Lent(Output):
+    """A sink that stays open after a session."""
+
+    receiver = True
+
+    def __init__(self, sink):
+        self.name, self.sink = sink.name, sink
+
+    def publish(self, step):
+        self.sink.publish(step)
+
+
+def test_no_pose_is_late_beside_programs_that_hang_and_hosts_that_are_dead():
+    """Of each frame the earliest of some rounds, because the machine has other work as well."""
+    body, messages = voodoo.Body.human(), []
+    track = track_of(body)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as place:
+        place.bind(("127.0.0.1", 0))
+        dead = f"vmc://127.0.0.1:{place.getsockname()[1]}"
+    servers = [opened("ws://:0", messages)]
+    if importlib.util.find_spec("foxglove"):
+        servers.append(opened("foxglove://:0", messages))
+    with ExitStack() as clients:
+        for server in servers:
+            small = socket.create_connection(("127.0.0.1", server.port))
+            small.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            protocols = ["foxglove.sdk.v1"] if server.name.startswith("foxglove") else None
+            how = {"sock": small, "subprotocols": protocols, "max_queue": 1, "max_size": None}
+            client = clients.enter_context(websockets.connect("ws://127.0.0.1", **how))
+            clients.callback(small.shutdown, socket.SHUT_RDWR)
+            told = {"channels": ()}
+            while protocols and not told.get("channels"):
+                text = client.recv(timeout=5)
+                told = json.loads(text) if isinstance(text, str) else {}
+            wanted = [{"id": one["id"], "channelId": one["id"]} for one in told["channels"]]
+            client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+            until(lambda server=server: getattr(getattr(server, "_channels", server), "are_wanted", True))
+        until(lambda: servers[0]._server.connections)
+        for number in range(200):  # nothing more goes through
+            for server in servers:
+                server.publish(step_of(track, body, stamp=float(number)))
+        until(lambda: servers[0]._late)
+        rounds = []
+        for _ in range(5):
+            timed = Timed()
+            rig = Paced([timed, *map(Lent, (opened(dead), *servers))], body)
+            rig.send(20)
+            rig.finish()
+            rounds.append(timed.late)
+            assert [words for words in rig.messages if not words.startswith("timed")] == [
+                f"{dead}: nobody receives: Connection refused"
+            ]
+    worst = max(min(late.get(stamp, np.inf) for late in rounds) for stamp in rounds[0])
+    assert worst < 0.005, f"{1e3 * worst:.1f} ms"
+    for server in servers:
+        server.close()
 
 
 def test_what_is_no_receiver_ends_the_session_with_its_error():

@@ -1,5 +1,6 @@
 """Names and texts of files never reach a terminal as commands."""
 
+import io
 import subprocess
 import sys
 
@@ -8,7 +9,7 @@ import pytest
 
 from bag_writer import Messages, write_bag
 from commands import run
-from voodoo.cli.terminal import escaped
+from voodoo.cli.terminal import Escaped, escaped
 
 M = Messages()
 COMMAND = "\x1b]0;title\x07\x1b[2J\r\x9b31m\u202e"
@@ -51,3 +52,8 @@ def test_names_of_files_are_escaped(tmp_path):
 def test_ordinary_letters_stay():
     text = "Größe 体 🙂 \\ 'x'\n\t1\u00a0m"
     assert escaped(text) == text and escaped(text[:3]) == "Grö"
+
+
+def test_a_stream_is_wrapped_once():
+    stream = io.StringIO()
+    assert Escaped(Escaped(stream)).stream is stream, "where a progress bar writes its own commands"

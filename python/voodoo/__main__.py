@@ -1,5 +1,6 @@
 """`python -m voodoo` is the command `voodoo`."""
 
+import os
 import sys
 
 
@@ -8,7 +9,10 @@ def main() -> None:
     if sys.argv[1:] == ["--version"]:
         from voodoo._core import __version__
 
-        sys.stdout.write(f"voodoo {__version__}\n")
+        try:
+            print(f"voodoo {__version__}", flush=True)
+        except BrokenPipeError:
+            os._exit(141)  # as `voodoo.cli.terminal`, which takes long to import
         return
     from voodoo.cli import main as command
 

@@ -34,10 +34,12 @@ __all__ = [
     "body_view",
     "carried",
     "config_fields",
+    "euler_angles",
     "expected_sites",
     "linear_sum_assignment",
     "nearest_surface",
     "person_candidates",
+    "quaternions",
     "render_depth",
 ]
 
@@ -345,6 +347,16 @@ class SiteRay:
     def trusted(self, trust: float) -> SiteRay:
         """Returns the ray with another trust."""
 
+def quaternions(rotations: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], bool]:
+    """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3), whose largest entry is positive; and whether one of
+    the matrices is only approximately a rotation."""
+
+def euler_angles(quaternions: npt.NDArray[np.float64], order: tuple[int, int, int]) -> npt.NDArray[np.float64]:
+    """Angles (..., 3) [rad] about moving axes, in their order (0, 1, 2: x, y, z), of unit quaternions (..., 4).
+
+    If the first and third axes are parallel, only their sum is determined; the third angle is then zero.
+    """
+
 def carried(
     points: _Points,
     tracker: Tracker | tuple[People, int],
@@ -446,6 +458,10 @@ class Body:
     def human(stature: float, model: str) -> Body: ...
     def scaled(self, factor: float) -> Body: ...
     def parts(self) -> tuple[str, list[Any], list[Any]]: ...
+    def sizes(self) -> npt.NDArray[np.float64]:
+        """Of each limb (L, 5) length, a0, b0, a1 and b1 of its shape [m]."""
+    def at_rest(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Orientations standing_from_limb (L, 3, 3), and where each limb is joined to its parent, in its own frame (L, 3) [m]."""
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
 

@@ -1,10 +1,12 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
+use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::math::{Pose, Quat, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{HumanModel, Joint, Limb, Site};
 
+use crate::arrays::frozen;
 use crate::errors::{IntoPy, exception};
 use crate::shape::PyShape;
 
@@ -17,6 +19,7 @@ pub(crate) enum Rotation {
     Quaternion([f64; 4]),
 }
 
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 /// Position and rotation of a joint's ellipse.
 type JointFrame = ([f64; 3], Rotation);
 /// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion
@@ -125,6 +128,31 @@ impl PyBody {
     /// The parts that `new` takes, rotations as vectors.
     fn parts(&self) -> (String, Vec<LimbParts>, Vec<SiteParts>) {
         self.parts_with(readable)
+    }
+
+    #[doc = stub!("Body.sizes")]
+    fn sizes<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let limbs = self.0.limbs();
+        let sizes = |limb: &Limb| {
+            let shape = &limb.shape;
+            [shape.length(), shape.a0(), shape.b0(), shape.a1(), shape.b1()]
+        };
+        frozen(py, limbs.iter().flat_map(sizes).collect(), &[limbs.len(), 5])
+    }
+
+    #[doc = stub!("Body.at_rest")]
+    fn at_rest<'py>(&self, py: Python<'py>) -> PyResult<(Array<'py>, Array<'py>)> {
+        let mut turns: Vec<Quat> = Vec::new();
+        for limb in self.0.limbs() {
+            turns.push(limb.parent.as_ref().map_or(Quat::IDENTITY, |(parent, joint)| {
+                turns[*parent] * joint.parent_from_joint.rotation * joint.limb_from_joint.rotation.inverse()
+            }));
+        }
+        let place =
+            |limb: &Limb| limb.parent.as_ref().map_or(Vec3::ZERO, |(_, joint)| joint.limb_from_joint.translation);
+        let turned = turns.iter().flat_map(|turn| Mat3::from_quat(*turn).transpose().to_cols_array()).collect();
+        let places = self.0.limbs().iter().flat_map(|limb| place(limb).to_array()).collect();
+        Ok((frozen(py, turned, &[turns.len(), 3, 3])?, frozen(py, places, &[turns.len(), 3])?))
     }
 
     /// For pickle and copy.

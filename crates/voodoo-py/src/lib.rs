@@ -27,6 +27,7 @@ mod keypoints;
 mod people;
 mod registration;
 mod render;
+mod rotations;
 mod shape;
 mod sites;
 mod skin;
@@ -63,6 +64,8 @@ mod _core {
     use super::registration::nearest_surface;
     #[pymodule_export]
     use super::render::render_depth;
+    #[pymodule_export]
+    use super::rotations::{euler_angles, quaternions};
     #[pymodule_export]
     use super::shape::{PyClosestPoints, PyShape};
     #[pymodule_export]

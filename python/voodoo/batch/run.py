@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from voodoo.batch.storage import Store, named
@@ -141,7 +142,9 @@ def run(
     Raises:
         VoodooError: Dask is not installed, the scheduler does not answer, or it has no worker.
     """
-    distributed = installed("distributed", "many recordings are run by Dask: pip install 'voodoo-tracker[batch]'")
+    check_installed()
+    import distributed
+
     with _client(distributed, workers, scheduler) as client:
         threads = sum(client.nthreads().values()) or workers
         waiting = iter(jobs)
@@ -195,7 +198,8 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
             scratch = stack.enter_context(
                 tempfile.TemporaryDirectory(prefix="voodoo-dask-", ignore_cleanup_errors=True)
             )
-            keys = _own_keys(distributed)
+            # Other users of this machine could run code on its workers otherwise.
+            keys = distributed.Security.temporary()
             with reading("batch", f"{workers} processes that start", error=VoodooError):
                 place: Any = stack.enter_context(
                     distributed.LocalCluster(
@@ -222,11 +226,15 @@ def _client(distributed: Any, workers: int, scheduler: str | None) -> Iterator[A
         yield client
 
 
-def _own_keys(distributed: Any) -> Any:  # noqa: ANN401 - Dask has no types
-    """Keys that only the processes of this batch know: other users of this machine could run code on its workers otherwise."""
-    try:
-        return distributed.Security.temporary()
-    except ImportError:
+def check_installed() -> None:
+    """Raise an error if packages of the extra are missing, before anything is written.
+
+    Raises:
+        VoodooError: names them.
+    """
+    missing = [name for name in ("cryptography", "distributed", "fsspec", "pyarrow") if find_spec(name) is None]
+    if missing:
         raise VoodooError(
-            "the processes of a batch need the package cryptography: pip install 'voodoo-tracker[batch]'"
-        ) from None
+            f"many recordings: expected Dask and what its extra brings, found no {', '.join(missing)}; "
+            "pip install 'voodoo-tracker[batch]'"
+        )

@@ -39,6 +39,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # file names may contain any bytes
             stream.reconfigure(errors="backslashreplace")
+    sys.stdout, sys.stderr = Escaped(sys.stdout), Escaped(sys.stderr)  # also for the help
     app()
 
 

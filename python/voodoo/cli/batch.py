@@ -84,7 +84,7 @@ def batch_command(
     voodoo batch s3://lab/walks/ --out s3://lab/results --scheduler tcp://10.0.0.5:8786
     """
     from voodoo._core import __version__
-    from voodoo.batch.run import Batch, run
+    from voodoo.batch.run import Batch, check_installed, run
     from voodoo.batch.storage import find_sources, is_local, local_path
     from voodoo.batch.summary import DONE, FAILED
     from voodoo.batch.task import Settings
@@ -112,6 +112,7 @@ def batch_command(
             version=__version__,
         )
         sources = find_sources(recordings, only=only or ())
+        check_installed()
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
         batch = Batch(

@@ -16,7 +16,7 @@ import typer
 
 from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.cli.signals import INTERRUPTED
-from voodoo.cli.terminal import Escaped
+from voodoo.cli.terminal import READER_LEFT, Escaped
 from voodoo.errors import NoPoseError, VoodooError, reason
 
 T = TypeVar("T")
@@ -32,6 +32,7 @@ EXIT_CODES = {
     INTERRUPTED: "ended by Ctrl-C (128 + SIGINT); the frames up to there are written",
     143: "ended by SIGTERM (128 + 15), as by Ctrl-C",
     129: "ended by SIGHUP (128 + 1), as by Ctrl-C",
+    READER_LEFT: "what read the output has ended, as `head` does (128 + SIGPIPE); nothing more is said",
 }
 """What the exit codes of all commands mean; Typer uses 2."""
 

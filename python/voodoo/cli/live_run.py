@@ -20,7 +20,7 @@ from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector
 from voodoo.errors import VoodooError, reason
-from voodoo.export.ros2 import instant
+from voodoo.export.ros2 import cdr, description, instant
 from voodoo.export.spool import Spool
 from voodoo.export.upright import Turn
 from voodoo.live.assembly import LiveFrame
@@ -296,4 +296,6 @@ def warm_up() -> None:
     for number in range(3):
         item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
         step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
-    instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="p1")
+    messages = instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="p1")
+    for message in (messages | description(step.bodies[ONE], "p1")).values():
+        cdr(message)

@@ -1,10 +1,14 @@
-"""Escapes text on its way to a terminal: names and texts in files of others may hold commands for it."""
+"""Standard output and errors: names and texts in files of others may hold commands for a terminal, and readers may leave."""
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Callable
 from typing import Any
 
+READER_LEFT = 141
+"""Exit code after the reader of the output ended: 128 + SIGPIPE."""
 _COMMANDS = r"[^\n\t\x20-\x7e\xa0-\u2027\u202f-\u2065\u206a-\U0010ffff]"
 """Control characters, and those that reverse the direction of text or end a line."""
 
@@ -17,7 +21,7 @@ def escaped(text: str) -> str:
 
 
 class Escaped:
-    """A text stream that escapes everything that is written to it.
+    """A text stream that escapes everything that is written to it, and ends the program quietly when its reader has left.
 
     Args:
         stream: where to.
@@ -25,11 +29,23 @@ class Escaped:
 
     def __init__(self, stream: Any) -> None:  # noqa: ANN401 - any object like a text file
         """Write nothing yet."""
-        self.stream = stream
+        self.stream: Any = stream.stream if isinstance(stream, Escaped) else stream
 
     def write(self, text: str) -> int:
         """Write a text."""
-        return int(self.stream.write(escaped(text)))
+        return int(self._read(self.stream.write, escaped(text)))
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+        self._read(self.stream.flush)
+
+    def _read(self, call: Callable[..., Any], *words: str) -> Any:  # noqa: ANN401
+        try:
+            return call(*words)
+        except BrokenPipeError:
+            # What is left in the buffer would fail again at the end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
+            raise SystemExit(READER_LEFT) from None
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401
         """Everything else is the stream's."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from voodoo.errors import VoodooError
-from voodoo.export.human_frames import frame_poses, on_parents
-from voodoo.export.skeleton import Skeleton, skeleton
+from voodoo.export.human_frames import human_frames, placed_names
+from voodoo.export.skeleton import FloatArray, skeleton
+from voodoo.export.template import STAMP_NS, Template
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
@@ -54,73 +56,133 @@ class Channels:
     def __init__(self, foxglove: Any, context: Any) -> None:  # noqa: ANN401
         """Open the topics."""
         self._messages, self._context = foxglove.messages, context  # topics do not keep their context
-        self._transforms = foxglove.channels.FrameTransformsChannel(TRANSFORMS, context=context)
-        self._scene = foxglove.channels.SceneUpdateChannel(SCENE, context=context)
+        self._transforms, self._scene = (
+            foxglove.Channel(topic, schema=kind.get_schema(), message_encoding="protobuf", context=context)
+            for topic, kind in ((TRANSFORMS, self._messages.FrameTransforms), (SCENE, self._messages.SceneUpdate))
+        )
+        self._transforms_of, self._entity_of = lru_cache(64)(self._make_transforms), lru_cache(64)(self._make_entity)
 
     @property
     def are_wanted(self) -> bool:
         """Whether somebody receives them."""
         return bool(self._transforms.has_sinks() or self._scene.has_sinks())
 
-    def log(self, stamp: float, people: Mapping[str, tuple[Track, Skeleton, Body]], root_frame: str) -> None:
-        """Write a frame.
-
-        Args:
-            stamp: [s].
-            people: REP-155 id -> track and skeleton of this frame, and body, of those who are there, in `root_frame`.
-            root_frame: with z up.
-        """
+    def log(self, stamp: float, people: Sequence[FoxgloveRow], root_frame: str) -> None:
+        """Write a frame of those who are there; `root_frame` has z up."""
+        seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
+        log_time, time = round(stamp * 1e9), _timestamp(seconds, rest)
+        # Messages one after the other are one with the entries of all of them.
+        if people:
+            made = [self._transforms_of(*one[:3], root_frame).filled(one.on_parents.ravel(), time) for one in people]
+            self._transforms.log(b"".join(made), log_time=log_time)
         m = self._messages
-        time = m.Timestamp.from_epoch_secs(stamp)
-        transforms, entities = [], []
-        for person, (track, posed, body) in people.items():
-            for name, parent, place, turn in on_parents(frame_poses(track, posed, 0, person)):
-                transforms.append(
-                    m.FrameTransform(
-                        timestamp=time,
-                        parent_frame_id=parent or root_frame,
-                        child_frame_id=name,
-                        translation=m.Vector3(**_xyz(place)),
-                        rotation=m.Quaternion(**_xyz(turn, "xyzw")),
-                    )
-                )
-            entities.append(self._entity(time, person, track, body, root_frame))
-        log_time = round(stamp * 1e9)
-        if transforms:
-            self._transforms.log(m.FrameTransforms(transforms=transforms), log_time=log_time)
-        all_before = m.SceneEntityDeletion(timestamp=time, type=m.SceneEntityDeletionType.All)
-        self._scene.log(m.SceneUpdate(deletions=[all_before], entities=entities), log_time=log_time)
+        before = m.SceneEntityDeletion(timestamp=m.Timestamp(seconds, rest), type=m.SceneEntityDeletionType.All)
+        entities = [self._entity_of(one.person, *one[3:5], root_frame).filled(one.shapes, time) for one in people]
+        self._scene.log(b"".join([m.SceneUpdate(deletions=[before]).encode(), *entities]), log_time=log_time)
 
-    def _entity(self, time: Any, person: str, track: Track, body: Body, root_frame: str) -> Any:  # noqa: ANN401
-        m = self._messages
-        poses = track.world_from_limb[0]
-        lengths = np.array([limb.shape.length for limb in body.limbs])
-        middles = poses[:, :3, 3] + poses[:, :3, 2] * lengths[:, None] / 2.0
-        cylinders = []
-        for limb, place, turn in zip(body.limbs, middles.tolist(), quaternions(poses[:, :3, :3]).tolist(), strict=True):
-            # Scales are of the mean of both ends.
-            a, b = limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1
-            low = (limb.shape.a0 / a + limb.shape.b0 / b) if a and b else 1.0
-            cylinders.append(
-                m.CylinderPrimitive(
-                    pose=m.Pose(position=m.Vector3(**_xyz(place)), orientation=m.Quaternion(**_xyz(turn, "xyzw"))),
-                    size=m.Vector3(x=a, y=b, z=limb.shape.length),
-                    bottom_scale=low,
-                    top_scale=2.0 - low,
-                    color=m.Color(**(_LEFT if limb.name.startswith("l_") else _RIGHT)),
+    def _make_transforms(
+        self, person: str, names: tuple[str, ...], parents: tuple[int, ...], root_frame: str
+    ) -> Template:
+        m, placed = self._messages, placed_names(names, parents, person, root_frame)
+
+        def encode(numbers: list[float]) -> bytes:
+            rows = [numbers[start : start + 7] for start in range(0, len(numbers), 7)]
+            transforms = [
+                m.FrameTransform(
+                    timestamp=m.Timestamp(*divmod(STAMP_NS, 1_000_000_000)),
+                    parent_frame_id=parent,
+                    child_frame_id=name,
+                    translation=m.Vector3(**_xyz(row)),
+                    rotation=m.Quaternion(**_xyz(row[3:], "xyzw")),
                 )
-            )
+                for (parent, name), row in zip(placed, rows, strict=True)
+            ]
+            return bytes(m.FrameTransforms(transforms=transforms).encode())
+
+        return Template(encode, 7 * len(placed), kind="<f8", stamp=_STAMP)
+
+    def _make_entity(self, person: str, limbs: tuple[str, ...], joints: int, root_frame: str) -> Template:
+        m = self._messages
         size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**_JOINT)
         still = m.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
-        spheres = [
-            m.SpherePrimitive(pose=m.Pose(position=m.Vector3(**_xyz(place)), orientation=still), size=size, color=red)
-            for place in track.joints[0].tolist()
-        ]
-        return m.SceneEntity(timestamp=time, frame_id=root_frame, id=person, cylinders=cylinders, spheres=spheres)
+
+        def cylinder(limb: str, row: list[float]) -> Any:  # noqa: ANN401
+            turn = m.Quaternion(**_xyz(row[3:7], "xyzw"))
+            return m.CylinderPrimitive(
+                pose=m.Pose(position=m.Vector3(**_xyz(row)), orientation=turn),
+                size=m.Vector3(**_xyz(row[7:])),
+                bottom_scale=row[10],
+                top_scale=row[11],
+                color=m.Color(**(_LEFT if limb.startswith("l_") else _RIGHT)),
+            )
+
+        def encode(numbers: list[float]) -> bytes:
+            rows = [numbers[start:] for start in range(0, 12 * len(limbs), 12)]
+            places = [numbers[12 * len(limbs) + 3 * index :] for index in range(joints)]
+            spheres = [
+                m.SpherePrimitive(
+                    pose=m.Pose(position=m.Vector3(**_xyz(place)), orientation=still), size=size, color=red
+                )
+                for place in places
+            ]
+            entity = m.SceneEntity(
+                timestamp=m.Timestamp(*divmod(STAMP_NS, 1_000_000_000)),
+                frame_id=root_frame,
+                id=person,
+                cylinders=[cylinder(*pair) for pair in zip(limbs, rows, strict=True)],
+                spheres=spheres,
+            )
+            return bytes(m.SceneUpdate(entities=[entity]).encode())
+
+        return Template(encode, 12 * len(limbs) + 3 * joints, kind="<f8", stamp=_STAMP)
+
+
+class FoxgloveRow(NamedTuple):
+    """A person in a frame: REP-155 id, names and parents of `HumanFrames`, names of limbs, number of joints and sites, and the
+    numbers of `HumanFrames.on_parents` and `shapes_of`."""
+
+    person: str
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    limbs: tuple[str, ...]
+    joints: int
+    on_parents: FloatArray
+    shapes: FloatArray
+
+
+def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray) -> FloatArray:
+    """Numbers of the shapes (F, 12 L + 3 J): of each limb's cylinder middle, rotation, size, and scales of both ends; joints.
+
+    Args:
+        bodies: one, or one of each of the F poses.
+        limb_poses: (F, L, 4, 4).
+        joints: (F, J, 3).
+    """
+    length, a0, b0, a1, b1 = np.array([body.core.sizes() for body in bodies]).transpose(2, 0, 1)
+    a, b = a0 + a1, b0 + b1
+    low = a0 / a + b0 / b  # of the mean of both ends
+    sizes = np.array([a, b, length, low, 2.0 - low]).transpose(1, 2, 0)
+    middles = limb_poses[..., :3, 3] + limb_poses[..., :3, 2] * length[..., None] / 2.0
+    count, limbs = limb_poses.shape[:2]
+    rows = [middles, quaternions(limb_poses[..., :3, :3]), np.broadcast_to(sizes, (count, limbs, 5))]
+    cylinders = np.concatenate(rows, axis=2).reshape(count, 12 * limbs)
+    return np.concatenate([cylinders, joints.reshape(count, 3 * joints.shape[1])], axis=1)
+
+
+def _timestamp(seconds: int, nanoseconds: int) -> bytes:
+    """Fields of google.protobuf.Timestamp, always of the same length: seven bits a byte, the highest says that more follow."""
+    words = [
+        bytes([number >> 7 * place & 0x7F | 0x80 for place in range(4)] + [number >> 28])
+        for number in (seconds, nanoseconds)
+    ]
+    return b"\x08" + words[0] + b"\x10" + words[1]
+
+
+_STAMP = _timestamp(*divmod(STAMP_NS, 1_000_000_000))
 
 
 def _xyz(values: Iterable[float], names: str = "xyz") -> dict[str, float]:
-    return dict(zip(names, values, strict=True))
+    return dict(zip(names, values, strict=False))
 
 
 def write_foxglove(
@@ -144,19 +206,16 @@ def write_foxglove(
     foxglove = library(path)
     context = foxglove.Context()
     channels = Channels(foxglove, context)
-    frames: dict[float, dict[str, int]] = {}
-    posed: dict[str, tuple[Track, Skeleton, Body]] = {}
+    frames: dict[float, list[FoxgloveRow]] = {}
     root = root_frame
     for person, (track, body) in people.items():
         track, root = upright(track, root_frame, turn)
-        posed[person] = track, skeleton(track, body), body
-        for index, (stamp, found) in enumerate(zip(track.stamps.tolist(), track.found.tolist(), strict=True)):
-            frames.setdefault(stamp, {}).update({person: index} if found else {})
+        found = track.of_frames(track.found)
+        placed = human_frames(track.joint_names, found.joints, skeleton(found, body))
+        about = person, placed.names, placed.parents, track.limb_names, len(track.joint_names)
+        rows = zip(placed.on_parents(), shapes_of([body], found.world_from_limb, found.joints), strict=True)
+        for stamp, there in zip(track.stamps.tolist(), track.found.tolist(), strict=True):
+            frames.setdefault(stamp, []).extend([FoxgloveRow(*about, *next(rows))] if there else [])
     with foxglove.open_mcap(str(path), context=context):
-        for stamp, there in sorted(frames.items()):
-            channels.log(stamp, {name: _at(*posed[name], index) for name, index in there.items()}, root)
-
-
-def _at(track: Track, posed: Skeleton, body: Body, index: int) -> tuple[Track, Skeleton, Body]:
-    one = np.array([index])
-    return track.of_frames(one), posed.of_frames(one), body
+        for stamp, present in sorted(frames.items()):
+            channels.log(stamp, present, root)

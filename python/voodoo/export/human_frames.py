@@ -2,68 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from voodoo.export.conventions import NAMES
 from voodoo.export.skeleton import FloatArray, Skeleton
-from voodoo.export.track import Track
 from voodoo.model.rotations import quaternions
 
 FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
 
 
-def frame_poses(track: Track, posed: Skeleton, index: int, person: str) -> dict[str, tuple[str | None, FloatArray]]:
-    """Frames of one instant: name -> (parent, root_from_frame (4, 4)); the parent of `body_` is None, the root
-    frame."""
-    sites = dict(zip(track.joint_names, track.joints[index], strict=True))
-    bones = posed.bones
-    limb_frames = [f"{FRAMES.get(bone.name, bone.name)}_{person}" for bone in bones]
-    body_frame = f"body_{person}"
-    trunk = posed.rotations[index, 0]
-    frames: dict[str, tuple[str | None, FloatArray]] = {
-        body_frame: (None, _pose(trunk, _middle(sites, "hip", posed.heads[index, 0])))
-    }
-    for number, bone in enumerate(bones):
-        place, turn = posed.heads[index, number], posed.rotations[index, number]
-        parent = body_frame if bone.parent is None or bone.name.endswith("_thigh") else limb_frames[bone.parent]
-        if bone.name in ("torso", "thorax"):
-            place = _middle(sites, "shoulder", place)
-        elif bone.parent is None:
-            place = frames[body_frame][1][:3, 3]
-        elif bone.name == "head" and "head_center" in sites:
-            place = sites["head_center"]
-        frames[limb_frames[number]] = (parent, _pose(turn, place))
+class HumanFrames(NamedTuple):
+    """Frames of F poses: N a pose, parents first.
+
+    Attributes:
+        names: N names without that of the person; the first is "body".
+        parents: N numbers of the parent; -1 of the first one, which is on the root frame.
+        rotations: (F, N, 3, 3) root_from_frame.
+        places: (F, N, 3) [m] in the root frame.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    rotations: FloatArray
+    places: FloatArray
+
+    def on_parents(self) -> FloatArray:
+        """(F, N, 7): place x, y, z [m] and rotation x, y, z, w of each frame on its parent."""
+        above = self.parents[1:]
+        turns, places = self.rotations.copy(), self.places.copy()
+        back = self.rotations[:, above].swapaxes(2, 3)
+        turns[:, 1:] = back @ turns[:, 1:]
+        places[:, 1:] = (back @ (places[:, 1:] - self.places[:, above])[..., None])[..., 0]
+        return np.concatenate([places, quaternions(turns)], axis=2)
+
+
+def human_frames(joint_names: tuple[str, ...], joints: FloatArray, posed: Skeleton) -> HumanFrames:
+    """Frames of poses with joints (F, J, 3)."""
+    names, parents, limbs, *ends = _plan(joint_names, posed.limbs)
+    points = np.concatenate([posed.heads, joints], axis=1)
+    return HumanFrames(names, parents, posed.rotations[:, limbs], (points[:, ends[0]] + points[:, ends[1]]) / 2.0)
+
+
+def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root: str) -> list[tuple[str, str]]:
+    """Parent and name of each of the frames of a person."""
+    names = [f"{name}_{person}" for name in names]
+    return [(names[above] if above >= 0 else root, name) for name, above in zip(names, parents, strict=True)]
+
+
+_Numbers = tuple[int, ...]
+
+
+@lru_cache(maxsize=64)
+def _plan(
+    joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
+) -> tuple[tuple[str, ...], _Numbers, _Numbers, _Numbers, _Numbers]:
+    """Of each frame the name, the parent, the limb it turns with, and two points in the middle of which it is: heads of limbs,
+    then joints."""
+    sites = {name: len(limbs) + index for index, name in enumerate(joint_names)}
+    there = {name for name, _ in limbs}
+
+    def middle(joint: str, otherwise: int) -> tuple[int, int]:
+        left, right = sites.get(f"l_{joint}"), sites.get(f"r_{joint}")
+        return (otherwise, otherwise) if left is None or right is None else (left, right)
+
+    rows: list[tuple[str, int, int, int, int]] = [("body", -1, 0, *middle("hip", 0))]
+    frame_of: list[int] = []
+    for number, (name, above) in enumerate(limbs):
+        parent = 0 if above is None or name.endswith("_thigh") else frame_of[above]
+        ends = number, number
+        if name in ("torso", "thorax"):
+            ends = middle("shoulder", number)
+        elif above is None:
+            ends = rows[0][3:]
+        elif name == "head" and "head_center" in sites:
+            ends = sites["head_center"], sites["head_center"]
+        frame_of.append(len(rows))
+        rows.append((FRAMES.get(name, name), parent, number, *ends))
         # In bodies without hand or foot, the forearm or calf carries the frame of the wrist or ankle.
         for limb, end, site in (("_forearm", "_hand", "_wrist"), ("_calf", "_foot", "_ankle")):
-            side = bone.name.removesuffix(limb)
-            if bone.name.endswith(limb) and side + end not in track.limb_names and side + site in sites:
-                frames[f"{side}{site}_{person}"] = (limb_frames[number], _pose(turn, sites[side + site]))
-    return frames
-
-
-def on_parents(
-    frames: Mapping[str, tuple[str | None, FloatArray]],
-) -> list[tuple[str, str | None, list[float], list[float]]]:
-    """Of each frame: name, parent, and place (3) [m] and rotation (x, y, z, w) on it."""
-    poses = np.array([pose for _, pose in frames.values()])
-    above = np.array([np.eye(4) if parent is None else frames[parent][1] for parent, _ in frames.values()])
-    relative = np.linalg.inv(above) @ poses
-    turns, places = quaternions(relative[:, :3, :3]).tolist(), relative[:, :3, 3].tolist()
-    parents = [parent for parent, _ in frames.values()]
-    return list(zip(frames, parents, places, turns, strict=True))
-
-
-def _pose(turn: FloatArray, place: FloatArray) -> FloatArray:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = turn, place
-    return pose
-
-
-def _middle(sites: dict[str, FloatArray], joint: str, otherwise: FloatArray) -> FloatArray:
-    both = [sites.get(f"{side}_{joint}") for side in "lr"]
-    if both[0] is None or both[1] is None:
-        return otherwise
-    return np.asarray((both[0] + both[1]) / 2.0)
+            side = name.removesuffix(limb)
+            if name.endswith(limb) and side + end not in there and side + site in sites:
+                place = sites[side + site]
+                rows.append((side + site, frame_of[number], number, place, place))
+    names, parents, turning, first, second = zip(*rows, strict=True)
+    return names, parents, turning, first, second

@@ -8,20 +8,21 @@ left, z up when the person stands at rest (REP-103). The parent of `body_<id>` i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.human_frames import frame_poses, on_parents
+from voodoo.export.human_frames import human_frames, placed_names
 from voodoo.export.joint_angles import joint_angles
-from voodoo.export.skeleton import FloatArray, Skeleton, skeleton
+from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
@@ -35,8 +36,8 @@ IDS, STRING = "hri_msgs/msg/IdsList", "std_msgs/msg/String"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 """Release whose definitions are used; the messages used here have the same fields in other releases."""
 STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
-_TF = "tf2_msgs/msg/TFMessage"
-_POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
 
 
@@ -126,75 +127,112 @@ def write_people_bag(
 class _Human:
     """The messages of one person."""
 
-    def __init__(
-        self,
-        track: Track,
-        body: Body,
-        person: str,
-        root_frame: str,
-        turn: Turn | None = None,
-        posed: Skeleton | None = None,
-    ) -> None:
+    def __init__(self, track: Track, body: Body, person: str, root_frame: str, turn: Turn | None = None) -> None:
         if not root_frame:
             raise VoodooError("root_frame: expected a name, found none")
-        self._given_root = root_frame
-        standing, self.root = upright(track, root_frame, turn)
-        track = standing if posed is None else track
-        pose = (by_axes(root_frame) if turn is None else turn).pose
-        self._above = (quaternions(pose[:3, :3].T).tolist(), (-pose[:3, :3].T @ pose[:3, 3]).tolist())
+        track, self.root = upright(track, root_frame, turn)
+        above = (by_axes(root_frame) if turn is None else turn).pose
+        self._above = [] if self.root == root_frame else [(root_frame, self.root, root_on_parent(above))]
         self.track, self.body, self.person, self.topic = track, body, person, f"{BODIES}/{person}"
         if (track.stamps < 0.0).any():
             raise VoodooError(f"stamps: expected none before zero, as a bag wants it, found {track.stamps.min()} s")
-        self._posed, self._displayed = posed or skeleton(track, body), track.found
-        displayed = self._displayed
-        self._names, angles = (
-            joint_angles(self._posed.of_frames(displayed)) if displayed.any() else ((), np.empty((0, 0)))
-        )
-        self._rows = iter(angles)
+        self._displayed = track.found
+        if self._displayed.any():
+            posed = skeleton(track, body).of_frames(self._displayed)
+            frames = human_frames(track.joint_names, track.joints[self._displayed], posed)
+            self._joints, angles = joint_angles(posed)
+            self._frames = placed_names(frames.names, frames.parents, person, self.root)
+            roots = track.world_from_limb[self._displayed, 0, :3, 3]
+            sure = body_covariances(track.root_covariance[self._displayed], frames.places[:, 0] - roots)
+            self._rows = zip(angles, frames.on_parents(), sure, strict=True)
 
     def kinds(self, markers: bool) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
-        kinds = {f"{self.topic}/joint_states": "sensor_msgs/msg/JointState"}
-        kinds |= {f"{self.topic}/pose": _POSE} if np.isfinite(self.track.root_covariance).any() else {}
+        kinds = {f"{self.topic}/joint_states": JOINTS}
+        kinds |= {f"{self.topic}/pose": POSE} if np.isfinite(self.track.root_covariance).any() else {}
         return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
 
     def messages(self, index: int, *, markers: bool) -> dict[str, Any]:
         """Topic -> message of a frame; frames are asked for in order."""
-        nanoseconds = round(float(self.track.stamps[index]) * 1e9)
-        header = _header(nanoseconds, self.root)
+        at = round(float(self.track.stamps[index]) * 1e9)
         messages: dict[str, Any] = {}
         if self._displayed[index]:
-            frames = frame_poses(self.track, self._posed, index, self.person)
-            transforms = [
-                _transform(_header(nanoseconds, parent or self.root), name, turn, place)
-                for name, parent, place, turn in on_parents(frames)
-            ]
-            if self.root != self._given_root:
-                above = _header(nanoseconds, self._given_root)
-                transforms.insert(0, _transform(above, self.root, *self._above))
-            messages["/tf"] = _new(_TF, transforms=transforms)
-            messages[f"{self.topic}/joint_states"] = _new(
-                "sensor_msgs/msg/JointState",
-                header=_header(nanoseconds, f"body_{self.person}"),
-                name=[f"{name}_{self.person}" for name in self._names],
-                position=next(self._rows),
-                velocity=np.empty(0),
-                effort=np.empty(0),
-            )
-            if np.isfinite(self.track.root_covariance[index]).all():
-                pose = _body_pose(self.track, index, frames[f"body_{self.person}"][1])
-                messages[f"{self.topic}/pose"] = _new(_POSE, header=header, pose=pose)
+            angles, rows, sure = next(self._rows)
+            placed = [(parent, name, row) for (parent, name), row in zip(self._frames, rows.tolist(), strict=True)]
+            messages["/tf"] = transforms_message(at, [*self._above, *placed])
+            messages[f"{self.topic}/joint_states"] = joint_message(at, self.person, self._joints, angles)
+            if np.isfinite(sure).all():
+                messages[f"{self.topic}/pose"] = pose_message(at, self.root, rows[0].tolist(), sure)
         if markers:
+            header = _header(at, self.root)
             drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
             messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
+
+
+def root_on_parent(pose: FloatArray) -> list[float]:
+    """Place and rotation, as in `HumanFrames.on_parents`, of the upright frame on the root frame that `pose` turns."""
+    return [*(-pose[:3, :3].T @ pose[:3, 3]).tolist(), *quaternions(pose[:3, :3].T).tolist()]
+
+
+def body_covariances(covariances: FloatArray, across: FloatArray) -> FloatArray:
+    """Covariances (F, 6, 6) of poses, moved by vectors (F, 3) to other points of the body."""
+    moved = np.zeros_like(covariances) + np.eye(6)
+    x, y, z = across.T
+    moved[:, [0, 0, 1, 1, 2, 2], [4, 5, 3, 5, 3, 4]] = np.array([z, -y, -z, x, y, -x]).T
+    result: FloatArray = moved @ covariances @ moved.swapaxes(1, 2)
+    return result
+
+
+def transforms_message(nanoseconds: int, rows: Iterable[tuple[str, str, Sequence[float]]]) -> Any:  # noqa: ANN401
+    """TFMessage of parents, names, and place x, y, z and rotation x, y, z, w on the parent."""
+    transforms = []
+    for parent, name, (x, y, z, qx, qy, qz, qw) in rows:
+        place = _new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+        turn = _new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw)
+        moved = _new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
+        header = _header(nanoseconds, parent)
+        transforms.append(
+            _new("geometry_msgs/msg/TransformStamped", header=header, child_frame_id=name, transform=moved)
+        )
+    return _new(TF, transforms=transforms)
+
+
+def joint_message(nanoseconds: int, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
+    """JointState of angles [rad]."""
+    return _new(
+        JOINTS,
+        header=_header(nanoseconds, f"body_{person}"),
+        name=[f"{name}_{person}" for name in joints],
+        position=np.ascontiguousarray(angles, dtype=np.float64),
+        velocity=np.empty(0),
+        effort=np.empty(0),
+    )
+
+
+def pose_message(nanoseconds: int, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
+    """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers)."""
+    x, y, z, w = row[3:]
+    return _new(
+        POSE,
+        header=_header(nanoseconds, root),
+        pose=_new(
+            "geometry_msgs/msg/PoseWithCovariance",
+            pose=_new(
+                "geometry_msgs/msg/Pose",
+                position=_point(row[:3]),
+                orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
+            ),
+            covariance=np.asarray(covariance, dtype=np.float64).ravel(),
+        ),
+    )
 
 
 def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None:
     path = Path(path)
     if path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    kinds = {"/tf": _TF, TRACKED: IDS}
+    kinds = {"/tf": TF, TRACKED: IDS}
     for human in humans:
         kinds |= human.kinds(markers) | {f"/human_description_{human.person}": STRING}
     frames = sorted(
@@ -221,37 +259,6 @@ def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None
                 writer.write(connect[name], round(stamp * 1e9), STORE.serialize_cdr(message, message.__msgtype__))
 
 
-def _transform(header: Any, child: str, turn: Sequence[float], place: Sequence[float]) -> Any:  # noqa: ANN401
-    (x, y, z), (qx, qy, qz, qw) = place, turn
-    return _new(
-        "geometry_msgs/msg/TransformStamped",
-        header=header,
-        child_frame_id=child,
-        transform=_new(
-            "geometry_msgs/msg/Transform",
-            translation=_new("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
-            rotation=_new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-        ),
-    )
-
-
-def _body_pose(track: Track, index: int, pose: FloatArray) -> Any:  # noqa: ANN401
-    """The pose of the body's frame with its covariance, moved there from the origin of the first limb's frame."""
-    x, y, z = pose[:3, 3] - track.world_from_limb[index, 0, :3, 3]
-    moved = np.eye(6)
-    moved[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    turn = quaternions(pose[:3, :3]).tolist()
-    return _new(
-        "geometry_msgs/msg/PoseWithCovariance",
-        pose=_new(
-            "geometry_msgs/msg/Pose",
-            position=_point(pose[:3, 3]),
-            orientation=_new("geometry_msgs/msg/Quaternion", x=turn[0], y=turn[1], z=turn[2], w=turn[3]),
-        ),
-        covariance=(moved @ track.root_covariance[index] @ moved.T).ravel(),
-    )
-
-
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
     result = []
     poses = track.world_from_limb[index]
@@ -261,7 +268,7 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
         rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
         result.append(_marker(header, "limbs", number, _CYLINDER, middle, turns[number], size, rgb, []))
-    points = [_point(position) for position in track.joints[index]]
+    points = [_point(position) for position in track.joints[index].tolist()]
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
     known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
@@ -305,7 +312,7 @@ def _marker(
         action=_ADD,
         pose=_new(
             "geometry_msgs/msg/Pose",
-            position=_point(place),
+            position=_point(place.tolist()),
             orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
         ),
         scale=_new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
@@ -346,8 +353,8 @@ def _header(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
     )
 
 
-def _point(position: FloatArray) -> Any:  # noqa: ANN401
-    x, y, z = position.tolist()
+def _point(position: Sequence[float]) -> Any:  # noqa: ANN401
+    x, y, z = position
     return _new("geometry_msgs/msg/Point", x=x, y=y, z=z)
 
 
@@ -359,7 +366,6 @@ def instant(
     person: str,
     markers: bool = True,
     turn: Turn | None = None,
-    posed: tuple[Track, Skeleton] | None = None,
 ) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
 
@@ -370,15 +376,13 @@ def instant(
         person: REP-155 id.
         markers: also make the markers.
         turn: see `write_bag`.
-        posed: track and skeleton of the frame, already upright, if they are known.
 
     Raises:
         VoodooError: a stamp before zero.
     """
     # Angles are not needed; if nobody was found, the names come from the body.
-    track, bones = posed or (Track.of([estimate], body=None if estimate.joints else body), None)
-    human = _Human(track, body, person, root_frame, turn, bones)
-    return human.messages(0, markers=markers)
+    track = Track.of([estimate], body=None if estimate.joints else body)
+    return _Human(track, body, person, root_frame, turn).messages(0, markers=markers)
 
 
 def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition

@@ -7,8 +7,9 @@ rest.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -17,7 +18,6 @@ import numpy.typing as npt
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.rotations import matrix_of_turn
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 _MOVES_M = 1e-4
@@ -49,35 +49,18 @@ class Bone:
 def bones(body: Body) -> tuple[Bone, ...]:
     """The bones of a body at rest, parents first."""
     result: list[Bone] = []
-    poses: list[tuple[FloatArray, FloatArray]] = []
+    shifts: list[FloatArray] = []
     _, limbs, _ = body.core.parts()
-    names = [limb[0] for limb in limbs]
-    axes = [place[1] for limb in limbs if limb[3] is not None for place in limb[3][1:3]]
-    from_joints = iter([_turn(*axis) for axis in axes])
-    for name, parent, shape, joint, _ in limbs:
-        if joint is None or parent is None:
-            turn, shift, place, above, joint_name = np.eye(3), np.zeros(3), np.zeros(3), None, name
-        else:
+    names = body.limb_names
+    for (name, parent, shape, joint, _), turn, place in zip(limbs, *body.core.at_rest(), strict=True):
+        above, shift = None, np.zeros(3)
+        if joint is not None and parent is not None:
             above = names.index(parent)
-            joint_name, on_parent, on_limb = joint[:3]
-            parent_turn, parent_shift = poses[above]
-            parent_from_joint, limb_from_joint = next(from_joints), next(from_joints)
-            turn = parent_turn @ parent_from_joint @ limb_from_joint.T
-            place = np.asarray(on_limb[0], dtype=np.float64)
-            shift = parent_turn @ np.asarray(on_parent[0]) + parent_shift - turn @ place
-        poses.append((turn, shift))
-        head = turn @ place + shift
+            shift = result[above].rest @ np.asarray(joint[1][0]) + shifts[above] - turn @ place
+        shifts.append(shift)
         tip = turn @ np.array([0.0, 0.0, shape.length]) + shift
-        result.append(Bone(name, above, joint_name, head, tip, turn, place))
+        result.append(Bone(name, above, joint[0] if joint else name, turn @ place + shift, tip, turn, place))
     return tuple(result)
-
-
-@lru_cache(maxsize=256)
-def _turn(x: float, y: float, z: float) -> FloatArray:
-    """Cached, because the axes of joints stay while lengths are refined in every frame."""
-    turn = matrix_of_turn((x, y, z))
-    turn.setflags(write=False)
-    return turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +68,7 @@ class Skeleton:
     """A track on its bones: F frames, L bones.
 
     Args:
-        bones: the body at rest.
+        body: whose bones they are; persons of one instant may have other sizes each.
         stamps: (F,) [s].
         rotations: (F, L, 3, 3) world_from_bone: the identity when the body stands at rest and looks along x.
         heads: (F, L, 3) where each bone is joined to its parent [m]: the track's own joint of that name, else the place on the
@@ -94,14 +77,25 @@ class Skeleton:
     Rotations and heads of searching frames are NaN.
     """
 
-    bones: tuple[Bone, ...]
+    body: Body
     stamps: FloatArray
     rotations: FloatArray
     heads: FloatArray
 
+    @cached_property
+    def bones(self) -> tuple[Bone, ...]:
+        """The body at rest."""
+        return bones(self.body)
+
+    @cached_property
+    def limbs(self) -> tuple[tuple[str, int | None], ...]:
+        """Name of each bone, and the number of its parent."""
+        names = self.body.limb_names
+        return tuple((limb.name, None if limb.parent is None else names.index(limb.parent)) for limb in self.body.limbs)
+
     def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Skeleton:
         """The skeleton of some frames: a mask (F,), or their numbers."""
-        return Skeleton(self.bones, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])
+        return Skeleton(self.body, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])
 
     def offsets(self) -> FloatArray:
         """(F, L, 3) where each bone is joined to its parent, in the parent bone's frame [m]; zero for the root."""
@@ -130,15 +124,27 @@ def skeleton(track: Track, body: Body) -> Skeleton:
     if track.limb_names != body.limb_names:
         found = ", ".join(track.limb_names) or "none (a .csv has no limb poses; use .npz)"
         raise VoodooError(f"track: expected poses of the limbs {', '.join(body.limb_names)}, found {found}")
-    parts = bones(body)
-    turn = track.world_from_limb[:, :, :3, :3]
-    rest = np.array([bone.rest for bone in parts])
-    places = np.array([bone.head_in_limb for bone in parts])
-    heads = np.einsum("flij,lj->fli", turn, places) + track.world_from_limb[:, :, :3, 3]
-    for index, bone in enumerate(parts):
-        if bone.parent is not None and bone.joint in track.joint_names:
-            heads[:, index] = track.joints[:, track.joint_names.index(bone.joint)]
-    return Skeleton(parts, track.stamps, turn @ rest.transpose(0, 2, 1), heads)
+    return skeleton_of([body], track.stamps, track.world_from_limb, track.joint_names, track.joints)
+
+
+def skeleton_of(
+    bodies: Sequence[Body], stamps: FloatArray, poses: FloatArray, joint_names: tuple[str, ...], joints: FloatArray
+) -> Skeleton:
+    """The skeleton of F poses (F, L, 4, 4) with joints (F, J, 3) of a body, or of persons of one instant with a body each."""
+    rest, _ = bodies[0].core.at_rest()
+    places = np.array([body.core.at_rest()[1] for body in bodies])
+    turn = poses[:, :, :3, :3]
+    heads = (turn @ places[..., None])[..., 0] + poses[:, :, :3, 3]
+    limbs, sites = _sites(bodies[0].limb_joints, joint_names)
+    heads[:, limbs] = joints[:, sites]
+    return Skeleton(bodies[0], stamps, turn @ rest.transpose(0, 2, 1), heads)
+
+
+@lru_cache(maxsize=64)
+def _sites(joints: tuple[str | None, ...], names: tuple[str, ...]) -> tuple[list[int], list[int]]:
+    """Limbs whose joint to the parent has a position of its own, and the number of that."""
+    limbs = [index for index, joint in enumerate(joints) if joint in names]
+    return limbs, [names.index(joint) for joint in joints if joint in names]
 
 
 def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
@@ -148,7 +154,7 @@ def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:
     such frame; where there is none at all the body stands at rest.
     """
     if not found.any():
-        still = Skeleton(posed.bones, posed.stamps, np.empty_like(posed.rotations), np.empty_like(posed.heads))
+        still = Skeleton(posed.body, posed.stamps, np.empty_like(posed.rotations), np.empty_like(posed.heads))
         still.rotations[:] = np.eye(3)
         still.heads[:] = np.array([bone.head for bone in posed.bones])
         return still

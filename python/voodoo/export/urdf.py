@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.export.human_frames import FRAMES, frame_poses
+from voodoo.export.human_frames import FRAMES, human_frames
 from voodoo.export.skeleton import bones, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
@@ -47,32 +47,33 @@ def urdf(body: Body, person: str) -> str:
     names, limb_names = estimate.joint_names, estimate.limb_names
     poses = np.array([estimate.limb_poses])
     track = Track(np.zeros(1), ("tracking",), np.zeros(1), names, estimate.joint_positions[None], limb_names, poses)
-    frames = frame_poses(track, skeleton(track, body), 0, person)
+    frames = human_frames(names, track.joints, skeleton(track, body))
+    ids, places = [f"{name}_{person}" for name in frames.names], frames.places[0]
     robot = ElementTree.Element("robot", name=f"human_{person}")
     limbs = {f"{FRAMES.get(limb.name, limb.name)}_{person}": limb for limb in body.limbs}
-    for name, (parent, pose) in frames.items():
+    for number, (name, parent) in enumerate(zip(ids, frames.parents, strict=True)):
         link = ElementTree.SubElement(robot, "link", name=name)
         if name in limbs:
             shape, place = limbs[name].shape, rest[limbs[name].name]
             visual = ElementTree.SubElement(link, "visual")
-            middle = place[:3, 3] + 0.5 * shape.length * place[:3, 2] - pose[:3, 3]
+            middle = place[:3, 3] + 0.5 * shape.length * place[:3, 2] - places[number]
             _origin(visual, middle, euler_angles(place[None, :3, :3], "ZYX")[0][::-1])
             radius = (shape.a0 + shape.a1 + shape.b0 + shape.b1) / 4.0
             size = {"radius": f"{radius:.4f}", "length": f"{shape.length:.4f}"}
             ElementTree.SubElement(ElementTree.SubElement(visual, "geometry"), "cylinder", size)
-        if parent is None:
+        if parent < 0:
             continue
-        offset, above = pose[:3, 3] - frames[parent][1][:3, 3], parent
+        offset, above = places[number] - places[parent], ids[parent]
         turns = _JOINTS.get(name.removesuffix(f"_{person}"), ())
-        for number, (joint, axis) in enumerate(turns, 1):
-            below = name if number == len(turns) else f"{joint}_{person}"
+        for count, (joint, axis) in enumerate(turns, 1):
+            below = name if count == len(turns) else f"{joint}_{person}"
             if below != name:
                 ElementTree.SubElement(robot, "link", name=below)
             made = _joint(robot, f"{joint}_{person}", "continuous", above, below, offset)
             ElementTree.SubElement(made, "axis", xyz=_words(axis))
             offset, above = np.zeros(3), below
         if not turns:
-            _joint(robot, f"{name}_fixed", "fixed", parent, name, offset)
+            _joint(robot, f"{name}_fixed", "fixed", above, name, offset)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 

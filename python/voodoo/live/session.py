@@ -21,7 +21,6 @@ from voodoo.live.stream import Live
 from voodoo.live.upright import Upright
 from voodoo.measurements import FloatArray
 
-_TICK_S = 0.05
 _RATE_S = 2.0
 _LATE_S = 1.0
 """A receiver that holds a pose up for this long is named."""
@@ -87,7 +86,7 @@ class _Lane:
     def _run(self) -> None:
         try:
             while not self.box.closed:
-                step = self.box.take(_TICK_S)
+                step = self.box.take()
                 if step is None:
                     continue
                 for output in self.outputs:

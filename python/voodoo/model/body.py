@@ -43,6 +43,7 @@ class Body:
         name, limbs, sites = core.parts()
         self.name: str = name
         self.limbs: tuple[Limb, ...] = tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in limbs)
+        self.limb_joints: tuple[str | None, ...] = tuple(joint and joint[0] for _, _, _, joint, _ in limbs)
         self.site_names: tuple[str, ...] = tuple(site[0] for site in sites)
 
     @property

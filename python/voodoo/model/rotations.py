@@ -7,44 +7,23 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
+
 FloatArray = npt.NDArray[np.float64]
 
 _NO_TURN = 1e-3
 """Below this angle [rad] a series is used instead of a division by it."""
-_LOCKED = 1e-7
-"""Tolerance for gimbal lock: distance of the middle angle from its singular value [rad]."""
-_SKEWED = 1e-12
-"""Tolerance for the products of rows of a rotation matrix."""
 
 
 def quaternions(rotations: FloatArray) -> FloatArray:
-    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), by the largest of four divisors (Markley, "Unit quaternion
-    from rotation matrix", JGCD 2008); a matrix that is only approximately a rotation is replaced by the nearest rotation."""
-    matrices = np.asarray(rotations, dtype=np.float64)
-    skewed = np.any(
-        np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)) > _SKEWED, axis=(-2, -1), keepdims=True
-    )
-    if skewed.any():
+    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3); the largest entry of each is positive. A matrix that is only
+    approximately a rotation is replaced by the nearest rotation."""
+    matrices = np.ascontiguousarray(rotations, dtype=np.float64)
+    found, skewed = _core.quaternions(matrices)
+    if skewed:
         left, _, right = np.linalg.svd(matrices)
-        matrices = np.where(skewed, left @ right, matrices)
-    flat = matrices.reshape(-1, 3, 3)
-    trace = np.trace(flat, axis1=1, axis2=2)
-    choice = np.column_stack([np.diagonal(flat, axis1=1, axis2=2), trace]).argmax(axis=1)
-    found = np.empty((len(flat), 4))
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        own = choice == i
-        m = flat[own]
-        found[own, i] = 1.0 - trace[own] + 2.0 * m[:, i, i]
-        found[own, j] = m[:, j, i] + m[:, i, j]
-        found[own, k] = m[:, k, i] + m[:, i, k]
-        found[own, 3] = m[:, k, j] - m[:, j, k]
-    own = choice == 3
-    m = flat[own]
-    found[own, :3] = np.column_stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]])
-    found[own, 3] = 1.0 + trace[own]
-    x, y, z, w = found.T
-    found /= np.sqrt(x * x + y * y + z * z + w * w)[:, None]
-    return found.reshape(*matrices.shape[:-2], 4)
+        found, _ = _core.quaternions(left @ right)
+    return found
 
 
 def matrix_of_quaternion(quaternion: tuple[float, float, float, float]) -> FloatArray:
@@ -115,21 +94,5 @@ def euler_angles(rotations: FloatArray, order: str) -> FloatArray:
 
 def euler_angles_of_quaternions(q: FloatArray, order: str) -> FloatArray:
     """As `euler_angles`, of unit quaternions (N, 4)."""
-    i, j, k = ("XYZ".index(axis) for axis in reversed(order))
-    proper = i == k
-    if proper:
-        k = 3 - i - j
-    sign = (i - j) * (j - k) * (k - i) // 2
-    if proper:
-        a, b, c, d = q[:, 3], q[:, i], q[:, j], q[:, k] * sign
-    else:
-        a, b, c, d = q[:, 3] - q[:, j], q[:, i] + q[:, k] * sign, q[:, j] + q[:, 3], q[:, k] * sign - q[:, i]
-    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
-    middle = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b))
-    low, high = np.abs(middle) <= _LOCKED, np.abs(middle - np.pi) <= _LOCKED
-    first = np.select([low, high], [2.0 * half_sum, 2.0 * half_difference], half_sum + half_difference)
-    third = np.where(low | high, 0.0, half_sum - half_difference)
-    if not proper:
-        first, middle = sign * first, middle - np.pi / 2.0
-    angles = np.column_stack([first, middle, third])
-    return np.where(angles > np.pi, angles - 2.0 * np.pi, np.where(angles < -np.pi, angles + 2.0 * np.pi, angles))
+    first, second, third = ("XYZ".index(axis) for axis in order)
+    return _core.euler_angles(np.ascontiguousarray(q, dtype=np.float64), (first, second, third))

@@ -4,6 +4,7 @@ mod absolute_orientation;
 mod cholesky;
 mod geometry;
 mod linear_sum_assignment;
+mod rotations;
 mod simd;
 mod weighted_points;
 
@@ -12,6 +13,7 @@ pub use cholesky::solve_in_place;
 pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
 pub use linear_sum_assignment::{CostTable, linear_sum_assignment};
+pub use rotations::{euler_angles, is_skewed, quaternion};
 pub use simd::{LANES, has_avx512, widest};
 pub(crate) use weighted_points::WeightedPoints;
 

@@ -197,4 +197,4 @@ class Publication:
     @property
     def subscribers(self) -> int:
         """Number of subscribers."""
-        return len(self._writer.get_matched_subscriptions())
+        return int(self._writer.get_publication_matched_status().current_count)

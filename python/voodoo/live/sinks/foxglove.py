@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from voodoo.errors import VoodooError
-from voodoo.export.foxglove import Channels, library
+from voodoo.export.foxglove import Channels, FoxgloveRow, library, shapes_of
 from voodoo.export.ros2 import person_id
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import parts_of
-from voodoo.live.sinks.people import upright_frame, upright_person
+from voodoo.live.sinks.people import shown, upright_frame
 
 PORT = 8766
 """Foxglove's own default is that of `ws://`."""
@@ -51,12 +51,19 @@ class FoxgloveSink(Output):
         """See Output."""
         if not self._channels.are_wanted:
             return
-        people = {
-            person_id(number): (*upright_person(step, number, self._root()), step.bodies[number])
-            for number, estimate in step.estimates.items()
-            if estimate.joints and str(estimate.status) != "lost"
-        }
-        self._channels.log(step.stamp, people, upright_frame(step, self._root()))
+        people, rows = shown(step, self._root()), []
+        if people is not None and len(people.present):
+            names, parents, *_ = people.frames
+            limbs = people.posed.body.limb_names
+            shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
+            rows = [
+                FoxgloveRow(
+                    person_id(people.numbers[index]),
+                    *(names, parents, limbs, people.joints.shape[1], people.on_parents[index], shapes[index]),
+                )
+                for index in people.present.tolist()
+            ]
+        self._channels.log(step.stamp, rows, upright_frame(step, self._root()))
 
     def close(self) -> None:
         """See Output."""

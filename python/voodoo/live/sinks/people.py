@@ -1,30 +1,104 @@
-"""The persons of a step as upright skeletons, for sinks."""
+"""The persons of a step, upright, for sinks: arrays that are made once for all of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock
 from weakref import WeakKeyDictionary
 
-from voodoo.export.skeleton import Skeleton, skeleton
-from voodoo.export.track import Track
-from voodoo.export.upright import SUFFIX, by_axes, upright
-from voodoo.live.follow import Step
+import numpy as np
+import numpy.typing as npt
 
-_made: WeakKeyDictionary[Step, dict[tuple[int, str], tuple[Track, Skeleton]]] = WeakKeyDictionary()
+from voodoo._core import Estimate
+from voodoo.export.human_frames import HumanFrames, human_frames
+from voodoo.export.joint_angles import joint_angles
+from voodoo.export.ros2 import body_covariances
+from voodoo.export.skeleton import FloatArray, Skeleton, skeleton_of
+from voodoo.export.upright import SUFFIX, Turn, by_axes
+from voodoo.live.follow import Step
+from voodoo.model.body import Body
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """Persons P of a step who have a pose: stamp [s]; frame with z up of everything, and how the root frame was turned to it;
+    numbers; estimates in the root frame; bodies; joints (P, J, 3) [m]; limb poses (P, L, 4, 4); and a skeleton that has persons
+    in the place of frames."""
+
+    stamp: float
+    frame: str
+    turn: Turn
+    numbers: tuple[int, ...]
+    estimates: Sequence[Estimate]
+    bodies: Sequence[Body]
+    joints: FloatArray
+    limb_poses: FloatArray
+    posed: Skeleton
+
+    @cached_property
+    def present(self) -> npt.NDArray[np.intp]:
+        """Indices of those who are not lost."""
+        return np.array([index for index, one in enumerate(self.estimates) if one.status != "lost"], dtype=np.intp)
+
+    @cached_property
+    def frames(self) -> HumanFrames:
+        """Their frames of REP-155."""
+        return human_frames(tuple(self.estimates[0].joint_names), self.joints, self.posed)
+
+    @cached_property
+    def on_parents(self) -> FloatArray:
+        """See HumanFrames.on_parents."""
+        return self.frames.on_parents()
+
+    @cached_property
+    def angles(self) -> tuple[tuple[str, ...], FloatArray]:
+        """See joint_angles."""
+        return joint_angles(self.posed)
+
+    @cached_property
+    def covariances(self) -> FloatArray:
+        """Covariances (P, 6, 6) of the poses of their frames "body"; NaN where unknown."""
+        root, unknown = self.posed.body.limb_names[0], np.full((6, 6), np.nan)
+        turned = np.kron(np.eye(2), self.turn.pose[:3, :3]) if self.turn.words else np.eye(6)
+        found = np.array([one.limb_covariance.get(root, unknown) for one in self.estimates])
+        return body_covariances(turned @ found @ turned.T, self.frames.places[:, 0] - self.limb_poses[:, 0, :3, 3])
+
+
+_made: WeakKeyDictionary[Step, dict[str, Shown | None]] = WeakKeyDictionary()
 _lock = Lock()
 
 
-def upright_person(step: Step, number: int, root_frame: str) -> tuple[Track, Skeleton]:
-    """Track and skeleton of one frame of a person who has a pose, in the frame `upright_frame`; made once for all sinks."""
+def shown(step: Step, root_frame: str) -> Shown | None:
+    """The persons of a step who have a pose; None without any."""
     with _lock:
         known = _made.setdefault(step, {})
-        if (number, root_frame) not in known:
-            track, _ = upright(Track.of([step.estimates[number]]), root_frame, step.turn)
-            known[number, root_frame] = track, skeleton(track, step.bodies[number])
-        return known[number, root_frame]
+        if root_frame not in known:
+            known[root_frame] = _shown(step, root_frame)
+        return known[root_frame]
+
+
+def _shown(step: Step, root_frame: str) -> Shown | None:
+    there = {number: one for number, one in step.estimates.items() if len(one.joint_positions)}
+    if not there:
+        return None
+    numbers, estimates = tuple(there), tuple(there.values())
+    joints = np.array([one.joint_positions for one in estimates])
+    poses = np.array([one.limb_poses for one in estimates])
+    turn, frame = _turn(step, root_frame), upright_frame(step, root_frame)
+    if turn.words:
+        joints, poses = joints @ turn.pose[:3, :3].T + turn.pose[:3, 3], turn.pose @ poses
+    bodies = [step.bodies[number] for number in numbers]
+    stamps = np.full(len(numbers), step.stamp)
+    posed = skeleton_of(bodies, stamps, poses, tuple(estimates[0].joint_names), joints)
+    return Shown(step.stamp, frame, turn, numbers, estimates, bodies, joints, poses, posed)
 
 
 def upright_frame(step: Step, root_frame: str) -> str:
     """Name of the frame with z up: the root frame, unless that is a camera's."""
-    turn = by_axes(root_frame) if step.turn is None else step.turn
-    return f"{root_frame}{SUFFIX}" if turn.words else root_frame
+    return f"{root_frame}{SUFFIX}" if _turn(step, root_frame).words else root_frame
+
+
+def _turn(step: Step, root_frame: str) -> Turn:
+    return by_axes(root_frame) if step.turn is None else step.turn

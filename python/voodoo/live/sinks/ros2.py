@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.ros2 import BODIES, IDS, STORE, STRING, TRACKED, description, instant, person_id, tracked
-from voodoo.export.skeleton import Skeleton
-from voodoo.export.track import Track
-from voodoo.export.upright import Turn
+from voodoo.export.human_frames import placed_names
+from voodoo.export.ros2 import (
+    BODIES,
+    IDS,
+    JOINTS,
+    POSE,
+    STORE,
+    STRING,
+    TF,
+    TRACKED,
+    cdr,
+    description,
+    instant,
+    joint_message,
+    person_id,
+    pose_message,
+    root_on_parent,
+    tracked,
+    transforms_message,
+)
+from voodoo.export.template import STAMP_NS, Template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import upright_person
+from voodoo.live.sinks.people import Shown, shown
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.search import nobody
 
@@ -67,13 +85,14 @@ class Ros2Sink(Output):
         self._displayed: set[int] = set()
         self._bodies: dict[int, Body] = {}
         self._described: dict[int, float] = {}
+        self._templates: dict[str, tuple[object, Template]] = {}
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
-        self._publish_on("/tf", "tf2_msgs/msg/TFMessage", 100)
+        self._publish_on("/tf", TF, 100)
         self._publish_on(TRACKED, IDS, 1)
         # Subscribers can discover these topics before the first pose.
-        self._publish_on(f"{BODIES}/{person_id(1)}/joint_states", "sensor_msgs/msg/JointState", 10)
-        self._publish_on(f"{BODIES}/{person_id(1)}/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", 10)
+        self._publish_on(f"{BODIES}/{person_id(1)}/joint_states", JOINTS, 10)
+        self._publish_on(f"{BODIES}/{person_id(1)}/pose", POSE, 10)
         self._publish_on(f"{BODIES}/{person_id(1)}/markers", _MARKERS, 10)
 
     def publish(self, step: Step) -> None:
@@ -84,34 +103,75 @@ class Ros2Sink(Output):
             chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
             if self.on_choice is not None:
                 self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
-        observed = {number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost"}
-        for number in sorted(observed):
-            posed = upright_person(step, number, self._root())
-            self._write_person(number, step.estimates[number], step.bodies[number], step.turn, posed)
-        for number in sorted(self._displayed - observed):
-            # Markers of persons who left are deleted once.
-            body = step.bodies.get(number, self._bodies[number])
-            self._write_person(number, nobody(step.stamp), body, step.turn)
+        people = shown(step, self._root())
+        observed = set() if people is None else {people.numbers[index] for index in people.present}
+        if people is not None and observed:
+            self._write_people(people)
+        for number in self._displayed | observed:
+            # They take as long as everything else together; those of persons who left are deleted once.
+            topic = f"{BODIES}/{person_id(number)}/markers"
+            if self._publish_on(topic, _MARKERS, 10).subscribers:
+                estimate = step.estimates[number] if number in observed else nobody(step.stamp)
+                how: Any = {"root_frame": self._root(), "person": person_id(number), "turn": step.turn}
+                made = instant(estimate, step.bodies.get(number) or self._bodies[number], **how)
+                self._write({topic: made[topic]})
         self._displayed = observed
         self._bodies = {number: step.bodies[number] for number in observed}
-        self._write(tracked(step.stamp, [person_id(number) for number in sorted(observed)], root_frame=self._root()))
+        ids = [person_id(number) for number in sorted(observed)]
+        self._write(tracked(step.stamp, ids, root_frame=self._root()))
 
-    def _write_person(
+    def _write_people(self, people: Shown) -> None:
+        there, frame, (names, parents, *_) = people.present, people.frame, people.frames
+        ids = tuple(person_id(people.numbers[index]) for index in there)
+        above = () if frame == self._root() else ((self._root(), frame, root_on_parent(people.turn.pose)),)
+
+        def transforms(numbers: list[float]) -> Any:  # noqa: ANN401
+            placed = [row for person in ids for row in placed_names(names, parents, person, frame)]
+            rows = [(*row, numbers[7 * index : 7 * index + 7]) for index, row in enumerate(placed)]
+            return transforms_message(STAMP_NS, [*above, *rows])
+
+        self._send("/tf", TF, people.stamp, (ids, frame, repr(above)), lambda: people.on_parents[there], transforms)
+        for index, person in zip(there.tolist(), ids, strict=True):
+            self._write_person(people, index, person)
+        for index, person in zip(there.tolist(), ids, strict=True):  # last: it takes milliseconds
+            number, body = people.numbers[index], people.bodies[index]
+            size = float(body.core.sizes()[:, 0].sum())
+            if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
+                self._write(description(body, person))
+                self._described[number] = size
+
+    def _write_person(self, people: Shown, index: int, person: str) -> None:
+        topic, sure = f"{BODIES}/{person}", people.covariances[index]
+        self._send(
+            *(f"{topic}/joint_states", JOINTS, people.stamp, person),
+            lambda: people.angles[1][index],
+            lambda angles: joint_message(STAMP_NS, person, people.angles[0], angles),
+        )
+        if np.isfinite(sure).all():
+            self._send(
+                *(f"{topic}/pose", POSE, people.stamp, people.frame),
+                lambda: np.concatenate([people.on_parents[index, 0], sure.ravel()]),
+                lambda numbers: pose_message(STAMP_NS, people.frame, numbers[:7], numbers[7:]),
+            )
+
+    def _send(
         self,
-        number: int,
-        estimate: Estimate,
-        body: Body,
-        turn: Turn | None,
-        posed: tuple[Track, Skeleton] | None = None,
+        topic: str,
+        kind: str,
+        stamp: float,
+        key: object,
+        numbers: Callable[[], FloatArray],
+        message: Callable[[list[float]], Any],
     ) -> None:
-        person, size = person_id(number), sum(limb.shape.length for limb in body.limbs)
-        if estimate.joints and abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
-            self._write(description(body, person))
-            self._described[number] = size
-        # Markers take as long as all other messages together.
-        seen = self._publish_on(f"{BODIES}/{person}/markers", _MARKERS, 10).subscribers > 0
-        how: dict[str, Any] = {"root_frame": self._root(), "person": person, "markers": seen}
-        self._write(instant(estimate, body, **how, turn=turn, posed=posed))
+        """Publish a message, which is made again when its key changes, with numbers at a time, if somebody subscribes."""
+        publication = self._publish_on(topic, kind, 10)
+        if publication.subscribers:
+            values = numbers().ravel()
+            key = key, len(values)
+            if self._templates.get(topic, (None,))[0] != key:
+                made = Template(lambda found: cdr(message(found)), len(values), kind="<f8", stamp=_stamp(STAMP_NS))
+                self._templates[topic] = key, made
+            publication.write(self._templates[topic][1].filled(values, _stamp(round(stamp * 1e9))))
 
     def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
         if topic not in self._topics:
@@ -124,3 +184,8 @@ class Ros2Sink(Output):
             kind = message.__msgtype__
             depth = 1 if kind == STRING else 10
             self._publish_on(topic, kind, depth).write(bytes(STORE.serialize_cdr(message, kind)))
+
+
+def _stamp(nanoseconds: int) -> bytes:
+    """A stamp in CDR."""
+    return struct.pack("<iI", *divmod(nanoseconds, 1_000_000_000))

@@ -9,16 +9,19 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
+from itertools import accumulate, pairwise
 
 import numpy as np
 
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.skeleton import FloatArray, Skeleton
+from voodoo.export.template import Template
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import parts_of
-from voodoo.live.sinks.people import upright_person
+from voodoo.live.sinks.people import shown
 from voodoo.model.rotations import matrix_of_turn, quaternions
 
 PORT = 39539
@@ -65,6 +68,7 @@ class VmcSink(Output):
         except OSError as error:
             raise VoodooError(f"{address}: expected the name or address of a host, found: {error.strerror}") from error
         self._start: float | None = None
+        self._templates: dict[tuple[str, ...], tuple[Template, list[int]]] = {}
 
     def publish(self, step: Step) -> None:
         """See Output.
@@ -74,14 +78,26 @@ class VmcSink(Output):
             OSError: nobody receives.
         """
         self._start = step.stamp if self._start is None else self._start
-        shown = sorted(number for number, one in step.estimates.items() if one.joints and str(one.status) != "lost")
-        messages: list[tuple[str | float, ...]] = [("/OK", int(bool(shown))), ("/T", step.stamp - self._start)]
-        if shown:
-            messages.append(("/Root/Pos", "root", *(0.0,) * 6, 1.0))
-            _, posed = upright_person(step, shown[0], self._root())
-            messages += [("/Bone/Pos", *row) for row in bones_of(posed, self.name)]
-        for first in range(0, len(messages), _TOGETHER):
-            self._send(self._bundle(messages[first : first + _TOGETHER]))
+        people, numbers = shown(step, self._root()), np.empty(0)
+        names: tuple[str, ...] = ()
+        if people is not None and len(people.present):
+            first = min(people.present.tolist(), key=lambda index: people.numbers[index])
+            names, numbers = bones_of(people.posed, first, self.name)
+        if names not in self._templates:
+            lengths = map(len, self._datagrams(names, [0.0] * (1 + numbers.size)))
+            whole = Template(lambda given: b"".join(self._datagrams(names, given)), 1 + numbers.size, kind=">f4")
+            self._templates = {names: (whole, [0, *accumulate(lengths)])}
+        template, ends = self._templates[names]
+        sent = template.filled(np.concatenate([[step.stamp - self._start], numbers.ravel()]))
+        for first, end in pairwise(ends):
+            self._send(sent[first:end])
+
+    def _datagrams(self, names: tuple[str, ...], numbers: list[float]) -> list[bytes]:
+        """Messages of the time and of bones, whose seven numbers each follow it."""
+        messages: list[tuple[str | float, ...]] = [("/OK", int(bool(names))), ("/T", numbers[0])]
+        messages += [("/Root/Pos", "root", *(0.0,) * 6, 1.0)] if names else []
+        messages += [("/Bone/Pos", name, *numbers[7 * at + 1 : 7 * at + 8]) for at, name in enumerate(names)]
+        return [self._bundle(messages[first : first + _TOGETHER]) for first in range(0, len(messages), _TOGETHER)]
 
     def _bundle(self, messages: list[tuple[str | float, ...]]) -> bytes:
         bundle = self._bundle_of(0)
@@ -101,34 +117,42 @@ class VmcSink(Output):
         self._socket.close()
 
 
-def bones_of(posed: Skeleton, address: str) -> list[tuple[str | float, ...]]:
-    """Rows of /VMC/Ext/Bone/Pos: name, position on the parent (3) [m], rotation relative to it (4) as x, y, z, w.
+def bones_of(posed: Skeleton, index: int, address: str) -> tuple[tuple[str, ...], FloatArray]:
+    """Names for /VMC/Ext/Bone/Pos, and position on the parent (3) [m] and rotation relative to it (4) as x, y, z, w of each.
 
     Rotations of an avatar in T-pose that looks along the x axis of the world are the identity.
 
     Args:
-        posed: one frame, z up.
+        posed: with z up.
+        index: of the frame.
         address: named in the error.
 
     Raises:
         VoodooError: the body lacks bones without which an avatar does not move.
     """
-    parts = posed.bones
+    chosen, names, parents, arms = _avatar(posed.limbs, address)
+    turns, heads = posed.rotations[index] @ arms, posed.heads[index]
+    # The root is on the origin of the world.
+    turns, heads = np.concatenate([turns, np.eye(3)[None]]), np.concatenate([heads, np.zeros((1, 3))])
+    above = _UNITY @ turns[parents].swapaxes(1, 2)
+    places = (above @ (heads[chosen] - heads[parents])[..., None])[..., 0]
+    return names, np.concatenate([places, quaternions(above @ turns[chosen] @ _UNITY.T)], axis=1)
+
+
+@lru_cache(maxsize=8)
+def _avatar(
+    limbs: tuple[tuple[str, int | None], ...], address: str
+) -> tuple[list[int], tuple[str, ...], list[int], FloatArray]:
+    """Limbs that are bones of an avatar, their names and parents (-1: the world), and the turns of all limbs to its rest pose."""
     quarter = {"l": matrix_of_turn((-_TURN, 0.0, 0.0)), "r": matrix_of_turn((_TURN, 0.0, 0.0))}
-    arms = [
-        quarter.get(bone.name[0], np.eye(3)) if bone.name.partition("_")[2] in _ARM else np.eye(3) for bone in parts
-    ]
-    turns = posed.rotations[0] @ np.array(arms)
-    above = np.array([np.eye(3) if bone.parent is None else turns[bone.parent] for bone in parts]).transpose(0, 2, 1)
-    origins = np.array([np.zeros(3) if bone.parent is None else posed.heads[0, bone.parent] for bone in parts])
-    local = quaternions(_UNITY @ above @ turns @ _UNITY.T).tolist()
-    places = (_UNITY @ above @ (posed.heads[0] - origins)[..., None])[..., 0].tolist()
-    names = [names_of(bone.name).vrm for bone in parts]
-    rows = {name: (name, *place, *turn) for name, place, turn in zip(names, places, local, strict=True) if name}
+    arms = [quarter.get(limb[0], np.eye(3)) if limb.partition("_")[2] in _ARM else np.eye(3) for limb, _ in limbs]
+    rows = {names_of(limb).vrm: (index, -1 if up is None else up) for index, (limb, up) in enumerate(limbs)}
+    rows.pop("", None)
     if missing := [name for name in _NEEDED if name not in rows]:
-        limbs = [limb for limb, names in NAMES.items() if names.vrm in missing and limb != "torso"]
+        needed = [limb for limb, names in NAMES.items() if names.vrm in missing and limb != "torso"]
         raise VoodooError(
-            f"{address}: expected the body of a human, with the limbs {', '.join(limbs)}, found "
-            f"{', '.join(bone.name for bone in parts)}"
+            f"{address}: expected the body of a human, with the limbs {', '.join(needed)}, found "
+            f"{', '.join(limb for limb, _ in limbs)}"
         )
-    return list(rows.values())
+    chosen, parents = zip(*rows.values(), strict=True)
+    return list(chosen), tuple(rows), list(parents), np.array(arms)

@@ -9,18 +9,20 @@ import math
 import re
 import socket
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 from urllib.parse import parse_qs
 
+import numpy as np
+
 from voodoo.errors import VoodooError
-from voodoo.export.skeleton import Skeleton
-from voodoo.export.track import Track
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import parts_of
-from voodoo.live.sinks.people import upright_frame, upright_person
+from voodoo.live.sinks.people import shown, upright_frame
 from voodoo.model.rotations import quaternions
 
 FORMAT, VERSION = "voodoo.people", 1
@@ -53,18 +55,18 @@ class WebSocketSink(Output):
     def __init__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> None:
         """Start the server."""
         try:
-            from websockets.asyncio.server import serve
+            from websockets.asyncio.server import broadcast, serve
             from websockets.exceptions import ConnectionClosed
         except ImportError:
             raise VoodooError(
                 f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
             ) from None
         self.name, self.receiver = address, True
-        self._root, self._on_message, self._left = root_frame, on_message, ConnectionClosed
+        self._root, self._on_message, self._left, self._broadcast = root_frame, on_message, ConnectionClosed, broadcast
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
         origins = [None, _OWN_PAGES, *parse_qs(parts.query).get("origin", ())]
         self._loop = asyncio.new_event_loop()
-        self._newest: asyncio.Future[str] = self._loop.create_future()
+        self._late: dict[Any, tuple[float, bool]] = {}
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
 
@@ -83,16 +85,27 @@ class WebSocketSink(Output):
     def publish(self, step: Step) -> None:
         """See Output."""
         if self._server.connections:
-            self._loop.call_soon_threadsafe(self._put, json.dumps(message_of(step, self._root()), allow_nan=False))
+            self._loop.call_soon_threadsafe(self._put, message_of(step, self._root()))
 
     def _put(self, text: str) -> None:
-        self._newest.set_result(text)
-        self._newest = self._loop.create_future()
+        """Send to all who took what they were sent before."""
+        now, free = time.monotonic(), []
+        for connection in self._server.connections:
+            since, named = self._late.pop(connection, (now, False))
+            if not connection.transport.get_write_buffer_size():
+                free.append(connection)
+                if named:
+                    self._on_message(f"{self._who(connection)} takes poses again")
+                continue
+            if not named and now - since > _LATE_S:
+                self._on_message(f"{self._who(connection)} takes nothing; it gets the newest pose when it does")
+                named = True
+            self._late[connection] = since, named
+        self._broadcast(free, text)
 
     async def _serve(self, connection: Any) -> None:  # noqa: ANN401 - of websockets
-        """Send until the receiver leaves; what it says is not heard."""
+        """Wait until the receiver leaves; what it says is not heard."""
         connection.transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
-        sender = asyncio.ensure_future(self._send_all(connection))
         try:
             async for _ in connection:
                 pass
@@ -100,20 +113,7 @@ class WebSocketSink(Output):
             if left.rcvd is None:
                 self._on_message(f"{self._who(connection)} is gone")
         finally:
-            sender.cancel()
-
-    async def _send_all(self, connection: Any) -> None:  # noqa: ANN401 - of websockets
-        late = False
-        with suppress(self._left):
-            while True:
-                sending = asyncio.ensure_future(connection.send(await asyncio.shield(self._newest)))
-                done, _ = await asyncio.wait({sending}, timeout=_LATE_S)
-                if not done and not late:
-                    self._on_message(f"{self._who(connection)} takes nothing; it gets the newest pose when it does")
-                await sending
-                if late and done:
-                    self._on_message(f"{self._who(connection)} takes poses again")
-                late = not done
+            self._late.pop(connection, None)
 
     def _who(self, connection: Any) -> str:  # noqa: ANN401 - of websockets
         return f"{self.name}: {connection.remote_address[0]}:{connection.remote_address[1]}"
@@ -130,37 +130,43 @@ class WebSocketSink(Output):
         self._thread.join(_CLOSE_S)
 
 
-def message_of(step: Step, root_frame: str) -> dict[str, Any]:
-    """The message of a step, see docs/how-to/stream.md."""
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "stamp_s": step.stamp,
-        "frame": upright_frame(step, root_frame),
-        "people": [
-            _person(number, *upright_person(step, number, root_frame))
-            for number, estimate in step.estimates.items()
-            if estimate.joints
-        ],
-    }
+def message_of(step: Step, root_frame: str) -> str:
+    """The message of a step as JSON, see docs/how-to/stream.md."""
+    people = shown(step, root_frame)
+    if people is None:
+        return _format(upright_frame(step, root_frame), (), (), ()) % repr(step.stamp)
+    limbs = people.posed.limbs
+    # Whole numbers of 10 um and of 1e-6 are written several times as fast as others.
+    bones = np.concatenate([1e5 * people.posed.heads, 1e6 * quaternions(people.posed.rotations)], axis=2)
+    rows = np.concatenate([1e5 * people.joints.reshape(len(bones), -1), bones.reshape(len(bones), -1)], axis=1)
+    values: list[Any] = [repr(step.stamp)]
+    for estimate, row in zip(people.estimates, np.rint(rows).astype(np.int64).tolist(), strict=True):
+        residual = estimate.residual
+        values += [estimate.status, repr(residual) if math.isfinite(residual) else "null", *row]
+        values += estimate.limb_status.values() or [""] * len(limbs)
+    return _format(people.frame, people.numbers, tuple(people.estimates[0].joint_names), limbs) % tuple(values)
 
 
-def _person(number: int, track: Track, posed: Skeleton) -> dict[str, Any]:
-    residual = float(track.residual[0])
-    turns = quaternions(posed.rotations[0]).round(6).tolist()
+_WRITTEN = {
+    "\0word": '"%s"', "\0value": "%s", "\0place": "[%de-5, %de-5, %de-5]", "\0turn": "[%de-6, %de-6, %de-6, %de-6]",
+}  # fmt: skip
+"""Values of a message, and how they are formatted; names cannot begin like them."""
+
+
+@lru_cache(maxsize=16)
+def _format(
+    frame: str, numbers: tuple[int, ...], joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
+) -> str:
+    """A message in which only values are missing, which `%` fills in."""
     bones = {
-        bone.name: {
-            "parent": None if bone.parent is None else posed.bones[bone.parent].name,
-            "position": place,
-            "rotation": turn,
-        }
-        for bone, place, turn in zip(posed.bones, posed.heads[0].round(5).tolist(), turns, strict=True)
+        name: {"parent": None if above is None else limbs[above][0], "position": "\0place", "rotation": "\0turn"}
+        for name, above in limbs
     }
-    return {
-        "id": number,
-        "status": track.status[0],
-        "residual_m": residual if math.isfinite(residual) else None,
-        "joints": dict(zip(track.joint_names, track.joints[0].round(5).tolist(), strict=True)),
-        "bones": bones,
-        "limb_status": {limb: words[0] for limb, words in track.limb_status.items()},
-    }
+    person = {"status": "\0word", "residual_m": "\0value", "joints": dict.fromkeys(joint_names, "\0place")}
+    person |= {"bones": bones, "limb_status": dict.fromkeys((name for name, _ in limbs), "\0word")}
+    people = [{"id": number, **person} for number in numbers]
+    whole = {"format": FORMAT, "version": VERSION, "stamp_s": "\0value", "frame": frame, "people": people}
+    text = json.dumps(whole).replace("%", "%%")
+    for value, written in _WRITTEN.items():
+        text = text.replace(json.dumps(value), written)
+    return text

@@ -1,0 +1,49 @@
+//! Rotations of many frames and limbs at once.
+
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use voodoo_core::math::{self, Mat3};
+
+use crate::errors::exception;
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+/// The leading axes of an array that ends with the given ones.
+fn leading<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, last: &[usize]) -> PyResult<&'a [usize]> {
+    array.shape().strip_suffix(last).ok_or_else(|| {
+        let text = format!("rotations: expected shape (..., {last:?}), found {:?}", array.shape());
+        exception(array.py(), "MeasurementError", text)
+    })
+}
+
+#[doc = stub!("quaternions")]
+#[pyfunction]
+pub(crate) fn quaternions<'py>(
+    py: Python<'py>,
+    rotations: PyReadonlyArrayDyn<'py, f64>,
+) -> PyResult<(Array<'py>, bool)> {
+    let shape = [leading(&rotations, &[3, 3])?, &[4]].concat();
+    let (mut found, mut skewed) = (Vec::with_capacity(shape.iter().product()), false);
+    for rows in rotations.as_slice()?.as_chunks::<9>().0 {
+        let matrix = Mat3::from_cols_array(rows).transpose();
+        found.extend(math::quaternion(&matrix));
+        skewed |= math::is_skewed(&matrix);
+    }
+    Ok((PyArray1::from_vec(py, found).reshape(shape)?, skewed))
+}
+
+#[doc = stub!("euler_angles")]
+#[pyfunction]
+pub(crate) fn euler_angles<'py>(
+    py: Python<'py>,
+    quaternions: PyReadonlyArrayDyn<'py, f64>,
+    order: [usize; 3],
+) -> PyResult<Array<'py>> {
+    let shape = [leading(&quaternions, &[4])?, &[3]].concat();
+    if order[0] == order[1] || order[1] == order[2] || order.iter().any(|axis| *axis > 2) {
+        return Err(exception(py, "MeasurementError", format!("order: expected axes that differ, found {order:?}")));
+    }
+    let rows = quaternions.as_slice()?.as_chunks::<4>().0;
+    let found = rows.iter().flat_map(|row| math::euler_angles(row, order)).collect();
+    PyArray1::from_vec(py, found).reshape(shape)
+}
