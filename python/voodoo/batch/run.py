@@ -20,7 +20,7 @@ from voodoo.batch.storage import Store, named
 from voodoo.batch.summary import FAILED, REPORTS, Row, read_table, write_index, write_table
 from voodoo.batch.task import Job, Settings, do, failed, stored_row
 from voodoo.children import children
-from voodoo.errors import VoodooError, installed, reading
+from voodoo.errors import VoodooError, reading
 
 SUMMARY, SETTINGS, INDEX = "summary.csv", "settings.json", "index.html"
 _EVERY_S, _FRACTION = 2.0, 0.05
