@@ -80,6 +80,35 @@ def test_a_damaged_chunk_costs_its_messages_and_no_others(tmp_path, compression)
         list(open_recording(path, use=("depth",)))
 
 
+def test_a_damaged_index_does_not_multiply_what_is_lost(tmp_path):
+    """It announces 2**27 messages in gigabytes, for a chunk that is damaged as well."""
+    path = tmp_path / "x.mcap"
+    places = write_mcap(path, chunks(2))
+    flip(path, places[1][0] + 20)
+    content = bytearray(path.read_bytes())
+    index = content.rindex(b"\x04\0\0\0zstd")  # the length of the chunk's index is before it, its size behind
+    for at in (index - 8, index + 16):
+        content[at : at + 8] = (2**31).to_bytes(8, "little")
+    path.write_bytes(content)
+    stamps, left_out = frames_of(path)
+    assert len(stamps) == 4 and 4 <= left_out.counts["in a damaged chunk"] < len(content) / 16
+
+
+@pytest.mark.parametrize("number", [2**63, -1])
+def test_numbers_of_messages_that_cannot_be_are_refused(tmp_path, number):
+    path = tmp_path / "x.mcap"
+    write_mcap(path, chunks(1))
+    content = bytearray(path.read_bytes())
+    statistics = content.rindex(b"\x0b" + (66).to_bytes(8, "little"))
+    if number > 0:
+        content[statistics + 67 : statistics + 75] = number.to_bytes(8, "little")
+    else:  # they follow from the length of the index of the chunk
+        content[statistics], index = 0x7F, content.rindex(b"\x04\0\0\0zstd")
+        content[index - 8 : index] = bytes(8)
+    path.write_bytes(content)
+    refused(run("info", path), "x.mcap: expected the number of messages on /d/depth/", "in the index, found")
+
+
 def test_a_wrong_checksum_is_the_reason_told(tmp_path):
     path = tmp_path / "x.mcap"
     ((at, length),) = write_mcap(path, chunks(1), compression="")

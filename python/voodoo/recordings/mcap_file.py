@@ -27,9 +27,10 @@ _MOST_OF_ALL = {_SCHEMA: 16 * MOST_METADATA, _CHANNEL: MOST_METADATA}
 """Largest size of all schemas, and of all channels [bytes]."""
 _ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
 _MOST_NESTED, _MOST_COMMAS = 50, 10_000
-_SMALLEST_MESSAGE = 31
-_MOST_LOST = 1_000_000
-"""Largest number of messages that a damaged chunk is taken to have had, because the index may be damaged as well."""
+_MOST_LOST = 100_000
+_INDEX_BYTES = 16
+"""Largest number of messages that damaged chunks are taken to have had, and the size of each in the index of the file, because
+that may be damaged as well."""
 DAMAGED = "in a damaged chunk"
 """Reason of messages that are left out."""
 
@@ -83,8 +84,9 @@ class McapFile(McapReader):
         first = -1 if start is None else start
         # The first item of every chunk is its start, so that a chunk is unpacked only when its time has come.
         is_back = self._is_back(wanted)
+        plausible = iter(range(min(_MOST_LOST, self._file.stat().st_size // _INDEX_BYTES)))
         sources = [
-            self._of_chunk(chunk, wanted, first, as_written=is_back)
+            self._of_chunk(chunk, wanted, first, plausible, as_written=is_back)
             for chunk in sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
             if first <= chunk.message_end_time
             and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
@@ -106,7 +108,7 @@ class McapFile(McapReader):
             return False  # the damage is told where the messages are read
 
     def _of_chunk(
-        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int, *, as_written: bool
+        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int, plausible: Iterator[int], *, as_written: bool
     ) -> Iterator[tuple[int, int, Item | None]]:
         yield chunk.message_start_time, 0, None
         found: list[tuple[int, int, bytes]] = []
@@ -124,10 +126,9 @@ class McapFile(McapReader):
             yield time, chunk.chunk_start_offset, (wanted[one], time, data)
         if lost is None:
             return
-        most = min(_MOST_LOST, chunk.uncompressed_size // _SMALLEST_MESSAGE)
         for one, connection in wanted.items():
             count = chunk.channel_count.get(one, 0) - sum(entry[1] == one for entry in found)
-            for _ in range(min(count, most)):
+            for _ in itertools.islice(plausible, max(count, 0)):
                 yield chunk.message_end_time, chunk.chunk_start_offset, (connection, chunk.message_end_time, lost)
 
     def _content(self, chunk: ChunkInfo) -> bytes:

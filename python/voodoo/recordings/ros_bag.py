@@ -72,6 +72,11 @@ class Bag:
                 self.realsense: bool = not self.is_ros2 and realsense.is_recorders(item.name for item in self.topics)
                 self.start_time: int = reader.metadata.start_time
                 self.end_time: int = reader.metadata.end_time
+            for topic in self.topics:
+                if not 0 <= topic.messages <= MOST_RECORDED:
+                    raise RecordingError(
+                        f"{self.path}: expected the number of messages on {topic.name} in the index, found {topic.messages}"
+                    )
             if isinstance(reader, BagFolder):
                 self._check_metadata(reader)
 
