@@ -266,10 +266,10 @@ def crash(points: int | None, *, seed: int = 0, only: str = "", at: int | None =
 
     import damage
     import voodoo.cli.live_run
-    import voodoo.cli.track
+    import voodoo.cli.running
 
     os.environ["RAYON_NUM_THREADS"] = "1"
-    voodoo.cli.track.TOGETHER = voodoo.cli.live_run._TOGETHER = TOGETHER
+    voodoo.cli.running.TOGETHER = voodoo.cli.live_run._TOGETHER = TOGETHER
     voodoo.cli.live_run.warm_up = lambda: None
     layer, report = ctypes.CDLL(os.environ["LD_PRELOAD"]), Report()
     names = [name for name in KINDS if only in ("", name) and all(map(importlib.util.find_spec, NEEDS.get(name, ())))]
