@@ -33,7 +33,7 @@ from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
-from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, removed
+from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, naming, removed
 
 ONE = 1
 """Number of the person if only one is tracked."""
@@ -103,11 +103,12 @@ class Spool:
         self._made = None
         self._bodies.update(bodies)
         self.frames += 1
-        if isinstance(estimate, Track):
-            self.states.update(estimate.status)
+        if isinstance(estimate, PeopleEstimate):
+            words: Sequence[str] = [str(one.estimate.status) for one in estimate]
         else:
-            poses = [one.estimate for one in estimate] if isinstance(estimate, PeopleEstimate) else [estimate]
-            self.states.update(str(pose.status) for pose in poses)
+            words = estimate.status if isinstance(estimate, Track) else (str(estimate.status),)
+        for word in words:
+            self.states[word] += 1
         self.persons.update(bodies)
         if len(self._waiting) >= self._together:
             self._put_away()
@@ -124,8 +125,11 @@ class Spool:
             arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
             arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
         path = self._hidden.folder / f"{len(self._parts):08d}.npz"
-        with appearing_whole(path) as place, place.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
+        place = path.with_suffix(".part")
+        with naming(path):
+            with place.open("wb") as file:
+                np.savez(file, allow_pickle=False, **arrays)
+            move_whole(place, path)
         if not self._parts and self._kept_for:
             self._keep(self._kept_for)
         self._bodies_at = time.monotonic() if BODIES in arrays else self._bodies_at
