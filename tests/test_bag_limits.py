@@ -5,11 +5,13 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import time
 import zipfile
 
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag1.reader import IndexData
 
 import voodoo
 from bag_writer import ROS1, Messages, write_bag
@@ -20,6 +22,7 @@ from voodoo.export.people import PeopleTrack
 from voodoo.export.people_rows import is_people_file
 from voodoo.export.track import Track
 from voodoo.recordings import open_recording
+from voodoo.recordings.bag_files import Ros1File
 from voodoo.recordings.left_out import LeftOut
 from voodoo.unpacking import Unpacking
 
@@ -163,6 +166,17 @@ def test_a_damaged_chunk_of_ros1_costs_its_messages(tmp_path, compression):
         assert left_out.counts == {"in a damaged chunk": 1}
     else:
         assert left_out.counts == {"in a damaged chunk": 2 * (18 - len(stamps))}
+
+
+def test_a_message_of_ros1_is_close_to_its_place_in_the_index(tmp_path):
+    """Millions of records that are skipped before each message would take hours."""
+    (tmp_path / "x.bag").write_bytes(b"")
+    reader = Ros1File(tmp_path / "x.bag", Unpacking())
+    reader._last = 0, 1_000_000 * b"\x08\0\0\0\x04\0\0\0op=\x07\0\0\0\0"
+    began = time.process_time()
+    with pytest.raises(ValueError, match="expected a message, found none"):
+        reader._message(IndexData(0, 0, 0))
+    assert time.process_time() - began < 0.5
 
 
 def sqlite_bag(folder, count=30, **how):
