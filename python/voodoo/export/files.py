@@ -155,13 +155,12 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | 
         with on_stdout(path) as file:
             track.save(file)
         return
-    with appearing_whole(path) as place:
-        if path.suffix in ONE_PERSON:
-            ONE_PERSON[path.suffix](place, upright(track, root_frame, turn)[0], body)
-        elif is_foxglove(path):
-            write_foxglove(place, {"p1": (track, body)}, root_frame=root_frame, turn=turn)
-        elif path.suffix == ".glb":
-            write_glb(place, {path.stem: (upright(track, root_frame, turn)[0], body)})
-        else:
-            with bag_folder(place) as folder:
-                write_bag(folder, track, body, root_frame=root_frame, turn=turn)
+    if path.suffix in ONE_PERSON:
+        ONE_PERSON[path.suffix](path, upright(track, root_frame, turn)[0], body)
+    elif is_foxglove(path):
+        write_foxglove(path, {"p1": (track, body)}, root_frame=root_frame, turn=turn)
+    elif path.suffix == ".glb":
+        write_glb(path, {path.stem: (upright(track, root_frame, turn)[0], body)})
+    else:
+        with appearing_whole(path) as place, bag_folder(place) as folder:
+            write_bag(folder, track, body, root_frame=root_frame, turn=turn)

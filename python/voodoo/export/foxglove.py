@@ -16,6 +16,7 @@ from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
+from voodoo.whole import appearing_whole
 
 SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
@@ -132,7 +133,7 @@ def write_foxglove(
     joints as spheres). In searching frames nobody is there.
 
     Args:
-        path: a file that does not exist.
+        path: .foxglove.mcap file.
         people: REP-155 id -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
         turn: see `write_bag`.
@@ -152,7 +153,7 @@ def write_foxglove(
         posed[person] = track, skeleton(track, body), body
         for index, (stamp, found) in enumerate(zip(track.stamps.tolist(), track.found.tolist(), strict=True)):
             frames.setdefault(stamp, {}).update({person: index} if found else {})
-    with foxglove.open_mcap(str(path), context=context):
+    with appearing_whole(Path(path)) as place, foxglove.open_mcap(str(place), context=context):
         for stamp, there in sorted(frames.items()):
             channels.log(stamp, {name: _at(*posed[name], index) for name, index in there.items()}, root)
 

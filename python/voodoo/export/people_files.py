@@ -40,22 +40,19 @@ def save_people(
         for one in result.tracks:
             own = path.with_name(f"{path.stem}_{one}{path.suffix}")
             track, _ = upright(result.unbroken(one), root_frame, turn)
-            with appearing_whole(own) as place:
-                ONE_PERSON[path.suffix](place, track, bodies[one])
+            ONE_PERSON[path.suffix](own, track, bodies[one])
             written.append(own)
         return written
     if is_bag(path) or is_foxglove(path):
         people = {person_id(one): (result.unbroken(one, to_the_end=True), bodies[one]) for one in result.tracks}
-        with appearing_whole(path) as place:
-            if is_foxglove(path):
-                write_foxglove(place, people, root_frame=root_frame, turn=turn)
-            else:
-                with bag_folder(place) as folder:
-                    write_people_bag(folder, people, root_frame=root_frame, turn=turn)
+        if is_foxglove(path):
+            write_foxglove(path, people, root_frame=root_frame, turn=turn)
+        else:
+            with appearing_whole(path) as place, bag_folder(place) as folder:
+                write_people_bag(folder, people, root_frame=root_frame, turn=turn)
     elif path.suffix == ".glb":
         shown = {one: upright(result.unbroken(one, to_the_end=True), root_frame, turn)[0] for one in result.tracks}
-        with appearing_whole(path) as place:
-            write_glb(place, {f"{path.stem}_{one}": (track, bodies[one]) for one, track in shown.items()})
+        write_glb(path, {f"{path.stem}_{one}": (track, bodies[one]) for one, track in shown.items()})
     else:
         with on_stdout(path) as file:
             result.save(file)
