@@ -394,6 +394,15 @@ def test_arrays_of_results_are_limited(tmp_path):
             read(tmp_path / "x.npz")
 
 
+def test_a_long_result_is_read_whatever_its_size(tmp_path, monkeypatch):
+    monkeypatch.setattr("voodoo.unpacking.MOST_UNPACKED", 1000)
+    numbers = np.random.default_rng(1).normal(size=(50, 4, 3))
+    names = tuple("abcd")
+    track = Track(np.arange(50.0), 50 * ("tracking",), np.zeros(50), names, numbers, (), np.empty((50, 0, 4, 4)))
+    track.save(tmp_path / "x.npz")
+    assert len(Track.load(tmp_path / "x.npz")) == 50
+
+
 # Files that are none, and what they say of themselves
 
 
