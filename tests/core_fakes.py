@@ -71,6 +71,10 @@ class Estimate:
         return tuple(self.joints)
 
     @property
+    def limb_names(self):
+        return tuple(self.world_from_limb)
+
+    @property
     def joint_positions(self):
         return np.array(list(self.joints.values())).reshape(-1, 3)
 

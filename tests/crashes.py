@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
+import warnings
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,11 +50,16 @@ KINDS = {
     "csv": Kind((*TRACK, "--out", "pose.csv"), ("pose.csv",)),
     "npz": Kind((*TRACK, "--out", "pose.npz"), ("pose.npz",)),
     "bvh trc": Kind((*TRACK, "--out", "pose.bvh", "--out", "pose.trc"), ("pose.bvh", "pose.trc")),
+    "c3d mot glb": Kind(
+        (*TRACK, "--out", "pose.c3d", "--out", "pose.mot", "--out", "pose.sto", "--out", "pose.glb"),
+        ("pose.c3d", "pose.mot", "pose.sto", "pose.glb"),
+    ),
     "mcap": Kind((*TRACK, "--out", "pose.mcap"), ("pose.mcap",)),
     "bag": Kind((*TRACK, "--out", "pose"), ("pose",)),
     "film": Kind((*TRACK, "--out", "pose.csv", "--overlay", "look.mp4"), ("pose.csv",), ("look.mp4",)),
     "pictures": Kind((*TRACK, "--out", "pose.csv", "--overlay", "look"), ("pose.csv",), ("look",)),
     "people": Kind((*PEOPLE, "--out", "pose.csv", "--out", "pose.npz"), ("pose.csv", "pose.npz")),
+    "ik": Kind(("ik", "REC", "--pictures", "none", "--out", "pose.csv", "--out", "pose.npz"), ("pose.csv", "pose.npz")),
     "live": Kind((*LIVE, "--out", "pose.csv", "--report", "r.json"), ("pose.csv",), ("r.json",)),
     "record": Kind((*LIVE, "--record", "take.mcap"), (), ("take.mcap",)),
     "batch": Kind(("job",), (), ("summary.csv", "settings.json", "frames/recording=rec/part-0.parquet")),
@@ -102,6 +108,7 @@ def command(kind: Kind, folder: Path, recording: Path) -> tuple[int, str]:
 
 def is_whole(path: Path) -> bool:
     """Whether a file or folder is a complete result; raises an error otherwise."""
+    import c3d
     import cv2
 
     from voodoo.export.people import PeopleTrack
@@ -113,7 +120,15 @@ def is_whole(path: Path) -> bool:
         people = path.read_bytes().startswith(b"stamp_s,person")
         people = people or (path.suffix == ".npz" and b"persons.npy" in path.read_bytes())
         return len((PeopleTrack if people else Track).load(path)) > 0
-    if path.suffix in (".bvh", ".trc"):
+    if path.suffix == ".c3d":
+        with path.open("rb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            reader = c3d.Reader(file)
+            return 0 < reader.frame_count == sum(1 for _ in reader.read_frames())
+    if path.suffix == ".glb":
+        content = path.read_bytes()
+        return content[:4] == b"glTF" and int.from_bytes(content[8:12], "little") == len(content)
+    if path.suffix in (".bvh", ".trc", ".mot", ".sto"):
         return path.read_text().endswith("\n") and len(path.read_text().splitlines()) > FRAMES
     if path.name == "take.mcap":
         return len(open_recording(path)) >= 0
@@ -266,10 +281,10 @@ def crash(points: int | None, *, seed: int = 0, only: str = "", at: int | None =
 
     import damage
     import voodoo.cli.live_run
-    import voodoo.cli.track
+    import voodoo.cli.running
 
     os.environ["RAYON_NUM_THREADS"] = "1"
-    voodoo.cli.track.TOGETHER = voodoo.cli.live_run._TOGETHER = TOGETHER
+    voodoo.cli.running.TOGETHER = voodoo.cli.live_run._TOGETHER = TOGETHER
     voodoo.cli.live_run.warm_up = lambda: None
     layer, report = ctypes.CDLL(os.environ["LD_PRELOAD"]), Report()
     names = [name for name in KINDS if only in ("", name) and all(map(importlib.util.find_spec, NEEDS.get(name, ())))]
@@ -277,7 +292,8 @@ def crash(points: int | None, *, seed: int = 0, only: str = "", at: int | None =
         recording = Path(top) / "rec"
         entries = damage.sound()
         damage.write(recording / "bag", entries[: damage.depth_rows(entries)[FRAMES]])
-        (recording / "init.json").write_bytes((damage.sample_path() / "init.json").read_bytes())
+        for beside in ("init.json", "truth.csv"):
+            (recording / beside).write_bytes((damage.sample_path() / beside).read_bytes())
         chosen: list[tuple[str, int, str]] = []
         tracked_before(recording)
         for name in names:

@@ -93,10 +93,12 @@ def chunk(body: bytes, rng: Random) -> bytes:
 def mcap(data: bytes, rng: Random) -> bytes:
     """An MCAP file with damaged records; offsets in its summary are right, if they were."""
     records = records_of(data[: -len(MAGIC)], len(MAGIC))
+    sound = list(records)
     for _ in range(rng.choice((1, 1, 3))):
         one = rng.randrange(len(records))
         at, code, body = records[one]
-        body = chunk(body, rng) if code == _CHUNK and rng.random() < 0.9 else changed(body, rng)
+        is_sound_chunk = code == _CHUNK and records[one] is sound[one]
+        body = chunk(body, rng) if is_sound_chunk and rng.random() < 0.9 else changed(body, rng)
         records[one] = at, code, body
     shuffled(records, rng)
     moved, place = {0: 0}, len(MAGIC)
@@ -124,10 +126,12 @@ def ros1(data: bytes, rng: Random) -> bytes:
     """A ROS 1 bag with damaged headers, messages and indices; places in the headers are right, if they were."""
     start = data.index(b"\n") + 1
     records, moved = _ros1_records(data, start), {}
+    sound = list(records)
     for _ in range(rng.choice((1, 1, 3))):
         one = rng.randrange(len(records))
         at, fields, body = records[one]
-        if fields.get(b"compression") == b"none" and rng.random() < 0.8:
+        is_sound_chunk = fields.get(b"compression") == b"none" and records[one] is sound[one]
+        if is_sound_chunk and rng.random() < 0.8:
             inner = _ros1_records(body, 0)
             row = rng.randrange(len(inner))
             inner[row] = _ros1_changed(inner[row], rng)

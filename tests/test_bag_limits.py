@@ -5,11 +5,13 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import time
 import zipfile
 
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag1.reader import IndexData
 
 import voodoo
 from bag_writer import ROS1, Messages, write_bag
@@ -20,6 +22,7 @@ from voodoo.export.people import PeopleTrack
 from voodoo.export.people_rows import is_people_file
 from voodoo.export.track import Track
 from voodoo.recordings import open_recording
+from voodoo.recordings.bag_files import Ros1File
 from voodoo.recordings.left_out import LeftOut
 from voodoo.unpacking import Unpacking
 
@@ -80,6 +83,35 @@ def test_a_damaged_chunk_costs_its_messages_and_no_others(tmp_path, compression)
         list(open_recording(path, use=("depth",)))
 
 
+def test_a_damaged_index_does_not_multiply_what_is_lost(tmp_path):
+    """It announces 2**27 messages in gigabytes, for a chunk that is damaged as well."""
+    path = tmp_path / "x.mcap"
+    places = write_mcap(path, chunks(2))
+    flip(path, places[1][0] + 20)
+    content = bytearray(path.read_bytes())
+    index = content.rindex(b"\x04\0\0\0zstd")  # the length of the chunk's index is before it, its size behind
+    for at in (index - 8, index + 16):
+        content[at : at + 8] = (2**31).to_bytes(8, "little")
+    path.write_bytes(content)
+    stamps, left_out = frames_of(path)
+    assert len(stamps) == 4 and 4 <= left_out.counts["in a damaged chunk"] < len(content) / 16
+
+
+@pytest.mark.parametrize("number", [2**63, -1])
+def test_numbers_of_messages_that_cannot_be_are_refused(tmp_path, number):
+    path = tmp_path / "x.mcap"
+    write_mcap(path, chunks(1))
+    content = bytearray(path.read_bytes())
+    statistics = content.rindex(b"\x0b" + (66).to_bytes(8, "little"))
+    if number > 0:
+        content[statistics + 67 : statistics + 75] = number.to_bytes(8, "little")
+    else:  # they follow from the length of the index of the chunk
+        content[statistics], index = 0x7F, content.rindex(b"\x04\0\0\0zstd")
+        content[index - 8 : index] = bytes(8)
+    path.write_bytes(content)
+    refused(run("info", path), "x.mcap: expected the number of messages on /d/depth/", "in the index, found")
+
+
 def test_a_wrong_checksum_is_the_reason_told(tmp_path):
     path = tmp_path / "x.mcap"
     ((at, length),) = write_mcap(path, chunks(1), compression="")
@@ -134,6 +166,17 @@ def test_a_damaged_chunk_of_ros1_costs_its_messages(tmp_path, compression):
         assert left_out.counts == {"in a damaged chunk": 1}
     else:
         assert left_out.counts == {"in a damaged chunk": 2 * (18 - len(stamps))}
+
+
+def test_a_message_of_ros1_is_close_to_its_place_in_the_index(tmp_path):
+    """Millions of records that are skipped before each message would take hours."""
+    (tmp_path / "x.bag").write_bytes(b"")
+    reader = Ros1File(tmp_path / "x.bag", Unpacking())
+    reader._last = 0, 1_000_000 * b"\x08\0\0\0\x04\0\0\0op=\x07\0\0\0\0"
+    began = time.process_time()
+    with pytest.raises(ValueError, match="expected a message, found none"):
+        reader._message(IndexData(0, 0, 0))
+    assert time.process_time() - began < 0.5
 
 
 def sqlite_bag(folder, count=30, **how):
@@ -349,6 +392,15 @@ def test_arrays_of_results_are_limited(tmp_path):
     for read in (Track.load, PeopleTrack.load, is_people_file):
         with pytest.raises(VoodooError, match=r"x\.npz: .* unpack to at most"):
             read(tmp_path / "x.npz")
+
+
+def test_a_long_result_is_read_whatever_its_size(tmp_path, monkeypatch):
+    monkeypatch.setattr("voodoo.unpacking.MOST_UNPACKED", 1000)
+    numbers = np.random.default_rng(1).normal(size=(50, 4, 3))
+    names = tuple("abcd")
+    track = Track(np.arange(50.0), 50 * ("tracking",), np.zeros(50), names, numbers, (), np.empty((50, 0, 4, 4)))
+    track.save(tmp_path / "x.npz")
+    assert len(Track.load(tmp_path / "x.npz")) == 50
 
 
 # Files that are none, and what they say of themselves

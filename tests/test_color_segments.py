@@ -95,10 +95,8 @@ def test_inverse_kinematics_takes_silhouettes_by_region(tmp_path):
     positions, known = Positions.of(recording), ["l_shoulder", "r_shoulder", "l_hip", "r_hip"]
     errors = {}
     for kind in ("none", "regions"):
-        _, found = follow(
-            recording, start_tracker(recording, model="full"), positions, sites=known, pictures=kind, rest=False
-        )
-        errors[kind] = np.nanmean(
-            [np.nanmean(found[name]) for name in ("l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_ankle", "r_ankle")]
-        )
+        tracker = start_tracker(recording, model="full")
+        steps = list(follow(recording, tracker, positions, sites=known, pictures=kind, rest=False))
+        names = ("l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_ankle", "r_ankle")
+        errors[kind] = np.mean([[step.errors[name] for name in names] for step in steps])
     assert errors["regions"] < 0.7 * errors["none"] and errors["regions"] < 0.03, errors

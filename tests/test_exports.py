@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,16 @@ from color_scene import write_videos
 from commands import run
 from measurement_data import data_folder
 from voodoo.errors import BodyError, VoodooError
-from voodoo.export import write_bag, write_bvh, write_trc
+from voodoo.export import (
+    write_bag,
+    write_bvh,
+    write_c3d,
+    write_foxglove,
+    write_glb,
+    write_mot,
+    write_sto,
+    write_trc,
+)
 from voodoo.export.files import check_target, save
 from voodoo.export.human_frames import human_frames
 from voodoo.export.joint_angles import joint_angles
@@ -110,6 +120,29 @@ def read_bvh(path: Path, *, turns=None):
             world.append((above[0] @ turn, above[1] + above[0] @ shift))
             places[name][frame] = world[-1][1]
     return places, interval
+
+
+def test_every_writer_replaces_an_old_file_whole_and_follows_no_link(tmp_path, tracked):
+    track, body = tracked
+    victim, path = tmp_path / "victim", tmp_path / "pose"
+    victim.write_text("victim")
+    people = {"p1": (track, body)}
+    writers = {
+        "bvh": lambda: write_bvh(path, track, body),
+        "trc": lambda: write_trc(path, track),
+        "c3d": lambda: write_c3d(path, track),
+        "mot": lambda: write_mot(path, track, body),
+        "sto": lambda: write_sto(path, track, body),
+        "glb": lambda: write_glb(path, people),
+    }
+    if find_spec("foxglove"):
+        writers["foxglove"] = lambda: write_foxglove(path, people, root_frame="odom")
+    for name, write in writers.items():
+        path.symlink_to(victim)
+        write()
+        assert victim.read_text() == "victim" and path.stat().st_size > 100 and not path.is_symlink(), name
+        path.unlink()
+    assert [file.name for file in tmp_path.iterdir()] == ["victim"]
 
 
 def test_bvh_gives_the_joints_back_through_its_own_kinematics(tmp_path, tracked):

@@ -1,7 +1,11 @@
 """Inverse kinematics through a recording, and `voodoo ik`."""
 
+import gc
 import json
+import os
+import signal
 import sys
+import tracemalloc
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +18,8 @@ from commands import refused
 from voodoo import ik
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
-from voodoo.pipeline.ik import KNOWN, Positions, follow
+from voodoo.pipeline.ik import KNOWN, Positions
+from voodoo.pipeline.ik import follow as follow_frames
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings.sample import sample_path
 
@@ -52,6 +57,14 @@ def some(recording):
 
 
 run = partial(commands.run, "ik")
+
+
+def follow(*args, **kwargs):
+    """The whole track, and the errors of every site in all frames."""
+    steps = list(follow_frames(*args, **kwargs))
+    names = dict.fromkeys(name for step in steps for name in step.errors)
+    errors = {name: np.array([step.errors.get(name, np.nan) for step in steps]) for name in names}
+    return Track.joined([step.track for step in steps]), errors
 
 
 def test_follow_reaches_what_is_known_and_reports_the_rest(some):
@@ -145,9 +158,10 @@ def test_what_cannot_be_followed(some, change, words):
         follow(depth_only, start_tracker(some), Positions.of(some), **change)
 
 
-def test_no_frames_and_no_reference(some):
-    with pytest.raises(voodoo.VoodooError, match="at least one frame"):
-        follow(Some(some, 0), start_tracker(some), Positions.of(some), pictures="none")
+def test_no_frames_and_no_reference(some, monkeypatch, tmp_path):
+    monkeypatch.setattr("voodoo.pipeline.ik.follow", lambda *_, **__: iter(()))
+    done = run(sample_path(), "--out", tmp_path / "pose.csv")
+    assert done.exit_code == 3 and "at least one frame" in done.stderr and not list(tmp_path.iterdir())
     bare = Some(some, 1)
     bare.reference = None
     with pytest.raises(voodoo.VoodooError, match="no reference"):
@@ -225,24 +239,31 @@ def test_sites_that_nobody_knows_are_refused_by_name(some):
         follow(some, start_tracker(some), sites=("l_wrist", "nose", "l_wirst"), **how)
 
 
-def test_ctrl_c_keeps_the_frames_up_to_there(tmp_path, monkeypatch):
-    steps = ik.Follower.step
-    count = iter(range(1000))
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_keeps_the_frames_up_to_there(tmp_path, monkeypatch, name):
+    steps, count = ik.Follower.step, iter(range(1000))
 
     def interrupted(self, *args, **kwargs):
         if next(count) == 5:
-            raise KeyboardInterrupt
+            os.kill(os.getpid(), getattr(signal, name))
         return steps(self, *args, **kwargs)
 
     monkeypatch.setattr(ik.Follower, "step", interrupted)
     done = run(sample_path(), "--pictures", "none", "--out", tmp_path / "pose.csv")
-    assert done.exit_code == 130, done.output
-    assert "interrupted: the rest of 90 frames is missing: 5 frames" in done.stderr
-    assert len(Track.load(tmp_path / "pose.csv")) == 5
+    assert done.exit_code == 128 + getattr(signal, name), done.output
+    assert "interrupted: the rest of 90 frames is missing: 6 frames" in done.stderr
+    assert len(Track.load(tmp_path / "pose.csv")) == 6 and len(list(tmp_path.iterdir())) == 1
 
 
-def test_progress_is_displayed_for_every_frame(some):
-    observed = []
-    wrap = lambda frames: (observed.append(frame.stamp) or frame for frame in frames)  # noqa: E731
-    follow(some, start_tracker(some), Positions.of(some), pictures="none", wrap=wrap)
-    assert len(observed) == len(some)
+def test_nothing_is_kept_of_a_frame(recording):
+    """The memory is that of the frame, however many there were."""
+    frames, start = 3 * list(recording), start_tracker(recording)
+    many = Some(recording, 0)
+    many.frames, used = frames, []
+    tracemalloc.start()
+    for number, _ in enumerate(follow_frames(many, start, Positions.of(recording), pictures="none")):
+        if number in (90, 269):
+            gc.collect()
+            used.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert used[1] - used[0] < 100 * 179, used

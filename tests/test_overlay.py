@@ -1,4 +1,5 @@
 import sys
+from pathlib import Path
 
 import av
 import cv2
@@ -124,6 +125,16 @@ def test_a_film_is_one_that_browsers_play(tmp_path, monkeypatch, codec):
     assert np.abs(picture.astype(int) - draw()[:height, :width]).mean() < 12
     content = (tmp_path / "look.mp4").read_bytes()
     assert content.index(b"moov") < content.index(b"mdat"), "it plays while it is loaded"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
+def test_a_film_on_a_full_disk_is_released():
+    """FFmpeg died of it: SIGSEGV."""
+    made = film_module.film(Path("/dev/full"), (64, 64, 3), rate_hz=30.0)
+    with pytest.raises(OSError, match="No space left"):
+        for number in range(40):
+            made.write(np.random.default_rng(number).integers(0, 255, (64, 64, 3)).astype(np.uint8))
+    made.release()
 
 
 def test_without_pyav_a_film_is_mpeg_4_and_says_what_to_install(tmp_path, monkeypatch):

@@ -41,13 +41,13 @@ def until(found, seconds=20.0):
     return result
 
 
-@pytest.mark.parametrize("people", ["1", "any"])
-def test_parts_are_the_whole(tmp_path, monkeypatch, people):
+@pytest.mark.parametrize("words", ["track --use depth", "track --use depth --people any", "ik --pictures none"])
+def test_parts_are_the_whole(tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)
     for together in (20, 1000):
-        monkeypatch.setattr("voodoo.cli.track.TOGETHER", together)
+        monkeypatch.setattr("voodoo.cli.running.TOGETHER", together)
         outputs = [word for name in FORMATS for word in ("--out", f"{together}/{name}")]
-        done = run("track", sample_path(), "--use", "depth", "--people", people, *outputs)
+        done = run(*words.split(), sample_path(), *outputs)
         assert done.exit_code == 0, done.output
     written = sorted(file.name for file in Path("20").iterdir())
     assert written == sorted(file.name for file in Path("1000").iterdir()) and len(written) == 4
@@ -81,22 +81,22 @@ def test_a_killed_command_is_completed_by_the_next_one(tmp_path):
     assert len(list(tmp_path.iterdir())) == 5
 
 
-@pytest.mark.parametrize("people", ["1", "any"])
-def test_recover_makes_all_formats_of_a_killed_track(tmp_path, monkeypatch, people):
+@pytest.mark.parametrize("words", ["track", "track --people any", "ik --pictures none"])
+def test_recover_makes_all_formats_of_a_killed_command(tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("voodoo.cli.track.TOGETHER", 30)
+    monkeypatch.setattr("voodoo.cli.running.TOGETHER", 30)
     child = os.fork()
     if not child:
         kill = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL)  # noqa: E731
         monkeypatch.setattr("voodoo.export.spool.Spool.write", kill)
-        run("track", sample_path(), "--people", people, *(word for name in FORMATS for word in ("--out", name)))
+        run(*words.split(), sample_path(), *(word for name in FORMATS for word in ("--out", name)))
     assert os.waitpid(child, 0)[1] == signal.SIGKILL
     (hidden,) = tmp_path.iterdir()
     assert json.loads((hidden / KEPT).read_text())["paths"] == list(FORMATS)
     (hidden / "00000001.npz").write_bytes(b"damage")
     done = run("recover", ".")
     assert done.exit_code == 1 and "00000001.npz" in done.stderr and "4 files recovered" in done.stderr
-    result = (PeopleTrack if people == "any" else Track).load("pose.npz")
+    result = (PeopleTrack if "any" in words else Track).load("pose.npz")
     assert len(result) == 60 and not hidden.exists()
 
 

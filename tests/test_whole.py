@@ -220,7 +220,7 @@ def test_a_film_or_format_that_fails_costs_no_other_output(tmp_path, monkeypatch
 def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monkeypatch, command):
     """No part can be stored after the first; the files are on another disk."""
     savez, parts = np.savez, []
-    monkeypatch.setattr("voodoo.cli.track.TOGETHER", 30)
+    monkeypatch.setattr("voodoo.cli.running.TOGETHER", 30)
     monkeypatch.setattr(np, "savez", lambda *place, **how: full() if parts else parts.append(savez(*place, **how)))
     done = run(app, [command[0], str(sample_path()), *command[1:], "--out", str(tmp_path / "pose.csv")])
     assert done.exit_code == 1 and "No space left" in done.stderr

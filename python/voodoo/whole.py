@@ -118,19 +118,25 @@ def appearing_whole(path: Path) -> Iterator[Path]:
     Raises:
         OSError: it cannot be written; names `path`.
     """
-    hidden = None
-    try:
+    with naming(path):
         hidden = Hidden(path)
-        place = hidden.folder / path.name
-        yield place
-        move_whole(place, path)
+        try:
+            place = hidden.folder / path.name
+            yield place
+            move_whole(place, path)
+        finally:
+            hidden.remove()
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Errors of the system inside name this file, instead of another or none."""
+    try:
+        yield
     except OSError as error:
         if error.errno is None:
             raise
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
-    finally:
-        if hidden is not None:
-            hidden.remove()
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,6 @@ from voodoo.cli.common import (
     print_interrupted,
     print_message,
     print_result,
-    progressing,
     refuse_both,
     refuse_missing,
     states,
@@ -33,7 +32,6 @@ from voodoo.cli.options import (
     RecordingArgument,
     TopicOption,
 )
-from voodoo.cli.paths import check_paths
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError
 
@@ -84,7 +82,7 @@ def ik_command(
 
     The .csv has the columns of voodoo track, with the six of the root before the other NAME_rad; the other formats are those of
     voodoo track, too. Other sites are compared with the reference, if it has them. Ctrl-C writes the
-    frames up to there and ends with exit code 130.
+    frames up to there and ends with exit code 130; after a crash, voodoo recover does.
 
     Examples
 
@@ -92,56 +90,52 @@ def ik_command(
 
     voodoo ik walk_bag/ --targets pose.npz --sites head_center,l_shoulder,r_shoulder,l_hip,r_hip,l_hand --out pose.bvh
     """
-    import numpy as np
-
-    from voodoo.cli.running import opened, turn_of
-    from voodoo.export.files import check_target, upright_words, written
-    from voodoo.export.files import save as export
+    from voodoo.cli.running import opened, run, spool_of, turn_of
+    from voodoo.export.files import upright_words
+    from voodoo.export.spool import ONE
     from voodoo.export.track import Track
     from voodoo.model.body import Body
-    from voodoo.pipeline.ik import Positions, follow
+    from voodoo.pipeline.ik import Positions, Solved, follow
     from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
 
     with clear_errors():
         refuse_both("--body", body, **{"--height": height, "--model": model})
         beginning = beginning_of(init)
         source = opened(recording, loader, frame, **loader_words(topic, option, layout=layout))
-        files = out or [Path(f"{source.name}_ik.csv")]
-        for file in files:
-            check_target(file)
-        if not out:
-            check_paths(context, files)
-        positions = Positions.of(source, None if targets is None else Track.load(targets))
-        tracker = start_tracker(
-            source,
-            init=beginning,
-            body=None if body is None else Body.load(body),
-            height=height,
-            model=model,
-        )
-        if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
-            raise NoPoseError(
-                f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
+        files, keeping = spool_of(source, out, context, suffix="_ik.csv")
+        with keeping as spool:
+            positions = Positions.of(source, None if targets is None else Track.load(targets))
+            tracker = start_tracker(
+                source,
+                init=beginning,
+                body=None if body is None else Body.load(body),
+                height=height,
+                model=model,
             )
-        known = None if sites is None else tuple(name.strip() for name in sites.split(","))
-        how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
-        how["wrap"] = partial(progressing, words=source.name, total=len(source))
-        result, errors = follow(source, tracker, positions, **how)
+            if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
+                raise NoPoseError(
+                    f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
+                )
+            known = None if sites is None else tuple(name.strip() for name in sites.split(","))
+            how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
+            errors: Counter[str] = Counter()
+            compared: Counter[str] = Counter()
 
-        turn = turn_of(source, [result], files)
+            def take(step: Solved) -> None:
+                errors.update(step.errors)
+                compared.update(step.errors.keys())
+                spool.add(step.track, {ONE: tracker.body})
 
-        def write(path: Path) -> list[Path]:
-            export(result, path, body=tracker.body, root_frame=source.root_frame, turn=turn)
-            return [path]
-
-        with deferred():
-            done, failed = written(files, write)
-        for name, values in errors.items():
-            if np.isfinite(values).any():
-                print_result(f"{name:<14} {1e3 * np.nanmean(values):6.1f} mm mean error", files)
-        message = f"{len(result)} frames, {states(result.status)}{wrote(done)}"
-        refuse_missing(failed, message)
-        print_interrupted(len(result) < len(source), f"the rest of {len(source)} frames is missing: {message}")
+            steps = follow(source, tracker, positions, **how)
+            with deferred():
+                done = run(source, steps, take=take)
+                turn = turn_of(source, spool.sample(), files)
+                written, failed = spool.write(turn=turn)
+        for name, count in compared.items():
+            print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", files)
+        message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
+        refuse_missing([*failed, *done.failures], message)
+        print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
         print_result(message, files)
-        if words := upright_words(done, turn):
+        if words := upright_words(written, turn):
             print_message(words)

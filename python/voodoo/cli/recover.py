@@ -15,9 +15,9 @@ from voodoo.errors import VoodooError, reason
 def recover_command(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Where the results should have been written.")],
 ) -> None:
-    """Make the files of voodoo track and voodoo live that were killed, or ended by a power cut.
+    """Make the files of voodoo track, live and ik that were killed, or ended by a power cut.
 
-    The next voodoo track or live that writes into FOLDER does the same. An existing file is not replaced: NAME.recovered.csv is
+    The next one that writes into FOLDER does the same. An existing file is not replaced: NAME.recovered.csv is
     written beside it.
     """
     from voodoo.export.spool import recover

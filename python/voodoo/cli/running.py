@@ -9,13 +9,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import typer
 
 from voodoo.cli.common import print_message, progressing
+from voodoo.cli.paths import check_paths
+from voodoo.cli.recover import recover_before
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
 from voodoo.errors import NoPoseError, VoodooError
-from voodoo.export.files import is_table
+from voodoo.export.files import check_target, is_table
+from voodoo.export.spool import Spool
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
 from voodoo.pipeline.floor import seen_floor
@@ -32,6 +36,9 @@ from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.ink import Picture
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.rerun_viewer import Viewer
+
+TOGETHER = 250
+"""Frames whose poses a crash costs at most, and that are in memory."""
 
 
 class Run(NamedTuple):
@@ -139,6 +146,32 @@ def detector_of(path: Path | None) -> AnyDetector:
     return "shipped" if path is None else OnnxDetector(path)
 
 
+def spool_of(
+    source: Recording,
+    out: Sequence[Path] | None,
+    context: typer.Context,
+    *,
+    suffix: str = ".csv",
+    upright: bool = False,
+    several: bool = False,
+) -> tuple[Sequence[Path], Spool]:
+    """The outputs of a command, by default one with the name of the recording, and where their poses are kept until the end.
+
+    What killed commands left in their folders is completed before.
+
+    Raises:
+        VoodooError: an output that cannot be written, or is an input.
+    """
+    targets = out or [Path(f"{source.name}{suffix}")]
+    for target in targets:
+        check_target(target)
+    if not out:
+        check_paths(context, targets)
+    recover_before(targets)
+    how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright, "several": several}
+    return targets, Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
+
+
 def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path], *, upright: bool = False) -> Turn:
     """How files are turned upright whose root frame is a camera's: by the floor that is seen, else by its axes.
 
@@ -163,8 +196,8 @@ def run(
     steps: Iterable[Any],
     *,
     take: Callable[[Any], None],
-    draw: Callable[[Overlay, Any], Picture],
-    show: Callable[[Viewer, Any], None],
+    draw: Callable[[Overlay, Any], Picture] | None = None,
+    show: Callable[[Viewer, Any], None] | None = None,
     overlay: Path | None = None,
     save: Path | None = None,
     viewer: Viewer | None = None,
@@ -177,7 +210,7 @@ def run(
         source: the recording.
         steps: its frames, tracked, of one person or several.
         take: keeps the poses of a frame. An OSError, also of the recording, ends the run.
-        draw: a picture of a frame.
+        draw: a picture of a frame, for `overlay`.
         show: shows a frame in `viewer`.
         overlay: PictureWriter's path.
         save: file of the viewer.
@@ -197,7 +230,7 @@ def run(
         print_message(writer.note)
     drawing: list[Overlay] = []
 
-    def drawn(step: Any) -> None:  # noqa: ANN401 - of one person or several
+    def drawn(draw: Callable[[Overlay, Any], Picture], step: Any) -> None:  # noqa: ANN401 - of one person or several
         if not drawing:
             with nullcontext() if left_out is None else left_out.aside():
                 drawing.append(Overlay(source))
@@ -212,10 +245,10 @@ def run(
             for step in progressing(steps, source.name, len(source)):
                 seconds.append(step.seconds)
                 take(step)
-                if viewer is not None:
+                if viewer is not None and show is not None:
                     _apart(viewer, show, viewer, step)
-                if writer is not None:
-                    _apart(writer, drawn, step)
+                if writer is not None and draw is not None:
+                    _apart(writer, drawn, draw, step)
                 if interrupted := ended.is_set():
                     break
         except KeyboardInterrupt:

@@ -43,7 +43,6 @@ from voodoo.cli.options import (
     UseOption,
     ViewOption,
 )
-from voodoo.cli.paths import check_paths
 from voodoo.cli.signals import INTERRUPTED, deferred
 from voodoo.errors import NoPoseError
 from voodoo.names import SEARCHING
@@ -52,9 +51,6 @@ if TYPE_CHECKING:
     from voodoo.export.spool import Spool
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.recording import Recording
-
-TOGETHER = 250
-"""Frames whose poses a crash costs at most, and that are in memory."""
 
 
 def track_command(
@@ -148,7 +144,6 @@ def track_command(
 
     from voodoo.cli.closing import closing_doubts, closing_lines
     from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people, refuse_several
-    from voodoo.cli.recover import recover_before
     from voodoo.cli.running import (
         bare_for,
         boxes_of,
@@ -160,12 +155,13 @@ def track_command(
         pictured,
         refuse_unused,
         run,
+        spool_of,
         turn_of,
         used_inputs,
         viewer_of,
     )
-    from voodoo.export.files import check_target, upright_words
-    from voodoo.export.spool import ONE, Spool
+    from voodoo.export.files import upright_words
+    from voodoo.export.spool import ONE
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
     from voodoo.people import People
@@ -227,20 +223,7 @@ def track_command(
             draw_regions=(draw_regions, ("color",)),
             background=(background, ("color",)),
         )
-        targets = out or [Path(f"{source.name}.csv")]
-        for target in targets:
-            check_target(target)
-        if not out:
-            check_paths(context, targets)
-        recover_before(targets)
-        keeping = Spool(
-            targets,
-            root_frame=lambda: source.root_frame,
-            optical=source.info().camera_root,
-            upright=upright,
-            several=several,
-            together=TOGETHER,
-        )
+        targets, keeping = spool_of(source, out, context, upright=upright, several=several)
         with keeping as spool, viewer_of(view, save, source.name) as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(used, draw_regions=draw_regions)

@@ -10,6 +10,7 @@ import numpy as np
 from voodoo.export.conventions import plain
 from voodoo.export.skeleton import mean_interval
 from voodoo.export.track import Track
+from voodoo.whole import appearing_whole
 
 _RESIDUAL = 3
 """Column of the library's points that tells a point that was not observed (-1); columns 0 to 2 are the position."""
@@ -40,6 +41,6 @@ def write_c3d(path: str | Path, track: Track) -> None:
     nothing = np.empty((0, 0), dtype=np.float32)
     for frame in points:
         writer.add_frames((frame, nothing))
-    with Path(path).open("wb") as file, warnings.catch_warnings():
+    with appearing_whole(Path(path)) as place, place.open("wb") as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library, where there are no forces
         writer.write(file)

@@ -36,7 +36,7 @@ def angle_sigmas_of(estimates: Sequence[Estimate], names: Sequence[str]) -> Floa
     found = np.full((len(estimates), len(names)), np.nan)
     for index, estimate in enumerate(estimates):
         known = getattr(estimate, "angle_covariance", {})
-        variances = {joint: float(np.trace(known[joint])) for joint in {*joints} & known.keys()}
+        variances = {joint: float(known[joint].trace()) for joint in {*joints} & known.keys()}
         found[index] = [variances.get(joint, np.nan) for joint in joints]
     return np.sqrt(found / free) if np.isfinite(found).any() else np.empty((len(estimates), 0))
 

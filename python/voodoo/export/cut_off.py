@@ -54,7 +54,7 @@ def _sound(source: Path) -> Iterator[tuple[int, bytes]]:
     """The records in whole chunks."""
     with reading(source, "a recording of voodoo live"):
         for content in stored_records(source):
-            yield from records(content)
+            yield from ((code, content[begin:end]) for code, begin, end in records(content))
 
 
 def _word(body: bytes, at: int) -> str:

@@ -151,8 +151,7 @@ def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | 
             track.save(file)
         return
     if path.suffix in ONE_PERSON:
-        with appearing_whole(path) as place:
-            ONE_PERSON[path.suffix](place, upright(track, root_frame, turn)[0], body)
+        ONE_PERSON[path.suffix](path, upright(track, root_frame, turn)[0], body)
         return
     write_persons(path, {"p1": (path.stem, track, body)}, root_frame=root_frame, turn=turn)
 
@@ -169,12 +168,10 @@ def write_persons(
         turn: see `save`.
     """
     tracks = {person: (track, body) for person, (_, track, body) in people.items()}
-    with appearing_whole(path) as place:
-        if is_foxglove(path):
-            write_foxglove(place, tracks, root_frame=root_frame, turn=turn)
-        elif path.suffix == ".glb":
-            shown = {name: (upright(track, root_frame, turn)[0], body) for name, track, body in people.values()}
-            write_glb(place, shown)
-        else:
-            with bag_folder(place) as folder:
-                write_people_bag(folder, tracks, root_frame=root_frame, turn=turn)
+    if is_foxglove(path):
+        write_foxglove(path, tracks, root_frame=root_frame, turn=turn)
+    elif path.suffix == ".glb":
+        write_glb(path, {name: (upright(track, root_frame, turn)[0], body) for name, track, body in people.values()})
+    else:
+        with appearing_whole(path) as place, bag_folder(place) as folder:
+            write_people_bag(folder, tracks, root_frame=root_frame, turn=turn)

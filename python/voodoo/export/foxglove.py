@@ -18,6 +18,7 @@ from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
+from voodoo.whole import appearing_whole
 
 SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
@@ -194,7 +195,7 @@ def write_foxglove(
     joints as spheres). In searching frames nobody is there.
 
     Args:
-        path: a file that does not exist.
+        path: .foxglove.mcap file.
         people: REP-155 id -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
         turn: see `write_bag`.
@@ -216,6 +217,6 @@ def write_foxglove(
         rows = zip(placed.on_parents(), shapes_of([body], found.world_from_limb, found.joints), strict=True)
         for stamp, there in zip(track.stamps.tolist(), track.found.tolist(), strict=True):
             frames.setdefault(stamp, []).extend([FoxgloveRow(*about, *next(rows))] if there else [])
-    with foxglove.open_mcap(str(path), context=context):
+    with appearing_whole(Path(path)) as place, foxglove.open_mcap(str(place), context=context):
         for stamp, present in sorted(frames.items()):
             channels.log(stamp, present, root)

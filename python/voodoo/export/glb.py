@@ -18,6 +18,7 @@ from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.limb_mesh import limb_mesh
 from voodoo.model.rotations import quaternions
+from voodoo.whole import appearing_whole
 
 _FLOAT, _UINT, _UBYTE = 5126, 5125, 5121
 _VERTICES, _INDICES = 34962, 34963
@@ -44,7 +45,8 @@ def write_glb(path: str | Path, people: Mapping[str, tuple[Track, Body]]) -> Non
     start = min((float(track.stamps[0]) for track, _ in people.values()), default=0.0)
     for number, (name, (track, body)) in enumerate(people.items()):
         file.add_person(name, track, body, _COLORS[number % len(_COLORS)], start)
-    Path(path).write_bytes(file.content())
+    with appearing_whole(Path(path)) as place:
+        place.write_bytes(file.content())
 
 
 class _File:

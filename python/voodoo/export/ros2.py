@@ -28,6 +28,7 @@ from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
+from voodoo.whole import appearing_whole
 
 BODIES = "/humans/bodies"
 TRACKED = f"{BODIES}/tracked"
@@ -240,7 +241,7 @@ def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None
         for number, human in enumerate(humans)
         for index, stamp in enumerate(human.track.stamps)
     )
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    with appearing_whole(path) as place, Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         there: dict[float, list[str]] = {}
         for stamp, number, index in frames:
             there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])

@@ -33,7 +33,7 @@ from voodoo.names import SEARCHING
 from voodoo.people import PeopleEstimate
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
-from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, removed
+from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, naming, removed
 
 ONE = 1
 """Number of the person if only one is tracked."""
@@ -84,7 +84,7 @@ class Spool:
         self._kept_for = [path for path in paths if path != STDOUT]
         self._hidden = Hidden(self._kept_for[0] if self._kept_for else Path(tempfile.gettempdir()) / "stdout.csv")
         self._together = together
-        self._waiting: list[Estimate | PeopleEstimate] = []
+        self._waiting: list[Any] = []
         self._made: dict[str, npt.NDArray[Any]] | None = None
         self._bodies: dict[int, Body] = {}
         self._bodies_at = -_BODIES_S
@@ -93,7 +93,7 @@ class Spool:
         self.states: Counter[str] = Counter()
         self.persons: set[int] = set()
 
-    def add(self, estimate: Estimate | PeopleEstimate, bodies: Mapping[int, Body]) -> None:
+    def add(self, estimate: Estimate | PeopleEstimate | Track, bodies: Mapping[int, Body]) -> None:
         """Take the poses of a frame, and the bodies in it.
 
         Raises:
@@ -103,8 +103,12 @@ class Spool:
         self._made = None
         self._bodies.update(bodies)
         self.frames += 1
-        poses = [one.estimate for one in estimate] if isinstance(estimate, PeopleEstimate) else [estimate]
-        self.states.update(str(pose.status) for pose in poses)
+        if isinstance(estimate, PeopleEstimate):
+            words: Sequence[str] = [str(one.estimate.status) for one in estimate]
+        else:
+            words = estimate.status if isinstance(estimate, Track) else (str(estimate.status),)
+        for word in words:
+            self.states[word] += 1
         self.persons.update(bodies)
         if len(self._waiting) >= self._together:
             self._put_away()
@@ -121,8 +125,11 @@ class Spool:
             arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
             arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
         path = self._hidden.folder / f"{len(self._parts):08d}.npz"
-        with appearing_whole(path) as place, place.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
+        place = path.with_suffix(".part")
+        with naming(path):
+            with place.open("wb") as file:
+                np.savez(file, allow_pickle=False, **arrays)
+            move_whole(place, path)
         if not self._parts and self._kept_for:
             self._keep(self._kept_for)
         self._bodies_at = time.monotonic() if BODIES in arrays else self._bodies_at
@@ -140,9 +147,11 @@ class Spool:
         """What is in memory."""
         if self._made is None:
             if self._several:
-                self._made = PeopleTrack.of(self._waiting, bodies=self._bodies).arrays()  # type: ignore[arg-type]
+                self._made = PeopleTrack.of(self._waiting, bodies=self._bodies).arrays()
+            elif isinstance(self._waiting[0], Track):
+                self._made = arrays_of(Track.joined(self._waiting))
             else:
-                self._made = arrays_of(Track.of(self._waiting, body=self._bodies.get(ONE)))  # type: ignore[arg-type]
+                self._made = arrays_of(Track.of(self._waiting, body=self._bodies.get(ONE)))
         return self._made
 
     def _contents(self) -> Callable[[], Iterator[Arrays]]:

@@ -182,20 +182,18 @@ class Track:
         if not estimates:
             raise VoodooError("estimates: expected at least one frame, found none")
         posed = [estimate for estimate in estimates if str(estimate.status) != SEARCHING]
-        joint_names: tuple[str, ...] = tuple(posed[0].joints) if posed else () if body is None else body.site_names
-        limb_names: tuple[str, ...] = (
-            tuple(posed[0].world_from_limb) if posed else () if body is None else body.limb_names
-        )
+        joint_names: tuple[str, ...] = posed[0].joint_names if posed else () if body is None else body.site_names
+        limb_names: tuple[str, ...] = posed[0].limb_names if posed else () if body is None else body.limb_names
         joints = np.full((len(estimates), len(joint_names), 3), np.nan)
         poses = np.full((len(estimates), len(limb_names), 4, 4), np.nan)
         for index, estimate in enumerate(estimates):
             if str(estimate.status) != SEARCHING:
-                if tuple(estimate.joints) != joint_names or tuple(estimate.world_from_limb) != limb_names:
+                if estimate.joint_names != joint_names or estimate.limb_names != limb_names:
                     raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
-                joints[index] = np.reshape(list(estimate.joints.values()), (-1, 3))
-                poses[index] = np.reshape(list(estimate.world_from_limb.values()), (-1, 4, 4))
+                joints[index], poses[index] = estimate.joint_positions, estimate.limb_poses
         angle_names, angles = angles_of_estimates(estimates, body)
         covariance, root_covariance = covariances_of(estimates, joint_names, limb_names)
+        support = [estimate.limb_status for estimate in estimates]
         return cls(
             covariance=covariance,
             root_covariance=root_covariance,
@@ -209,10 +207,7 @@ class Track:
             joints=joints,
             limb_names=limb_names,
             world_from_limb=poses,
-            limb_status={
-                limb: tuple(str(each.limb_status[limb]) if each.limb_status else "" for each in estimates)
-                for limb in limb_names
-            },
+            limb_status={limb: tuple(str(words[limb]) if words else "" for words in support) for limb in limb_names},
             left_out=dict(left_out or {}),
         )
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -77,6 +78,14 @@ class Positions:
         return {name: position for name, position in row.items() if np.isfinite(position).all()}
 
 
+class Solved(NamedTuple):
+    """A frame: its posture as a track of one frame, the error [m] of every other site with a known position, its time [s]."""
+
+    track: Track
+    errors: dict[str, float]
+    seconds: float
+
+
 def follow(
     recording: Recording,
     tracker: Tracker,
@@ -87,8 +96,7 @@ def follow(
     options: Options | None = None,
     warm: bool = True,
     rest: bool = True,
-    wrap: Callable[[Iterable[RecordedFrame]], Iterable[RecordedFrame]] = iter,
-) -> tuple[Track, dict[str, FloatArray]]:
+) -> Iterator[Solved]:
     """Solve the postures of all frames from the known sites and the silhouettes.
 
     Args:
@@ -102,14 +110,12 @@ def follow(
             earlier frames, near the posture solved from the known sites alone. "none": plain inverse kinematics.
         options: see voodoo.ik.Options.
         warm: start each frame from the previous posture; else solve each frame independently, from the first pose.
-        wrap: passes the frames on, e.g. to display progress.
         rest: with `warm`: angles that sites and silhouettes leave free return to the mean of the postures so far, see
             ik.Follower.
 
     Returns:
-        The result, including angles, and the error (F,) [m] of every other site of `positions`, NaN where unknown. The status
-        is "degraded" without a known site, or if targets are missed by more than 5 cm, else "tracking". The residual is the
-        root mean square of the target residuals. After Ctrl-C the frames solved so far, if any, are returned.
+        The frames, solved one by one. The status is "degraded" without a known site, or if targets are missed by more than
+        5 cm, else "tracking". The residual is the root mean square of the target residuals.
 
     Raises:
         VoodooError: an unknown site, a site without positions, no known site at all, an unknown value, or a damaged recording.
@@ -125,70 +131,58 @@ def follow(
     known = [name for name in sites if name in there]
     if not known:
         raise VoodooError(f"sites: expected some of {', '.join(positions.names)}, found {', '.join(sites)}")
+    scenes = {} if pictures in ("none", "regions") else _scenes(recording, positions, known, pictures)
+    regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
     options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
     chosen = {name: getattr(options, name) for name in Options.__dataclass_fields__}
     follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
-    scenes = {} if pictures in ("none", "regions") else _scenes(recording, positions, known, pictures)
-    regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
-    current_poses: Mapping[str, npt.ArrayLike] = tracker.estimate.world_from_limb
-    near: FloatArray | Posture = start
     others = [name for name in there if name not in known]
-    postures: list[Posture] = []
-    stamps, rows = [], []
-    last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
     level = recording.root_frame in LEVEL_FRAMES
-    try:
-        for recorded in wrap(recording):
+
+    def solved() -> Iterator[Solved]:
+        near: FloatArray | Posture = start
+        last: Mapping[str, FloatArray] = {name: tracker.estimate.joints[name] for name in chain.site_names}
+        first, seen = True, False
+        for recorded in recording:
+            began = time.perf_counter()
             targets = positions.at(recorded.stamp, known)
             observed = {**last, **targets} if warm else targets
             images = _silhouettes(recorded, observed, scenes, level=level) if targets else []
             colors = [item for item in recorded.measurements if isinstance(item, ColorImage)] if regions else []
             if regions is not None and targets:
                 # The first frame is the one whose posture is known.
-                if postures:
-                    current_poses = solve(chain, targets, start=near, options=options).world_from_limb
-                images = _cut_out(regions, colors, current_poses)
+                plain = tracker.estimate if first else solve(chain, targets, start=near, options=options)
+                images = _cut_out(regions, colors, plain.world_from_limb)
             if warm:
                 posture = follower.step(targets, images=images)
             else:
                 posture = solve(chain, targets, images=images, start=start, options=options)
             last, near = posture.joints, posture
+            first, seen = False, seen or posture.images > 0
             if regions is not None and targets:
                 regions.learn(colors, posture.world_from_limb)
             truth = positions.at(recorded.stamp, others)
-            off = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
-            rows.append([off.get(name, float("nan")) for name in others])
-            stamps.append(recorded.stamp)
-            postures.append(posture)
-    except KeyboardInterrupt:
-        if not postures:
-            raise
-        rows, stamps = rows[: len(postures)], stamps[: len(postures)]
-    if not postures:
-        raise VoodooError(f"{recording.name}: expected at least one frame, found none")
-    if regions is not None and not any(posture.images for posture in postures):
-        raise VoodooError(f"{recording.name}: expected color pictures, found none; --pictures says where to look")
-    table = np.array(rows, dtype=np.float64).reshape(len(postures), len(others))
-    errors = {name: table[:, index] for index, name in enumerate(others)}
-    return _track(stamps, postures), errors
+            errors = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
+            yield Solved(_track(recorded.stamp, posture), errors, time.perf_counter() - began)
+        if regions is not None and not seen:
+            raise VoodooError(f"{recording.name}: expected color pictures, found none; --pictures says where to look")
+
+    return solved()
 
 
-def _track(stamps: Sequence[float], postures: Sequence[Posture]) -> Track:
-    def reached(posture: Posture) -> float:
-        return float(np.sqrt(np.mean(np.square(posture.residuals)))) if posture.residuals else float("inf")
-
-    first = postures[0]
+def _track(stamp: float, posture: Posture) -> Track:
+    reached = float(np.sqrt(np.mean(np.square(posture.residuals)))) if posture.residuals else float("inf")
     return Track(
-        stamps=np.array(stamps, dtype=np.float64),
-        status=tuple("tracking" if reached(posture) < _REACHED_M else "degraded" for posture in postures),
-        residual=np.array([reached(posture) if posture.residuals else 0.0 for posture in postures]),
-        joint_names=tuple(first.joints),
-        joints=np.array([list(posture.joints.values()) for posture in postures]),
-        limb_names=tuple(first.world_from_limb),
-        world_from_limb=np.array([list(posture.world_from_limb.values()) for posture in postures]),
-        angle_names=first.angle_names,
-        angles=np.array([posture.angles for posture in postures]),
+        stamps=np.array([stamp], dtype=np.float64),
+        status=("tracking" if reached < _REACHED_M else "degraded",),
+        residual=np.array([reached if posture.residuals else 0.0]),
+        joint_names=tuple(posture.joints),
+        joints=np.array([list(posture.joints.values())]),
+        limb_names=tuple(posture.world_from_limb),
+        world_from_limb=np.array([list(posture.world_from_limb.values())]),
+        angle_names=posture.angle_names,
+        angles=np.array([posture.angles]),
     )
 
 

@@ -22,6 +22,10 @@ from voodoo.recordings.sqlite_file import SqliteFile
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored, read_stored_text
 from voodoo.unpacking import Unpacking, count_zstd
 
+_MOST_SKIPPED = 100
+"""Records of connections between the place of a message in the index and the message: one is usual, and a hostile chunk has
+millions before each."""
+
 
 def bag_file(path: Path, unpacking: Unpacking) -> BagFile:
     """The reader of a bag.
@@ -100,7 +104,9 @@ class Ros1File(Reader):
             raise content
         chunk = io.BytesIO(content)
         chunk.seek(entry.offset)
-        while (header := Header.read(chunk)).get_uint8("op") == RecordType.CONNECTION:
+        for _ in range(_MOST_SKIPPED):
+            if (header := Header.read(chunk)).get_uint8("op") != RecordType.CONNECTION:
+                break
             chunk.seek(read_uint32(chunk), os.SEEK_CUR)
         if header.get_uint8("op") != RecordType.MSGDATA or header.get_time("time") != entry.time:
             raise ValueError("expected a message, found none")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 import re
 import struct
 import zlib
@@ -27,9 +28,10 @@ _MOST_OF_ALL = {_SCHEMA: 16 * MOST_METADATA, _CHANNEL: MOST_METADATA}
 """Largest size of all schemas, and of all channels [bytes]."""
 _ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
 _MOST_NESTED, _MOST_COMMAS = 50, 10_000
-_SMALLEST_MESSAGE = 31
-_MOST_LOST = 1_000_000
-"""Largest number of messages that a damaged chunk is taken to have had, because the index may be damaged as well."""
+_MOST_LOST = 100_000
+_INDEX_BYTES = 16
+"""Largest number of messages that damaged chunks are taken to have had, and the size of each in the index of the file, because
+that may be damaged as well."""
 DAMAGED = "in a damaged chunk"
 """Reason of messages that are left out."""
 
@@ -50,6 +52,7 @@ class McapFile(McapReader):
         super().__init__(path)
         self._file, self._unpacking = path, unpacking
         self._chunks: frozenset[int] = frozenset()
+        self._last: tuple[int, bytes] = (-1, b"")
 
     def open(self) -> None:
         """Check the file, and read its summary."""
@@ -83,55 +86,64 @@ class McapFile(McapReader):
         first = -1 if start is None else start
         # The first item of every chunk is its start, so that a chunk is unpacked only when its time has come.
         is_back = self._is_back(wanted)
+        plausible = iter(range(min(_MOST_LOST, self._file.stat().st_size // _INDEX_BYTES)))
         sources = [
-            self._of_chunk(chunk, wanted, first, as_written=is_back)
+            self._of_chunk(chunk, wanted, first, plausible, as_written=is_back)
             for chunk in sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
             if first <= chunk.message_end_time
             and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
         ]
-        for _, _, item in itertools.chain(*sources) if is_back else heapq.merge(*sources, key=lambda entry: entry[:2]):
+        in_turn = is_back or self._longest_step_back() <= 0
+        for _, _, item in itertools.chain(*sources) if in_turn else heapq.merge(*sources, key=lambda entry: entry[:2]):
             if item is not None:
                 yield item
 
+    def _longest_step_back(self) -> float:
+        """From the end of a chunk to the beginning of the next one in the file [ns]; infinite for a single chunk."""
+        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
+        pairs = itertools.pairwise(chunks)
+        return max((before.message_end_time - chunk.message_start_time for before, chunk in pairs), default=math.inf)
+
     def _is_back(self, wanted: Collection[int]) -> bool:
         """Whether the clock of the recorder was set back; chunks are unpacked only where times of two are apart."""
-        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
-        apart = [before.message_end_time - chunk.message_start_time for before, chunk in itertools.pairwise(chunks)]
-        if apart and max(apart) < BACK_S * 1e9:
+        if self._longest_step_back() < BACK_S * 1e9:
             return False
+        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
         try:
             read = (entry for chunk in chunks for entry in _messages(self._content(chunk)))
-            return falls((one, time) for one, time, _ in read if one in wanted)
+            return falls((one, time) for one, time, _, _ in read if one in wanted)
         except Exception:
             return False  # the damage is told where the messages are read
 
     def _of_chunk(
-        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int, *, as_written: bool
+        self, chunk: ChunkInfo, wanted: dict[int, Connection], first: int, plausible: Iterator[int], *, as_written: bool
     ) -> Iterator[tuple[int, int, Item | None]]:
         yield chunk.message_start_time, 0, None
-        found: list[tuple[int, int, bytes]] = []
+        content, found = b"", []
         lost: RecordingError | None = None
         try:
             with reading(self._file, f"a sound chunk at byte {chunk.chunk_start_offset}"):
-                for one, time, data in _messages(self._content(chunk)):
+                content = self._content(chunk)
+                for one, time, begin, end in _messages(content):
                     if one in wanted and first <= time:
-                        found.append((time, one, data))
+                        found.append((time, one, begin, end))
         except RecordingError as error:
             lost = RecordingError(str(error), reason=DAMAGED)
         if not as_written:
             found.sort(key=lambda entry: entry[0])
-        for time, one, data in found:
-            yield time, chunk.chunk_start_offset, (wanted[one], time, data)
+        for time, one, begin, end in found:
+            yield time, chunk.chunk_start_offset, (wanted[one], time, content[begin:end])
         if lost is None:
             return
-        most = min(_MOST_LOST, chunk.uncompressed_size // _SMALLEST_MESSAGE)
         for one, connection in wanted.items():
             count = chunk.channel_count.get(one, 0) - sum(entry[1] == one for entry in found)
-            for _ in range(min(count, most)):
+            for _ in itertools.islice(plausible, max(count, 0)):
                 yield chunk.message_end_time, chunk.chunk_start_offset, (connection, chunk.message_end_time, lost)
 
     def _content(self, chunk: ChunkInfo) -> bytes:
-        """The records in a chunk."""
+        """The records in a chunk; the last one is kept, because several topics are looked for in it."""
+        if self._last[0] == chunk.chunk_start_offset:
+            return self._last[1]
         if chunk.chunk_start_offset not in self._chunks:
             raise ValueError("found no chunk there")
         assert self.bio is not None
@@ -151,27 +163,30 @@ class McapFile(McapReader):
             raise RecordingError(
                 f"{self._file}: expected a sound chunk at byte {chunk.chunk_start_offset}, found a wrong checksum"
             )
+        self._last = chunk.chunk_start_offset, content
         return content
 
 
-def records(content: bytes) -> Iterator[tuple[int, bytes]]:
-    """Code and bytes of the records in a chunk."""
+def records(content: bytes) -> Iterator[tuple[int, int, int]]:
+    """Code, begin and end of the records in a chunk."""
     at = 0
     while at < len(content):
         code, length = struct.unpack_from("<BQ", content, at)
         at += 9
         if at + length > len(content):
             raise ValueError(f"expected {len(content) - at} bytes at most in a record, found {length}")
-        yield code, content[at : at + length]
+        yield code, at, at + length
         at += length
 
 
-def _messages(content: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Channel, time [ns] and bytes of the messages in a chunk."""
-    for code, body in records(content):
+def _messages(content: bytes) -> Iterator[tuple[int, int, int, int]]:
+    """Channel and time [ns] of the messages in a chunk, and begin and end of each."""
+    for code, begin, end in records(content):
         if code == _MESSAGE:
-            channel, _, time, _ = struct.unpack_from("<HIQQ", body)
-            yield channel, time, body[22:]
+            if end - begin < 22:
+                raise ValueError(f"expected a message of 22 bytes or more, found {end - begin}")
+            channel, _, time, _ = struct.unpack_from("<HIQQ", content, begin)
+            yield channel, time, begin + 22, end
 
 
 def stored_records(path: Path) -> Iterator[bytes]:

@@ -122,13 +122,14 @@ class RosRecording(Recording):
             "color": color_topic,
         }
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
-        sources = finder.find(use)
-        self._unused = finder.unused
-        self._units = {s.topic: self._unit(s.topic, scale, given=meters_per_unit is not None) for s in sources}
-        self._float_unit = 1.0 if meters_per_unit is None else scale
-        self._set_back = SetBack()
-        self._tree = TransformTree(path, max_age=max_age, set_back=self._set_back)
-        self.root_frame = self._read_transforms(root_frame, sources)
+        with self._bag.kept_open():
+            sources = finder.find(use)
+            self._unused = finder.unused
+            self._units = {s.topic: self._unit(s.topic, scale, given=meters_per_unit is not None) for s in sources}
+            self._float_unit = 1.0 if meters_per_unit is None else scale
+            self._set_back = SetBack()
+            self._tree = TransformTree(path, max_age=max_age, set_back=self._set_back)
+            self.root_frame = self._read_transforms(root_frame, sources)
         self._driver = sources[0]
         self._sources = {s.topic: s for s in sources if self._connected(s, optional=color_topic is None)}
         self.complete = self._driver.kind == "color" and len(sources) > 1
@@ -199,7 +200,8 @@ class RosRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize; reads the first and last message of every topic in use, once."""
-        return self._summary
+        with self._bag.kept_open():
+            return self._summary
 
     @cached_property
     def _summary(self) -> RecordingInfo:

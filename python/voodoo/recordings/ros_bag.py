@@ -52,6 +52,7 @@ class Bag:
         """Unpack the archive if needed, and read the index."""
         self.path = path
         self._left_out, self._unpacked = left_out, unpacked
+        self._reader: BagFile | None = None
         folder = path
         if path.suffix == ".zip":
             folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
@@ -72,6 +73,11 @@ class Bag:
                 self.realsense: bool = not self.is_ros2 and realsense.is_recorders(item.name for item in self.topics)
                 self.start_time: int = reader.metadata.start_time
                 self.end_time: int = reader.metadata.end_time
+            for topic in self.topics:
+                if not 0 <= topic.messages <= MOST_RECORDED:
+                    raise RecordingError(
+                        f"{self.path}: expected the number of messages on {topic.name} in the index, found {topic.messages}"
+                    )
             if isinstance(reader, BagFolder):
                 self._check_metadata(reader)
 
@@ -183,8 +189,20 @@ class Bag:
                 )
 
     @contextmanager
+    def kept_open(self) -> Iterator[None]:
+        """Inside, `first`, `last` and `read` one after the other open and check the bag once, not each of them."""
+        with self._open() as self._reader:
+            try:
+                yield
+            finally:
+                self._reader = None
+
+    @contextmanager
     def _open(self) -> Iterator[BagFile]:
         with self._naming():
+            if self._reader is not None:
+                yield self._reader
+                return
             with reading(self.path, "a complete ROS bag"):
                 reader = bag_file(self.file, Unpacking(self._unpacked, kept=False, advice=_ADVICE))
                 reader.open()

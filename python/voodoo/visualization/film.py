@@ -41,19 +41,22 @@ class _ForBrowsers:
         # Colors have half the resolution: sizes are even.
         self._stream.height, self._stream.width = (size // 2 * 2 for size in shape[:2])
         self._stream.pix_fmt = "yuv420p"
-        self._count = 0
+        self._count, self._sound = 0, True
 
     def write(self, picture: Picture) -> None:
         """As cv2.VideoWriter."""
+        self._sound = False
         whole = np.ascontiguousarray(picture[: self._stream.height, : self._stream.width])
         frame = self._encoded(whole, format="bgr24")
         frame.pts, self._count = self._count, self._count + 1
         self._file.mux(self._stream.encode(frame))
+        self._sound = True
 
     def release(self) -> None:
-        """As cv2.VideoWriter."""
+        """As cv2.VideoWriter; after an error nothing is written, because FFmpeg dies of it."""
         try:
-            self._file.mux(self._stream.encode(None))
+            if self._sound:
+                self._file.mux(self._stream.encode(None))
         finally:
             self._file.close()
 
