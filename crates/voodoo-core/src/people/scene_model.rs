@@ -34,7 +34,7 @@ pub(super) struct SceneModel {
     off: bool,
 }
 
-/// Recent depth of each pixel where the scene is not known, and the number of consecutive observations.
+/// Recent depth of each pixel where the scene is not known, or of the person there, and the number of consecutive observations.
 #[derive(Debug, Default)]
 struct PendingDepth {
     depth: Vec<f32>,
@@ -96,16 +96,22 @@ impl SceneModel {
             }
             let all = !std::mem::replace(&mut tentative.filled, true);
             if all {
-                for (known, index) in known.iter_mut().zip(0..).filter(|(_, index)| owners[*index] == NO_OWNER) {
-                    *known = meters(image, index).unwrap_or(0.0);
+                for (index, owner) in owners.iter().enumerate() {
+                    let z = meters(image, index).unwrap_or(0.0);
+                    let learned = if *owner == NO_OWNER { &mut known[index] } else { &mut tentative.depth[index] };
+                    *learned = z;
                 }
             }
             for row in (self.row..image.camera.height()).step_by(LEARNED_ROWS) {
                 self.learned += image.camera.width();
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
-                    let Some(z) = meters(image, index).filter(|_| owners[index] == NO_OWNER) else { continue };
-                    self.unexplained += usize::from(is_new(known[index], z));
+                    let Some(z) = meters(image, index) else { continue };
+                    if owners[index] != NO_OWNER {
+                        (tentative.depth[index], tentative.frames[index]) = (z, 0);
+                        continue;
+                    }
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
+                    self.unexplained += usize::from(is_new(known[index], z));
                 }
             }
         }
@@ -148,6 +154,11 @@ fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
     if *known > 0.0 && z > *known - DEPTH_STEP {
         *known = if z > *known + DEPTH_STEP { z } else { *known + NEW_DEPTH * (z - *known) };
         *frames = 0;
+        return;
+    }
+    // What is revealed behind a person or an object is scene.
+    if *known == 0.0 && *tentative > 0.0 && z > *tentative + DEPTH_STEP {
+        (*known, *frames) = (z, 0);
         return;
     }
     if (z - *tentative).abs() > SAME {
