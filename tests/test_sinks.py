@@ -284,7 +284,7 @@ def test_no_pose_is_late_beside_programs_that_hang_and_hosts_that_are_dead():
                 server.publish(step_of(track, body, stamp=float(number)))
         until(lambda: servers[0]._late)
         rounds = []
-        for _ in range(5):
+        for _ in range(8):
             timed = Timed()
             rig = Paced([timed, *map(Lent, (opened(dead), *servers))], body)
             rig.send(20)

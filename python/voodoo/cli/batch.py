@@ -112,9 +112,9 @@ def batch_command(
             version=__version__,
         )
         sources = find_sources(recordings, only=only or ())
-        check_installed()
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
+        check_installed()
         batch = Batch(
             sources,
             out if "://" in out else str(local_path(out).absolute()),
