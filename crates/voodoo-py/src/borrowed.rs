@@ -276,7 +276,8 @@ impl<'a> Parts<'a> {
     }
 
     pub(crate) fn frame<'b>(&'b self, all: &Frame<'b>, stamp: f64) -> Frame<'b> {
-        let mut frame = all.with_clouds(&self.clouds).with_positions(&self.positions).with_rays(&self.rays);
+        let own = all.with_clouds(&self.clouds).with_positions(&self.positions).with_rays(&self.rays);
+        let mut frame = own.with_colors(&[]);
         frame.stamp = stamp;
         frame
     }

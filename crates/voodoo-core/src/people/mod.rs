@@ -14,7 +14,7 @@ mod scene_model;
 mod tentative_tracks;
 
 use crate::body::{Body, Model};
-use crate::config::Config;
+use crate::config::{Config, SolverKind};
 use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body,
 };
@@ -166,7 +166,8 @@ impl People {
         Person::new(self.next_id, body, config, self.detector.fresh(), stamp)
     }
 
-    /// Updates all persons with the next frame. `own` has the frames of those persons who have measurements that the others lack.
+    /// Updates all persons with the next frame. `own` has the frames of those persons who have measurements that the others lack;
+    /// a person is fitted to color pictures only if their own frame has any.
     /// On error nothing changes.
     pub fn step(&mut self, frame: &Frame, own: &[(usize, Frame)]) -> Result<(), TrackError> {
         frame.check(&self.prototype, self.stamp)?;
@@ -277,8 +278,8 @@ impl People {
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
     fn finds_new(&self, stamp: f64) -> bool {
         let unconfirmed = |person: &Person| person.is_tracked() && !person.tracker.is_confirmed(stamp);
-        let relocalizes = self.config.relocalization || !self.persons.iter().any(|person| person.present);
-        relocalizes && !self.persons.iter().any(unconfirmed)
+        let relocalizes = self.config.relocalization && self.config.solver != SolverKind::Limbwise;
+        (relocalizes || !self.persons.iter().any(|person| person.present)) && !self.persons.iter().any(unconfirmed)
     }
 
     fn detect(&mut self, frame: &Frame, query: DetectionQuery) {

@@ -105,13 +105,9 @@ impl SceneModel {
             for row in (self.row..image.camera.height()).step_by(LEARNED_ROWS) {
                 self.learned += image.camera.width();
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
-                    let Some(z) = meters(image, index) else { continue };
-                    if owners[index] != NO_OWNER {
-                        (tentative.depth[index], tentative.frames[index]) = (z, 0);
-                        continue;
-                    }
+                    let Some(z) = meters(image, index).filter(|_| owners[index] == NO_OWNER) else { continue };
+                    self.unexplained += usize::from(is_new(known[index], tentative.depth[index], z));
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
-                    self.unexplained += usize::from(is_new(known[index], z));
                 }
             }
         }
@@ -145,20 +141,15 @@ impl SceneModel {
     }
 }
 
-/// Whether a return is clearly before the known scene, or where nothing is known.
-fn is_new(known: f32, z: f32) -> bool {
-    known == 0.0 || z < known - DEPTH_STEP && !Background::contains(known, z)
+/// Whether a return is clearly before the known scene, or where nothing was seen before.
+fn is_new(known: f32, tentative: f32, z: f32) -> bool {
+    known == 0.0 && tentative == 0.0 || z < known - DEPTH_STEP && !Background::contains(known, z)
 }
 
 fn learn_pixel(known: &mut f32, tentative: &mut f32, frames: &mut u8, z: f32) {
     if *known > 0.0 && z > *known - DEPTH_STEP {
         *known = if z > *known + DEPTH_STEP { z } else { *known + NEW_DEPTH * (z - *known) };
         *frames = 0;
-        return;
-    }
-    // What is revealed behind a person or an object is scene.
-    if *known == 0.0 && *tentative > 0.0 && z > *tentative + DEPTH_STEP {
-        (*known, *frames) = (z, 0);
         return;
     }
     if (z - *tentative).abs() > SAME {
@@ -184,11 +175,42 @@ mod tests {
     const PIXELS: usize = 160 * 124;
 
     fn feed(scene: &mut SceneModel, millimeters: u16, frame: usize, check: impl FnOnce(&mut SceneModel, &Frame)) {
+        feed_owned(scene, millimeters, NO_OWNER, frame, check);
+    }
+
+    fn feed_owned(
+        scene: &mut SceneModel,
+        millimeters: u16,
+        owner: u16,
+        frame: usize,
+        check: impl FnOnce(&mut SceneModel, &Frame),
+    ) {
         with_frame(&[millimeters; PIXELS], frame as f64 / 30.0, |frame| {
             scene.register(frame);
             check(scene, frame);
-            scene.learn(frame, &[vec![NO_OWNER; PIXELS]]);
+            scene.learn(frame, &[vec![owner; PIXELS]]);
         });
+    }
+
+    #[test]
+    fn something_new_is_before_the_scene_and_noise_is_not() {
+        let mut scene = SceneModel::default();
+        (0..3).for_each(|frame| feed(&mut scene, 4000, frame, |_, _| ()));
+        let mut new = |millimeters: u16, owner: u16| {
+            feed_owned(&mut scene, millimeters, owner, 3, |_, _| ());
+            scene.shows_something_new()
+        };
+        assert!(!new(3900, NO_OWNER) && !new(2000, 0) && new(2000, NO_OWNER));
+    }
+
+    #[test]
+    fn what_a_person_reveals_is_not_new_and_what_comes_before_nothing_is() {
+        for (covered, owner) in [(2000, 0), (0, NO_OWNER)] {
+            let mut scene = SceneModel::default();
+            (0..3).for_each(|frame| feed_owned(&mut scene, covered, owner, frame, |_, _| ()));
+            feed(&mut scene, 4000, 3, |_, _| ());
+            assert_eq!(scene.shows_something_new(), owner == NO_OWNER);
+        }
     }
 
     #[test]
