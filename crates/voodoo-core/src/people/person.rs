@@ -115,7 +115,7 @@ impl Person {
             return;
         }
         self.present &= estimate.status != Status::Searching;
-        if self.stays || !self.tracker.can_search() {
+        if self.stays {
             return;
         }
         let patience = match self.presence(frame, ownership) {
