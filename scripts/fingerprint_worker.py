@@ -32,7 +32,7 @@ FORMAT = 3
 """Of the files of results; a new number makes all of them anew."""
 
 Record = dict[str, Any]
-TIMES = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)? ?(ms|us|µs|s|seconds|Hz|fps)\b")
+TIMES = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)? ?(ms|us|µs|s|seconds|Hz|fps|frames a second)\b")
 TIME_HEADS = re.compile(r"\b(ms|CPU)\b")
 
 

@@ -12,6 +12,8 @@ from voodoo.live import Follower, Live
 from voodoo.live.session import Session
 from voodoo.live.sources.realsense import RealSenseSource
 
+pytest.importorskip("pyrealsense2", reason="it needs libusb of the system", exc_type=ImportError)
+
 
 @pytest.fixture(scope="module")
 def images():

@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::{body_box, image_window};
-use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
+use crate::observation::frame::{Cloud, DepthImage, DepthPixels, Frame, Scope};
 use crate::observation::ownership::{NO_OWNER, OwnershipMask};
 
 /// Distance from its expected position within which a surface explains a measurement, meters: the reach of the candidate search.
@@ -152,25 +152,29 @@ impl PixelAssignment {
         pixels.clear();
         for row in rows {
             let start = row * image.camera.width();
+            let span = start + columns.start..start + columns.end;
             depth.clear();
-            depth.extend((start..start + columns.end).map(|index| image.pixels.get(index) * scale));
+            match image.pixels {
+                DepthPixels::U16(all) => depth.extend(all[span.clone()].iter().map(|pixel| f32::from(*pixel) * scale)),
+                DepthPixels::F32(all) => depth.extend(all[span.clone()].iter().map(|pixel| pixel * scale)),
+            }
             // Where there is no return, or the scene, the depth is 0.
             for z in depth.iter_mut() {
                 *z = if *z > 0.0 && *z < f32::INFINITY { *z } else { 0.0 };
             }
-            for (z, scene) in depth.iter_mut().zip(background.get(start..).unwrap_or(&[])) {
+            for (z, scene) in depth.iter_mut().zip(background.get(span).unwrap_or(&[])) {
                 *z = if Background::contains(*scene, *z) { 0.0 } else { *z };
             }
             let mut column = columns.start;
             while column < columns.end {
-                let z = depth[column];
+                let z = depth[column - columns.start];
                 if z == 0.0 {
                     column += 1;
                     continue;
                 }
                 let last = columns.end.min(column + together);
                 let mut run = 1;
-                while column + run < last && (depth[column + run] - z).abs() < LIKE_DEPTH {
+                while column + run < last && (depth[column + run - columns.start] - z).abs() < LIKE_DEPTH {
                     run += 1;
                 }
                 let [x, y] = image.camera.pixel_ray(column, row);
