@@ -150,6 +150,8 @@ impl PixelAssignment {
         let Self { queries, pixels, depth, .. } = self;
         queries.clear();
         pixels.clear();
+        depth.clear();
+        depth.reserve(image.camera.width());
         for row in rows {
             let start = row * image.camera.width();
             let span = start + columns.start..start + columns.end;
