@@ -47,8 +47,8 @@ class Tracker:
         body: body to track, with its initial sizes.
         config: parameters; the defaults were tuned by measurements.
         detector: finds the body in depth images: when there is no pose, when the body is lost, and when the tracked position is
-            wrong. "shipped" is the person detector that comes with the package; None disables detection. See
-            `voodoo.detectors` for others.
+            wrong; and everybody else who moves in view, so that nobody else is taken for the body. "shipped" is the person
+            detector that comes with the package; None disables detection. See `voodoo.detectors` for others.
     """
 
     def __init__(self, body: Body, *, config: Config | None = None, detector: AnyDetector = "shipped") -> None:

@@ -6,7 +6,7 @@ use super::observer::Own;
 
 impl Backgrounds {
     /// Sets the learned depth to unknown at pixels that show the body, and returns the previous values.
-    pub(super) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
+    pub(crate) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
         let Some(image) = frame.images.get(own.image) else { return Vec::new() };
         let Some(depth) = self.depth_mut(image) else { return Vec::new() };
         let scale = image.meters_per_unit as f32;

@@ -29,7 +29,7 @@ use person_detector::PersonDetector;
 use segment_search::SegmentSearch;
 use trials::Trials;
 
-/// Number of consecutive frames after which a visible body counts as visible and a lost one as lost.
+/// Number of consecutive frames after which a lost body counts as lost.
 const PATIENCE: usize = 2;
 
 /// Finds bodies. Stores the evidence of past detections and for how long the body has been lost.
@@ -89,13 +89,6 @@ impl Relocalizer {
         self.people.set_detection(detection);
     }
 
-    /// Returns a body and its poses, world frame, for the detection of this frame: in the detected sizes, or with `known` in those
-    /// of the model.
-    pub(crate) fn place_body(&self, model: &Model, known: bool) -> Option<(Body, Vec<Pose>)> {
-        let detected = self.people.detection()?;
-        if known { Some((model.body.clone(), fit_pose(&model.body, detected)?)) } else { fit_body(model, detected) }
-    }
-
     /// Records how the track was started: `auto_initialized` by the detector, or by the user.
     pub(crate) fn record_start(&mut self, auto_initialized: bool) {
         self.check.set_auto_initialized(auto_initialized);
@@ -128,14 +121,14 @@ impl Relocalizer {
         self.people.detection().is_none_or(|detected| is_sized_like(body, detected, SIGMAS))
     }
 
-    /// Returns the body and its poses, world frame, that fit best the detection of this frame. The body is `set`, the one of the
-    /// start, or has the detected sizes where these clearly differ.
-    pub(crate) fn fit_detected(&self, model: &Model, set: &Body) -> Option<(Body, Vec<Pose>)> {
+    /// Returns the body and its poses, world frame, that fit best the detection of this frame. The body is `set`, the one that is
+    /// known, or has the detected sizes where none is or these clearly differ.
+    pub(crate) fn fit_detected(&self, model: &Model, set: Option<&Body>) -> Option<(Body, Vec<Pose>)> {
         let detected = self.people.detection()?;
-        if is_sized_like(set, detected, SIGMAS) {
-            return Some((set.clone(), fit_pose(set, detected)?));
+        match set.filter(|set| is_sized_like(set, detected, SIGMAS)) {
+            Some(set) => Some((set.clone(), fit_pose(set, detected)?)),
+            None => fit_body(model, detected),
         }
-        fit_body(model, detected)
     }
 
     /// Returns the poses of this body that fit the detection of this frame, world frame.

@@ -174,7 +174,7 @@ impl BodyTracker {
     fn restart_at_detection(&mut self) -> bool {
         self.note_move();
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
-        let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
+        let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
         let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.is_auto_initialized());
         self.restart(body, poses, !known);
         self.relocalizer.record_start(auto_initialized);
@@ -203,7 +203,8 @@ impl BodyTracker {
     ) -> bool {
         self.relocalizer.set_detection(detection);
         let known = known && self.relocalizer.detects_sizes_of(&self.model.body);
-        let Some((body, poses)) = self.relocalizer.place_body(&self.model, known) else { return false };
+        let set = known.then_some(&self.model.body);
+        let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, set) else { return false };
         self.restart(body, poses, !known);
         self.before.keep(&self.estimate);
         self.assessor.distrust_pose();
