@@ -112,14 +112,11 @@ def is_whole(path: Path) -> bool:
     import cv2
 
     from voodoo.export.people import PeopleTrack
-    from voodoo.export.track import Track
     from voodoo.recordings import open_recording
     from voodoo.recordings.mcap_file import check_mcap
 
     if path.suffix in (".csv", ".npz") and path.name != "summary.csv":
-        people = path.read_bytes().startswith(b"stamp_s,person")
-        people = people or (path.suffix == ".npz" and b"persons.npy" in path.read_bytes())
-        return len((PeopleTrack if people else Track).load(path)) > 0
+        return len(PeopleTrack.load(path)) > 0
     if path.suffix == ".c3d":
         with path.open("rb") as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")

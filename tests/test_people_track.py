@@ -16,8 +16,8 @@ from voodoo.cli import app
 from voodoo.cli.common import NO_POSE
 from voodoo.errors import VoodooError
 from voodoo.evaluation.people_evaluate import judge
+from voodoo.export.files import save
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
 from voodoo.export.track import Track
 from voodoo.measurements import MarkerSet, RecordedFrame
 from voodoo.names import SEARCHING
@@ -129,13 +129,26 @@ def test_the_npz_holds_everybody_exactly(followed, tmp_path):
     for one, track in result.tracks.items():
         for name in ("stamps", "residual", "joints", "world_from_limb", "angles"):
             np.testing.assert_array_equal(getattr(again.tracks[one], name), getattr(track, name))
-        assert again.tracks[one].status == track.status
+        assert (again.tracks[one].status, again.tracks[one].limb_status) == (track.status, track.limb_status)
+
+
+def test_the_csv_holds_of_everybody_what_it_holds_of_one(followed, tmp_path):
+    result, _ = followed
+    result.save(tmp_path / "all.csv")
+    again = PeopleTrack.load(tmp_path / "all.csv")
+    for one, track in result.tracks.items():
+        np.testing.assert_allclose(again.tracks[one].joints, track.joints, atol=1e-6)
+        assert (again.tracks[one].status, again.tracks[one].limb_status) == (track.status, track.limb_status)
+        track.save(tmp_path / "one.csv")
+        with (tmp_path / "one.csv").open(newline="") as alone, (tmp_path / "all.csv").open(newline="") as together:
+            own = [{**row, "person": str(one)} for row in csv.DictReader(alone)]
+            assert own == [row for row in csv.DictReader(together) if row["person"] == str(one)]
 
 
 def test_there_is_a_bvh_and_a_trc_for_every_person(followed, tmp_path):
     result, bodies = followed
     for suffix in (".bvh", ".trc"):
-        written = save_people(result, tmp_path / f"all{suffix}", bodies=bodies, root_frame="base_link")
+        written = save(result, tmp_path / f"all{suffix}", body=bodies, root_frame="base_link")
         assert [path.name for path in written] == [f"all_1{suffix}", f"all_2{suffix}"]
         assert all(path.is_file() for path in written)
     frames = [line for line in (tmp_path / "all_2.bvh").read_text().splitlines() if line.startswith("Frames:")]
@@ -144,7 +157,7 @@ def test_there_is_a_bvh_and_a_trc_for_every_person(followed, tmp_path):
 
 def test_the_bag_has_the_frames_of_everybody(followed, tmp_path):
     result, bodies = followed
-    save_people(result, tmp_path / "all", bodies=bodies, root_frame="odom")
+    save(result, tmp_path / "all", body=bodies, root_frame="odom")
     children, stamps = {}, []
     with AnyReader([tmp_path / "all"]) as bag:
         topics = {connection.topic for connection in bag.connections}
@@ -166,8 +179,8 @@ def test_files_of_nobody_are_written_all_the_same(tmp_path):
     nobody.save(tmp_path / "nobody.csv")
     nobody.save(tmp_path / "nobody.npz")
     assert PeopleTrack.load(tmp_path / "nobody.npz").tracks == {}
-    assert save_people(nobody, tmp_path / "nobody.bvh", bodies={}, root_frame="odom") == []
-    save_people(nobody, tmp_path / "nobody.mcap", bodies={}, root_frame="odom")
+    assert save(nobody, tmp_path / "nobody.bvh", body={}, root_frame="odom") == []
+    save(nobody, tmp_path / "nobody.mcap", body={}, root_frame="odom")
     assert (tmp_path / "nobody.mcap").is_file()
     assert PeopleTrack.load(tmp_path / "nobody.csv").tracks == {}
 
@@ -189,7 +202,7 @@ def test_readers_of_one_person_take_the_only_one_and_refuse_several(followed, tm
     PeopleTrack(result.stamps, {2: result.tracks[2]}).save(tmp_path / f"one{suffix}")
     assert len(Track.load(tmp_path / f"one{suffix}")) == len(result.tracks[2])
     result.save(tmp_path / f"two{suffix}")
-    with pytest.raises(VoodooError, match="expected the result of one person, found persons 1, 2"):
+    with pytest.raises(VoodooError, match=r"found persons 1, 2; PeopleTrack\.load reads them"):
         Track.load(tmp_path / f"two{suffix}")
 
 

@@ -11,8 +11,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import voodoo
 from made_up import two_people
+from voodoo.export.files import save
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
 from voodoo.export.ros2 import person_id, write_bag
 from voodoo.export.track import Track
 from voodoo.export.urdf import urdf
@@ -42,7 +42,7 @@ def several(folder):
     for step in track_people(two_people(), people):
         estimates.append(step.estimate)
         bodies |= {person.id: people.body(person.id) for person in step.estimate}
-    save_people(PeopleTrack.of(estimates, bodies=bodies), folder, bodies=bodies, root_frame="odom")
+    save(PeopleTrack.of(estimates, body=bodies), folder, bodies=bodies, root_frame="odom")
     return 2
 
 

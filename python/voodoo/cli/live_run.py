@@ -225,7 +225,7 @@ class FileOutput(Output):
 
     def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str], several: bool) -> None:
         """Make the folder of the poses."""
-        self._spool = Spool(paths, root_frame=root_frame, several=several, together=_TOGETHER)
+        self._spool = Spool(paths, root_frame=root_frame, together=_TOGETHER)
         self._several = several
         self._turn: Turn | None = None
         self.written: list[Path] = []

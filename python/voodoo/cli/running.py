@@ -153,7 +153,6 @@ def spool_of(
     *,
     suffix: str = ".csv",
     upright: bool = False,
-    several: bool = False,
 ) -> tuple[Sequence[Path], Spool]:
     """The outputs of a command, by default one with the name of the recording, and where their poses are kept until the end.
 
@@ -168,7 +167,7 @@ def spool_of(
     if not out:
         check_paths(context, targets)
     recover_before(targets)
-    how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright, "several": several}
+    how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright}
     return targets, Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
 
 

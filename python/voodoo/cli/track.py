@@ -223,7 +223,7 @@ def track_command(
             draw_regions=(draw_regions, ("color",)),
             background=(background, ("color",)),
         )
-        targets, keeping = spool_of(source, out, context, upright=upright, several=several)
+        targets, keeping = spool_of(source, out, context, upright=upright)
         with keeping as spool, viewer_of(view, save, source.name) as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(used, draw_regions=draw_regions)
