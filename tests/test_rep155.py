@@ -42,7 +42,7 @@ def several(folder):
     for step in track_people(two_people(), people):
         estimates.append(step.estimate)
         bodies |= {person.id: people.body(person.id) for person in step.estimate}
-    save(PeopleTrack.of(estimates, body=bodies), folder, bodies=bodies, root_frame="odom")
+    save(PeopleTrack.of(estimates, bodies=bodies), folder, body=bodies, root_frame="odom")
     return 2
 
 

@@ -109,8 +109,8 @@ def track_command(
     cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until a person is found,
     and when the person has left, the status is searching and the coordinates are empty.
 
-    The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in the
-    recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
+    The .csv has stamp_s, person (1), status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in
+    the recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
     limb. The .npz adds the pose of every limb. Ctrl-C writes the frames so far and ends with exit code 130; after a
     crash, voodoo recover does.
 
@@ -120,9 +120,9 @@ def track_command(
     --init FILE gives the pose in the first frame, by any subset of names that determines it, or with stamp_s in a later frame:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
-    --people any or N tracks several persons, detected in depth images; no start is read. The .csv then begins with stamp_s,
-    person, status, residual_m and has a row for every person who is present; person is an id from 1, which is kept when a person
-    returns. The .npz, .glb and bags have all persons (frames body_p1, ...); others have one file per person: NAME_1.bvh, ...
+    --people any or N tracks several persons, detected in depth images; no start is read. The .csv then has a row for every
+    person who is present; person is an id from 1, which is kept when a person returns.
+    The .npz, .glb and bags have all persons (frames body_p1, ...); others have one file per person: NAME_1.bvh, ...
 
     Examples
 
