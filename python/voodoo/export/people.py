@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.export.table import BY_FRAME, Arrays, FloatArray, opened_result, save_result
 from voodoo.export.track import Track, arrays_of, tracks_of
@@ -48,15 +49,10 @@ class PeopleTrack:
             estimates: of all frames.
             bodies: bodies of the persons, with their last sizes; required for the joint angles.
         """
-        known = bodies or {}
-        persons = sorted({person.id for estimate in estimates for person in estimate})
-        tracks = {
-            one: Track.of(
-                [person.estimate for estimate in estimates for person in estimate if person.id == one],
-                body=known.get(one),
-            )
-            for one in persons
-        }
+        found: dict[int, list[Estimate]] = {}
+        for person in (person for estimate in estimates for person in estimate):
+            found.setdefault(person.id, []).append(person.estimate)
+        tracks = {one: Track.of(found[one], body=(bodies or {}).get(one)) for one in sorted(found)}
         return cls(np.array([estimate.stamp for estimate in estimates], dtype=np.float64), tracks)
 
     def unbroken(self, person: int, *, to_the_end: bool = False) -> Track:
@@ -66,7 +62,6 @@ class PeopleTrack:
             return track
         place = np.searchsorted(self.stamps, track.stamps)
         first, end = int(place[0]), len(self) if to_the_end else int(place[-1]) + 1
-
         rows = np.full(end - first, -1)
         rows[place - first] = np.arange(len(track))
         away, wide = rows < 0, track.of_frames(rows)
@@ -104,7 +99,8 @@ class PeopleTrack:
         Raises:
             VoodooError: one is missing, or they do not belong together.
         """
-        return cls(content["frame_stamps" if "frame_stamps" in content else "stamps"], tracks_of(content))
+        tracks = tracks_of(content)
+        return cls(content["frame_stamps" if "frame_stamps" in content else "stamps"], tracks)
 
     @classmethod
     def joined(cls, parts: Sequence[PeopleTrack]) -> PeopleTrack:

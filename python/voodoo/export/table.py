@@ -6,6 +6,7 @@ import csv
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import isnan
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -20,14 +21,14 @@ from voodoo.whole import appearing_whole
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
-"""The arrays of docs/reference/files.md#results, by name; R rows, of which those of a part of a result follow those before."""
+"""Arrays of a result, or of a part of it, by the names of docs/reference/files.md#results."""
 
 BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", "angle_sigma", "covariance", "root_covariance")
 """Arrays of numbers with a row each."""
 _BY_ROW = (*BY_FRAME, "status", "limb_status", "person", "frame_stamps")
 """Arrays that are concatenated."""
 BODIES, BODY_OF = "bodies", "body_of"
-"""Arrays of a part that are not those of a result: texts of bodies, and the persons whose they are."""
+"""Arrays of a part that a result does not have: bodies as text, and their persons."""
 _FIRST = ("stamp_s", "person", "status", "residual_m")
 """The first columns of .csv."""
 _STATUS = "_status"
@@ -42,7 +43,7 @@ def write_result(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Array
     Args:
         path: the file.
         parts: returns their arrays, from the first part on.
-        fixed: arrays that are not those of a part; not in .csv.
+        fixed: arrays of the whole result, in place of those of its parts; not in .csv.
     """
     if path.suffix == ".csv":
         _write_csv(path, parts)
@@ -123,7 +124,7 @@ def joint_sigma(covariance: FloatArray) -> FloatArray:
 
 def cells(values: Iterable[float]) -> list[str]:
     """Texts of numbers; empty if unknown."""
-    return ["" if np.isnan(value) else f"{value:.6f}" for value in values]
+    return ["" if isnan(value) else f"{value:.6f}" for value in values]
 
 
 def _header(names: Sequence[str], angle_names: Sequence[str]) -> list[str]:
@@ -133,7 +134,7 @@ def _header(names: Sequence[str], angle_names: Sequence[str]) -> list[str]:
 def _read_csv(path: Path) -> Arrays:
     with path.open(newline="", encoding="utf-8-sig") as file:
         header, *lines = list(csv.reader(file)) or [[]]
-    if header[:2] == ["stamp_s", "status"]:  # a file of one person had no column of persons once
+    if header[:2] == ["stamp_s", "status"]:  # earlier versions wrote one person without this column
         header.insert(1, "person")
         for line in lines:
             line.insert(1, "1")

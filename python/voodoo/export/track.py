@@ -242,7 +242,7 @@ def arrays_of(
 
     Args:
         rows: of one person, or of several.
-        persons: (R,) whose the rows are; None: all are of person 1.
+        persons: (R,) person of each row; None: 1.
         frame_stamps: (F,) [s] of all frames; None: a row is a frame.
     """
     limbs = np.array(list(rows.limb_status.values()), dtype=np.str_)
@@ -266,7 +266,7 @@ def left_out_arrays(left_out: Mapping[str, int]) -> dict[str, npt.NDArray[Any]]:
 
 
 def rows_of(content: Arrays) -> Track:
-    """The rows of such arrays, whosever they are.
+    """All rows of such arrays, of one person or several.
 
     Raises:
         VoodooError: one is missing, or they do not belong together.
