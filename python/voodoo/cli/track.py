@@ -143,7 +143,7 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.closing import closing_doubts, closing_lines
-    from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people, refuse_several
+    from voodoo.cli.people import limit_of, no_starts, refuse_several
     from voodoo.cli.running import (
         bare_for,
         boxes_of,
@@ -161,14 +161,11 @@ def track_command(
         viewer_of,
     )
     from voodoo.export.files import upright_words
-    from voodoo.export.spool import ONE
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
-    from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
-    from voodoo.pipeline.people import track_people
     from voodoo.pipeline.run import track
-    from voodoo.pipeline.start import AUTO, beginning_of, start_tracker, starts_of
+    from voodoo.pipeline.start import AUTO, beginning_of, start_people, start_tracker, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
@@ -210,7 +207,7 @@ def track_command(
         for words in source.assumed:
             print_message(words)
         if several:
-            refuse_several(draw_regions=draw_regions, background=background, marker_map=marker_map)
+            refuse_several(draw_regions=draw_regions, background=background)
         used = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
         places = ("depth", "points", "scan")
         refuse_unused(
@@ -227,26 +224,23 @@ def track_command(
         with keeping as spool, viewer_of(view, save, source.name) as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(used, draw_regions=draw_regions)
+            start: dict[str, Any] = {
+                "body": None if body is None else Body.load(body),
+                "height": height,
+                "model": model,
+                "config": config_of(config),
+                "markers": markers,
+                "use": kinds,
+                "detector": detector_of(detector),
+            }
+            tracker: Any
             if several:
-                followed = body_of(body, height=height, model=model)
-                everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
-                steps = track_people(source, everybody, settings=settings, left_out=left_out)
-                how |= {"steps": steps, **pictured_people(everybody, spool)}
+                tracker = start_people(source, limit=limit, **start)
             else:
-                tracker = start_tracker(
-                    source,
-                    init=beginning,
-                    body=None if body is None else Body.load(body),
-                    height=height,
-                    model=model,
-                    config=config_of(config),
-                    markers=markers,
-                    use=kinds,
-                    detector=detector_of(detector),
-                )
-                starts = starts_of(beginning, source)
-                how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
-                how |= {"take": lambda step: spool.add(step.estimate, {ONE: tracker.body}), **pictured(tracker)}
+                tracker = start_tracker(source, init=beginning, **start)
+            starts = starts_of(beginning, source)
+            how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+            how |= pictured(tracker, spool.add)
             with deferred():
                 done = run(source, **how)
                 sample = spool.sample()

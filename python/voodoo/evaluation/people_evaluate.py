@@ -16,7 +16,7 @@ from voodoo.export.people_rows import read_rows
 from voodoo.model.body import Body
 from voodoo.names import HumanModel
 from voodoo.people import People
-from voodoo.pipeline.people import track_people
+from voodoo.pipeline.run import track
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, PeopleTruth
 from voodoo.recordings.recording import Recording
@@ -90,7 +90,7 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
     """
     truth = truth_of(recording)
     motmetrics()  # a missing library must be reported before the work
-    steps = list(track_people(recording, people, settings=settings))
+    steps = list(track(recording, people, settings=settings))
     rows = PeopleTrack.of([step.estimate for step in steps]).rows()
     seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan
     about = recording.info()
