@@ -11,6 +11,7 @@ from measurement_data import data_folder
 from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
+from voodoo.pipeline.run import track
 from voodoo.recordings import open_recording
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.pose2sim import SITES
@@ -163,6 +164,20 @@ def test_two_persons_in_four_pictures_without_names(voodoo_data):
             ]
         )
     assert np.nanmean(errors) < 0.05
+
+
+def test_persons_who_touch_are_one_segment_and_several_bodies(voodoo_data):
+    recording = open_recording(data_folder(voodoo_data, "real", "pcl_five"))
+    steps = [step.estimate for step in track(recording, voodoo.People())]
+    assert len(steps[17]) == 5  # 0.57 s
+    roots = np.array([person.estimate.joints["humanoid_root"] for person in steps[-1]])
+    apart = np.linalg.norm(roots[:, None] - roots, axis=2) + 9.0 * np.eye(len(roots))
+    assert len(roots) == 5 and apart.min() > 0.4
+    shoulders = [
+        np.linalg.norm(person.estimate.joints["l_shoulder"] - person.estimate.joints["r_shoulder"])
+        for person in steps[-1]
+    ]
+    assert max(shoulders) < 0.5, "no body spans two persons"
 
 
 def test_two_who_cross_keep_their_numbers(voodoo_data):

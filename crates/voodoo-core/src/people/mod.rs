@@ -19,9 +19,9 @@ use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body,
 };
 use crate::error::TrackError;
-use crate::math::Vec3;
+use crate::math::{Pose, Vec3};
 use crate::observation::background::Background;
-use crate::observation::frame::{DetectedPerson, Frame, PositionRelation};
+use crate::observation::frame::{DepthImage, DetectedPerson, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
@@ -35,6 +35,10 @@ use tentative_tracks::{SAME_PERSON, TentativeTrack, TentativeTracks};
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
 const DETECT_EVERY: f64 = 0.06;
+/// Fraction of a detected person's segment that may show another person if the person does not explain it.
+const LEFT_OVER: f64 = 0.3;
+/// Largest number of persons after whom the rest of a segment is looked at again.
+const MOST_TOGETHER: usize = 4;
 /// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.3;
 /// A track that lasted for less than this is not remembered, seconds.
@@ -317,25 +321,66 @@ impl People {
     }
 
     fn detect(&mut self, frame: &Frame, query: DetectionQuery) {
-        for (number, image) in frame.images.iter().enumerate() {
-            let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
-            let around = Surroundings {
-                ground: frame.ground,
-                excluded: frame.excluded,
-                owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
-                // A person may have stood there since the camera started, so only an old background is excluded.
-                background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
-                ..Surroundings::default()
-            };
-            for found in self.detector.detect(&self.prototype, image, &around, query) {
-                if !self.is_requested(frame, found.root) {
-                    self.detector.reject(found.index);
-                    continue;
+        for number in 0..frame.images.len() {
+            let mut found = self.detect_in_image(frame, number, query);
+            // Persons who touch are one segment: what a detected person leaves of it may show another one.
+            let mut newcomers = Vec::new();
+            for next in 0..MOST_TOGETHER {
+                let Some(one) = found.get(next) else { break };
+                let detected = Detected { detection: &one.detection, map: self.detector.map() };
+                newcomers.extend(fit_body(&Model::new(self.prototype.clone()), detected));
+                self.assign_segment(frame, number, &one.detection.pixels, &newcomers);
+                if let Some(place) = self.rest_of_segment(&frame.images[number], number, &one.detection.pixels) {
+                    found.extend(self.detect_in_image(frame, number, DetectionQuery::Near(place)));
                 }
+            }
+            for found in found {
                 let still = self.everybody && self.scene.is_still(frame, number, &found.detection.pixels);
                 self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), still);
             }
         }
+    }
+
+    /// Returns the persons who are detected in an image, and are to be tracked.
+    fn detect_in_image(&mut self, frame: &Frame, number: usize, query: DetectionQuery) -> Vec<PlacedDetection> {
+        let image = &frame.images[number];
+        let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
+        let around = Surroundings {
+            ground: frame.ground,
+            excluded: frame.excluded,
+            owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
+            // A person may have stood there since the camera started, so only an old background is excluded.
+            background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
+            ..Surroundings::default()
+        };
+        let mut found = self.detector.detect(&self.prototype, image, &around, query);
+        found.retain(|found| {
+            let requested = self.is_requested(frame, found.root);
+            if !requested {
+                self.detector.reject(found.index);
+            }
+            requested
+        });
+        found
+    }
+
+    /// Assigns pixels of a segment to newcomers, who are numbered after all persons.
+    fn assign_segment(&mut self, frame: &Frame, image: usize, pixels: &[usize], newcomers: &[(Body, Vec<Pose>)]) {
+        let bodies = (self.persons.len() as u16..).zip(newcomers).map(|(number, (body, poses))| PredictedBody {
+            number,
+            body,
+            poses,
+        });
+        self.assignment.assign_segment(&frame.images[image], image, pixels, bodies);
+    }
+
+    /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
+    fn rest_of_segment(&self, image: &DepthImage, number: usize, pixels: &[usize]) -> Option<Vec3> {
+        let owners = &self.assignment.owners()[number];
+        let free = || pixels.iter().filter(|pixel| owners[**pixel] == NO_OWNER);
+        let place = |pixel: usize| image.back_project(pixel, image.pixels.get(pixel) * image.meters_per_unit as f32);
+        let (count, sum) = (free().count() as f64, free().map(|pixel| place(*pixel)).sum::<Vec3>());
+        (count > LEFT_OVER * pixels.len() as f64).then(|| image.world_from_sensor * (sum / count))
     }
 
     /// Whether a person detected at a position is to be tracked.
@@ -367,13 +412,29 @@ impl People {
             absent.iter().map(cost).collect()
         };
         let costs: Vec<Vec<f64>> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).map(cost).collect();
-        for (track, given) in confirmed.iter().zip(assign::assign(&costs, NEW)) {
+        let given = assign::assign(&costs, NEW);
+        let known = |column: Option<usize>| column.map(|column| absent[column]);
+        // Who comes with others gets their own pixels.
+        let (first, mut newcomers, mut numbers) = (self.persons.len(), Vec::new(), Vec::new());
+        for (track, column) in confirmed.iter().zip(&given) {
+            let tracked = known(*column).filter(|number| self.persons[*number].is_tracked());
+            let fitted = if tracked.is_none() { self.fit_track(track) } else { None };
+            numbers.push(fitted.is_some().then_some(first + newcomers.len()));
+            newcomers.extend(fitted);
+        }
+        let others: Vec<(Body, Vec<Pose>)> =
+            self.tentative.updated_at(frame.stamp).filter_map(|track| self.fit_track(track)).collect();
+        newcomers.extend(others);
+        for track in confirmed.iter().filter(|track| !track.detection.pixels.is_empty()) {
+            self.assign_segment(frame, track.image, &track.detection.pixels, &newcomers);
+        }
+        for ((track, given), own) in confirmed.iter().zip(given).zip(numbers) {
             let known = given.map(|column| absent[column]);
             let others = self.tracked_except(known);
             let Some(leaves) = self.options.room(frame, track.place, &others) else { continue };
             let came = match known {
-                Some(number) => self.reactivate(frame, track, number),
-                None => self.spawn(frame, track),
+                Some(number) => self.reactivate(frame, track, number, own.unwrap_or(number)),
+                None => self.spawn(frame, track, own.unwrap_or(first)),
             };
             if let Some(leaves) = leaves.filter(|_| came) {
                 self.persons[leaves].present = false;
@@ -399,30 +460,37 @@ impl People {
         Detected { detection: &track.detection, map: self.detector.map() }
     }
 
+    /// Returns the body of a tentative track, in its sizes, and its poses.
+    fn fit_track(&self, track: &TentativeTrack) -> Option<(Body, Vec<Pose>)> {
+        let model = Model::new(self.prototype.clone());
+        match track.positions.as_slice() {
+            [] => fit_body(&model, self.detected(track)),
+            positions => model.fit(&sites_of(positions), true).ok(),
+        }
+    }
+
     /// Returns the colors of a tentative track's clothes.
     fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
-        let model = Model::new(self.prototype.clone());
-        let fitted = match track.positions.as_slice() {
-            [] => fit_body(&model, self.detected(track)),
-            positions => model.fit(&sites_of(positions), true).ok(),
-        };
-        if let Some((body, poses)) = fitted {
-            let free = |image: usize, pixel: usize| self.assignment.owners()[image].get(pixel) == Some(&NO_OWNER);
+        if let Some((body, poses)) = self.fit_track(track) {
+            let tracked = |owner: u16| usize::from(owner) < self.persons.len();
+            let free = |image: usize, pixel: usize| {
+                self.assignment.owners()[image].get(pixel).is_some_and(|owner| !tracked(*owner))
+            };
             clothes.observe(frame, &body, &poses, free);
         }
         clothes
     }
 
     /// Spawns a new person at a tentative track. Returns whether the person is there.
-    fn spawn(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
+    fn spawn(&mut self, frame: &Frame, track: &TentativeTrack, own: usize) -> bool {
         let full = self.persons.len() >= usize::from(NO_OWNER);
         if full || !self.options.includes(self.next_id) {
             return false;
         }
         let Ok(person) = self.nobody_yet(frame.stamp) else { return false };
         self.persons.push(person);
-        let came = self.reactivate(frame, track, self.persons.len() - 1);
+        let came = self.reactivate(frame, track, self.persons.len() - 1, own);
         if came {
             self.next_id += 1;
         } else {
@@ -431,15 +499,15 @@ impl People {
         came
     }
 
-    /// Starts a person's tracker at a tentative track. Returns whether the person is there.
-    fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize) -> bool {
+    /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
+    fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
         self.scene.release(frame, track.image, &track.detection.pixels);
         let person = &mut self.persons[number];
         if !self.options.includes(person.id) {
             return false;
         }
         let known = person.created < frame.stamp;
-        let ownership = self.assignment.ownership(number, self.scene.known());
+        let ownership = self.assignment.ownership(own, self.scene.known());
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
