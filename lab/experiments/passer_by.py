@@ -9,6 +9,7 @@ the greatest distance, and those without a pose. The id of the person is the one
 """
 
 import argparse
+import sys
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,10 @@ import voodoo
 from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
-from voodoo.synthetic.passer_by import WithPasserBy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from synthetic.passer_by import WithPasserBy
 
 FAR_M = 0.5
 ROOT = "humanoid_root"
