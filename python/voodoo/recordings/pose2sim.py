@@ -280,6 +280,6 @@ def read_triangulation(path: Path, rate: float) -> Reference | None:
     files = sorted(path.glob("*.trc"), key=lambda file: (len(file.name), file.name))
     if not files:
         return None
-    names, positions = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP).of(SITES)
+    names, positions = read_trc(files[0]).of(SITES)
     # Rows are images; the file's own time starts at 1 / rate for image 0.
-    return Reference(np.arange(len(positions)) / rate, names, positions, exact=False)
+    return Reference(np.arange(len(positions)) / rate, names, positions @ Z_UP_FROM_Y_UP.T, exact=False)
