@@ -13,6 +13,7 @@ from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.model.transforms import is_rigid
 from voodoo.recordings.camera_yaml import camera_tables
 from voodoo.recordings.pictures import picture_size
 from voodoo.stored import read_stored
@@ -146,14 +147,7 @@ def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here
     if rows is None:
         return np.eye(4)
     pose = numbers_or_nan(rows)
-    rigid = (
-        pose.shape == (4, 4)
-        and np.isfinite(pose).all()
-        and np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=_TYPED)
-        and np.linalg.det(pose[:3, :3]) > 0.0
-        and np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0))
-    )
-    if not rigid:
+    if not is_rigid(pose, off=_TYPED):
         raise RecordingError(
             f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {short(rows)}"
         )
