@@ -15,7 +15,7 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.model.body_toml import body_text, core_body
-from voodoo.model.joint import Joint, Place, as_numbers, number_of, short
+from voodoo.model.joint import Joint, Place, number_of, numbers_of, short
 from voodoo.model.toml_io import read_text
 from voodoo.names import HumanModel
 
@@ -131,10 +131,7 @@ def checked_joints(
         raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
     checked = {}
     for name, position in joints.items():
-        try:
-            x, y, z = (float(value) for value in as_numbers(position).reshape(-1))
-        except (TypeError, ValueError, OverflowError):
-            raise BodyError(f"{what}[{name}]: expected three numbers in meters, found {short(position)}") from None
+        x, y, z = numbers_of(f"{what}[{name}]", position, BodyError, "three numbers in meters", count=3).tolist()
         if not all(map(math.isfinite, (x, y, z))):
             raise BodyError(f"{what}[{name}]: expected finite meters, found {short(position)}")
         checked[name] = (x, y, z)
@@ -157,11 +154,5 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
         raise BodyError(
             f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(map(str, world_from_limb))}"
         )
-    poses = []
-    for name in names:
-        try:
-            poses.append(as_numbers(world_from_limb[name]))
-        except (TypeError, ValueError, OverflowError):
-            found = short(world_from_limb[name])
-            raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None
-    return poses
+    expected = "a rigid 4x4 transform"
+    return [numbers_of(f"world_from_limb[{name}]", world_from_limb[name], MeasurementError, expected) for name in names]
