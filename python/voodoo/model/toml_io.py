@@ -1,4 +1,4 @@
-"""Reads TOML with errors of the caller's class, and writes it with tomlkit, which keeps comments."""
+"""Reads TOML with errors of the caller's class, and writes it with comments."""
 
 from __future__ import annotations
 
@@ -59,28 +59,3 @@ def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequ
         document.add(name, value)
         document.add(tomlkit.nl())
     return tomlkit.dumps(document).rstrip("\n") + "\n"
-
-
-def edited(
-    text: str, values: Mapping[str, Any], *, defaults: Mapping[str, Any], source: str, error: type[VoodooError]
-) -> str:
-    """Change values at the top level of a TOML text; comments, order and layout are kept.
-
-    Args:
-        text: the TOML.
-        values: by key; missing keys are appended unless they have their default values.
-        defaults: default values.
-        source: origin of the text, for the message.
-        error: class of the error.
-
-    Raises:
-        VoodooError: of the class `error`, see `parse_toml`.
-    """
-    import tomlkit
-
-    before = parse_toml(text, source=source, error=error)
-    document = tomlkit.parse(text)
-    for key, value in values.items():
-        if before[key] != value if key in before else value != defaults[key]:
-            document[key] = value
-    return tomlkit.dumps(document)
