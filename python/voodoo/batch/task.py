@@ -15,7 +15,7 @@ import numpy as np
 
 from voodoo.batch.storage import Store, on_disk
 from voodoo.batch.summary import DONE, FAILED, REPORTS, Row
-from voodoo.batch.table import Columns, columns_of, encode, note_of, stacked
+from voodoo.batch.table import Columns, columns_of, encode, note_of
 from voodoo.config import Config
 from voodoo.errors import RecordingError
 from voodoo.evaluation import metrics
@@ -141,7 +141,7 @@ def stored_row(out: str, name: str, settings: Settings) -> Row | None:
     return row if row.status == DONE else None
 
 
-def _track(job: Job, path: Path) -> tuple[Row, Columns]:
+def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
     chosen = job.settings
     left_out = None if chosen.strict else LeftOut()
     options = {"loader": chosen.loader, **(chosen.options or {})} | pictures_alone(path, chosen.loader, chosen.use)
@@ -177,7 +177,7 @@ def _track(job: Job, path: Path) -> tuple[Row, Columns]:
         left_out=0 if left_out is None else len(left_out),
         source=job.source,
     )
-    return row, stacked(columns)
+    return row, columns
 
 
 def _one_person(
