@@ -221,15 +221,22 @@ def tracking_class(errors: FloatArray, stamps: FloatArray, *, limit: float) -> t
     return (0 if at_end else 1 if lost.any() else 2), lost
 
 
-def jitter(positions: FloatArray) -> float:
+def jitter(positions: FloatArray, still: BoolArray | None = None, *, lag: int = 0) -> float:
     """Mean norm [m] of the second difference of joint positions (F, J, 3) over time; NaN for fewer than three frames.
 
     It is zero for a body that stands still or moves uniformly. Since it includes real acceleration, compare it with that of
     the reference.
+
+    Args:
+        positions: of the estimate, or of the reference itself.
+        still: (F, J) where joints should stand still, see standing_still; None: everywhere, also where they move.
+        lag: frame i is compared with frame i - lag of `still`: positive if the estimate is late.
     """
     if len(positions) < 3:
         return float("nan")
-    return mean_or_nan(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2))
+    second = np.full(positions.shape[:2], np.nan)
+    second[1:-1] = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
+    return mean_or_nan(second if still is None else second[shifted(still, lag) == 1.0])
 
 
 def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
@@ -252,24 +259,6 @@ def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
         quiet &= away <= STILL_M
     still[reach : frames - reach] = quiet
     return still
-
-
-def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) -> float:
-    """Mean norm [m] of the second difference of joints (F, J, 3) over the frames in which they should stand still.
-
-    Args:
-        positions: of the estimate, or of the reference itself.
-        still: (F, J), see standing_still.
-        lag: frame i is compared with frame i - lag of `still`: positive if the estimate is late.
-
-    Returns:
-        NaN if no joint stands still.
-    """
-    if len(positions) < 3:
-        return float("nan")
-    second = np.full(positions.shape[:2], np.nan)
-    second[1:-1] = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
-    return mean_or_nan(second[shifted(still, lag) == 1.0])
 
 
 def fraction_within(distances: FloatArray, limit: float) -> float:
