@@ -48,14 +48,9 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
 
 def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:
     """Entries as TOML, each below the lines of its comment."""
-    import tomlkit
+    from tomlkit import item
 
-    document = tomlkit.document()
-    document.add(tomlkit.comment(title))
-    document.add(tomlkit.nl())
+    blocks = [[f"# {title}"]]
     for name, value in values.items():
-        for line in notes.get(name, ()):
-            document.add(tomlkit.comment(line))
-        document.add(name, value)
-        document.add(tomlkit.nl())
-    return tomlkit.dumps(document).rstrip("\n") + "\n"
+        blocks.append([*(f"# {line}" for line in notes.get(name, ())), f"{name} = {item(value).as_string()}"])
+    return "\n\n".join(map("\n".join, blocks)) + "\n"

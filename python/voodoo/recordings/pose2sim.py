@@ -119,7 +119,7 @@ class Pose2SimRecording(Recording):
             KeypointImage(
                 sensor=placed.name,
                 stamp=index / self.rate,
-                people=() if file is None else read_people(file, layout=layout, left_out=left_out),
+                people=read_people(file, layout=layout, left_out=left_out),
                 layout=layout or "",
                 camera=placed.camera,
                 root_from_sensor=placed.world_from_sensor,
@@ -131,7 +131,7 @@ class Pose2SimRecording(Recording):
         """Tell the layout, and check the keypoints of some instants against the calibration."""
         unread = None if self._left_out is None else LeftOut()
         instants = some_of(
-            len(self),
+            range(len(self)),
             lambda index: self._images(index, asked, unread),
             good=lambda images: any(image.people for image in images),
         )
