@@ -13,11 +13,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.children import children
@@ -26,6 +25,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
 from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
+from voodoo.evaluation.metrics import BoolArray, FloatArray
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
 from voodoo.names import SEARCHING, HumanModel
@@ -36,7 +36,6 @@ from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 _OF_TERMINALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name))
 """Signals of Ctrl-C and of a terminal that is closed."""
 
@@ -116,12 +115,12 @@ def differences(recording: Recording, result: Track, *, at_best_lag: bool = Fals
     return np.asarray(positions - metrics.shifted(reference, lag))
 
 
-def called_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
+def called_measured(estimate: Estimate) -> BoolArray:
     """For metrics.JOINTS (12,), whether the status of the limb that ends there is "measured"; False for joints of the trunk."""
     return np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
 
 
-def limb_ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
+def limb_ends(errors: FloatArray, *, far: bool) -> BoolArray:
     """Masks (F, 12) of the joints at ends of limbs that are farther than LIMIT_EXACT_M from the truth, and of the nearer ones."""
     ends = np.array([name in _CARRIER for name in metrics.JOINTS])
     return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
@@ -228,7 +227,7 @@ class _Step:
     status: str
     seconds: float
     joints: FloatArray
-    measured: npt.NDArray[np.bool_]
+    measured: BoolArray
     witness: FrameWitness
     sigma: FloatArray
 
