@@ -24,6 +24,8 @@ from voodoo.unpacking import Unpacking
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
 _ATTACHMENT, _METADATA = 0x09, 0x0C
+_MOST = {_ATTACHMENT: 2**63} | dict.fromkeys((_CHUNK, _MESSAGE, _MESSAGE_INDEX, _METADATA), MOST_BYTES)
+"""Largest size of a record that is more than metadata [bytes]."""
 _MOST_OF_ALL = {_SCHEMA: 16 * MOST_METADATA, _CHANNEL: MOST_METADATA}
 """Largest size of all schemas, and of all channels [bytes]."""
 _ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
@@ -272,17 +274,10 @@ def check_mcap(path: Path) -> frozenset[int]:
 
 
 def _check_record(path: Path, code: int, length: int, position: int, found: _Found) -> None:
-    most = {
-        _CHUNK: MOST_BYTES,
-        _MESSAGE: MOST_BYTES,
-        _MESSAGE_INDEX: MOST_BYTES,
-        _METADATA: MOST_BYTES,
-        _ATTACHMENT: 2**63,
-    }
-    if length > most.get(code, MOST_METADATA):
+    most = _MOST.get(code, MOST_METADATA)
+    if length > most:
         raise RecordingError(
-            f"{path}: expected a record of {most.get(code, MOST_METADATA)} bytes at most, found {length} bytes at byte "
-            f"{position}"
+            f"{path}: expected a record of {most} bytes at most, found {length} bytes at byte {position}"
         )
     if code == _CHUNK:
         found.chunks.add(position)

@@ -115,12 +115,7 @@ class RosRecording(Recording):
         )
         self._bag = Bag(path, left_out=left_out, unpacked=None if given is None else int(given * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
-        choices: dict[TopicKind, TopicChoice] = {
-            "depth": depth_topic,
-            "points": points_topic,
-            "scan": scan_topic,
-            "color": color_topic,
-        }
+        choices = dict(zip(TOPIC_KINDS, (depth_topic, points_topic, scan_topic, color_topic), strict=True))
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
         with self._bag.kept_open():
             sources = finder.find(use)
