@@ -137,18 +137,19 @@ def evaluate_all(
     paths: Sequence[Path],
     *,
     config_file: Path | None = None,
-    loader: str | None = None,
-    options: Mapping[str, Any] | None = None,
-    model: HumanModel | None = None,
-    use: Sequence[str] | None = None,
-    init: Automatic | None = None,
     jobs: int = 1,
+    **how: Any,  # noqa: ANN401 - of evaluate
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
 
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
+
+    Args:
+        paths: of the recordings.
+        config_file: None means the defaults.
+        jobs: number of processes.
+        **how: the other options of `evaluate`.
     """
-    how = {"loader": loader, "options": dict(options or {}), "model": model, "use": use, "init": init}
     task = partial(_task, config_file, how)
     if jobs == 1 or len(paths) == 1:
         for index, path in enumerate(paths):
