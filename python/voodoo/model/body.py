@@ -39,17 +39,12 @@ class Body:
 
     def __init__(self, core: _core.Body) -> None:
         """Wrap a body of the core; use `human`, `load` or `from_toml` instead."""
-        self._core = core
+        self.core = core
         name, limbs, sites = core.parts()
         self.name: str = name
         self.limbs: tuple[Limb, ...] = tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in limbs)
         self.limb_joints: tuple[str | None, ...] = tuple(joint and joint[0] for _, _, _, joint, _ in limbs)
         self.site_names: tuple[str, ...] = tuple(site[0] for site in sites)
-
-    @property
-    def core(self) -> _core.Body:
-        """The body of the compiled core."""
-        return self._core
 
     @property
     def limb_names(self) -> tuple[str, ...]:
@@ -98,19 +93,19 @@ class Body:
         Raises:
             BodyError: not a number, or the result is not a valid body.
         """
-        return Body(self._core.scaled(number_of("factor", factor)))
+        return Body(self.core.scaled(number_of("factor", factor)))
 
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
-        return body_text(self._core)
+        return body_text(self.core)
 
     def __reduce__(self) -> tuple[type[Body], tuple[_core.Body]]:
         """Pickles and copies have the same bits."""
-        return type(self), (self._core,)
+        return type(self), (self.core,)
 
     def __eq__(self, other: object) -> bool:
         """Equal if all limbs, joints and sites are equal."""
-        return isinstance(other, Body) and bool(self._core == other._core)
+        return isinstance(other, Body) and bool(self.core == other.core)
 
     __hash__ = None  # type: ignore[assignment]
 
