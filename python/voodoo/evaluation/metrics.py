@@ -13,9 +13,8 @@ import numpy.typing as npt
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
-JOINTS = tuple(
-    f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("l", "r")
-)
+_LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+JOINTS = tuple(f"{side}_{joint}" for joint in _LIMBS for side in ("l", "r"))
 """The twelve joints that errors are averaged over."""
 
 LOST_AFTER_S = 0.3
@@ -113,27 +112,12 @@ def joint_angles(positions: FloatArray) -> FloatArray:
     limb."""
     at = {name: positions[:, index] for index, name in enumerate(JOINTS)}
     down = (at["l_hip"] + at["r_hip"] - at["l_shoulder"] - at["r_shoulder"]) / 2.0
-    bones = {
-        (side, bone): at[f"{side}_{end}"] - at[f"{side}_{start}"]
-        for side in ("l", "r")
-        for bone, start, end in (
-            ("upperarm", "shoulder", "elbow"),
-            ("forearm", "elbow", "wrist"),
-            ("thigh", "hip", "knee"),
-            ("calf", "knee", "ankle"),
-        )
-    }
-    pairs = [
-        (first, bones[side, second])
-        for side in ("l", "r")
-        for first, second in (
-            (bones[side, "upperarm"], "forearm"),
-            (bones[side, "thigh"], "calf"),
-            (down, "upperarm"),
-            (down, "thigh"),
-        )
-    ]
-    return np.column_stack([_between(first, second) for first, second in pairs])
+    angles = []
+    for side in ("l", "r"):
+        shoulder, elbow, wrist, hip, knee, ankle = (at[f"{side}_{joint}"] for joint in _LIMBS)
+        angles += [_between(elbow - shoulder, wrist - elbow), _between(knee - hip, ankle - knee)]
+        angles += [_between(down, elbow - shoulder), _between(down, knee - hip)]
+    return np.column_stack(angles)
 
 
 def _between(first: FloatArray, second: FloatArray) -> FloatArray:
