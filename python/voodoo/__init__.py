@@ -92,7 +92,7 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands fo
         return value
     from importlib.util import find_spec
 
-    if find_spec(f"voodoo.{name}") is not None:
+    if name.isidentifier() and find_spec(f"voodoo.{name}") is not None:
         return import_module(f"voodoo.{name}")
     raise AttributeError(f"module 'voodoo' has no attribute {name!r}")
 
