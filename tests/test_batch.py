@@ -100,8 +100,8 @@ def test_columns_hold_every_frame_of_everybody():
     columns = columns_of(tracks)
     assert columns["stamp_s"].tolist() == [0.0, 0.1, 0.1, 0.2, 0.2, 0.3]
     assert columns["person"].tolist() == [1, 1, 2, 1, 2, 2]
-    assert columns["status"] == ["searching", "tracking", "searching", "tracking", "tracking", "tracking"]
-    assert columns["torso_status"] == ["", "measured", "", "measured", "measured", "measured"]
+    assert columns["status"].tolist() == ["searching", "tracking", "searching", "tracking", "tracking", "tracking"]
+    assert columns["torso_status"].tolist() == ["", "measured", "", "measured", "measured", "measured"]
     x = T_POSE["l_knee"][0]
     np.testing.assert_allclose(columns["l_knee_x"], [np.nan, x, np.nan, x, x + 1.0, x + 1.0], rtol=1e-6)
     assert {len(column) for column in columns.values()} == {6} and columns["l_knee_x"].dtype == np.float32

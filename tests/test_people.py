@@ -9,8 +9,8 @@ import pytest
 import voodoo
 from measurement_data import data_folder
 from voodoo.errors import BodyError, ConfigError, MeasurementError
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.people import PeopleFrontEnd
 from voodoo.recordings import open_recording
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.pose2sim import SITES
@@ -146,7 +146,7 @@ def test_two_persons_in_four_pictures_without_names(voodoo_data):
     files = [next(folder.glob(f"*_P{number}_0-100.trc")) for number in (1, 2)]
     read = [read_trc(file).of(SITES) for file in files]
     known = [(names, positions @ Z_UP_FROM_Y_UP.T) for names, positions in read]
-    front_end = PeopleFrontEnd(people, settings=FrontEndSettings.of(recording))
+    front_end = FrontEnd(people, settings=FrontEndSettings.of(recording))
     errors = []
     for index, recorded in enumerate(islice(paired(recording), 40)):
         found = front_end.step(recorded)
@@ -171,7 +171,7 @@ def test_two_who_cross_keep_their_numbers(voodoo_data):
     with (folder / "truth_people.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if float(row["in_view"]) > 0.3]
     recording, people = open_recording(folder / "bag"), voodoo.People()
-    front_end, numbers = PeopleFrontEnd(people, settings=FrontEndSettings.of(recording)), {}
+    front_end, numbers = FrontEnd(people, settings=FrontEndSettings.of(recording)), {}
     for recorded in islice(paired(recording), 72):
         for person in front_end.step(recorded):
             root = person.estimate.joints["humanoid_root"]

@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
-from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 
@@ -70,7 +69,7 @@ def alone(recording: WithPasserBy) -> list[voodoo.Estimate | None]:
 
 def among_others(recording: WithPasserBy) -> list[voodoo.Estimate | None]:
     """The person's estimates of `voodoo.People`."""
-    steps = [step.estimate for step in track_people(recording, voodoo.People())]
+    steps = [step.estimate for step in track(recording, voodoo.People())]
     truth = recording.people
     near: Counter[int] = Counter()
     for step in steps:

@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import installed
-from voodoo.export.people import by_time
+from voodoo.export.people import PeopleTrack
+from voodoo.export.table import columns_of as columns_of_rows
 from voodoo.export.track import Track
 
-Columns: TypeAlias = dict[str, npt.NDArray[Any] | list[str]]
+Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 
 NOTE = b"voodoo"
 """Key in the metadata of the file; the value is JSON with the recording's summary row and the settings."""
@@ -29,25 +30,12 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     Args:
         tracks: of each person, from 1; with the same joints.
     """
-    if not tracks:
-        return {
-            "stamp_s": np.empty(0),
-            "person": np.empty(0, np.int32),
-            "status": [],
-            "residual_m": np.empty(0, np.float32),
-        }
-    persons, rows = by_time(tracks)
-    residual, joints, angles = (values.astype(np.float32) for values in (rows.residual, rows.joints, rows.angles))
-    found: Columns = {"stamp_s": rows.stamps, "person": persons.astype(np.int32), "status": list(rows.status)}
-    found["residual_m"] = residual
-    for number, name in enumerate(rows.joint_names):
-        found |= {f"{name}_{axis}": joints[:, number, place] for place, axis in enumerate("xyz")}
-    found |= {f"{name}_rad": angles[:, number] for number, name in enumerate(rows.angle_names)}
-    found |= {f"{limb}_status": list(words) for limb, words in rows.limb_status.items()}
-    if np.isfinite(rows.joint_sigma).any():
-        sigmas = rows.joint_sigma.astype(np.float32)
-        found |= {f"{name}_sigma_m": sigmas[:, number] for number, name in enumerate(rows.joint_names)}
-    return found
+    rows = PeopleTrack(np.empty(0), tracks).arrays()
+    kinds = {"stamp_s": np.float64, "person": np.int32}
+    return {
+        name: column if column.dtype.kind == "U" else column.astype(kinds.get(name, np.float32))
+        for name, column in columns_of_rows(rows, sure=rows["covariance"].size > 0).items()
+    }
 
 
 def encode(parts: Sequence[Columns], note: Mapping[str, Any]) -> bytes:
@@ -58,10 +46,12 @@ def encode(parts: Sequence[Columns], note: Mapping[str, Any]) -> bytes:
     """
     pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
 
-    def array(column: npt.NDArray[Any] | list[str]) -> Any:  # noqa: ANN401 - it has no types
-        words = isinstance(column, list)
+    def array(column: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - it has no types
+        words = column.dtype.kind == "U"
         return (
-            pa.array([value or None for value in column], pa.string()) if words else pa.array(column, from_pandas=True)
+            pa.array([value or None for value in column.tolist()], pa.string())
+            if words
+            else pa.array(column, from_pandas=True)
         )
 
     tables = [pa.table({name: array(column) for name, column in part.items()}) for part in parts or ({},)]

@@ -26,7 +26,6 @@ from voodoo.model.body import Body
 from voodoo.names import HumanModel
 from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.inputs import pictures_alone
-from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_tracker
 from voodoo.recordings.left_out import LeftOut
@@ -199,7 +198,7 @@ def _people(
     bodies: dict[int, Body] = {}
 
     def estimates() -> Iterator[PeopleEstimate]:
-        for step in track_people(recording, people, settings=settings):
+        for step in track(recording, people, settings=settings):
             bodies.update({person.id: people.body(person.id) for person in step.estimate})
             yield step.estimate
 

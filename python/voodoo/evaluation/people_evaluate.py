@@ -12,11 +12,11 @@ from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation.people import PeopleScore, motmetrics, score
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_rows import read_rows
+from voodoo.export.table import Arrays, opened_result
 from voodoo.model.body import Body
 from voodoo.names import HumanModel
 from voodoo.people import People
-from voodoo.pipeline.people import track_people
+from voodoo.pipeline.run import track
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, PeopleTruth
 from voodoo.recordings.recording import Recording
@@ -32,11 +32,11 @@ def has_people(path: Path) -> bool:
 def evaluate_result(
     path: Path, result: Path, *, loader: str | None = None, options: Mapping[str, Any] | None = None
 ) -> PeopleScore:
-    """Evaluate a result file of several persons, see voodoo.export.people_rows.
+    """Evaluate a result file, see voodoo.export.table.opened_result.
 
     Args:
         path: of the recording, with truth_people.csv beside it.
-        result: .csv in the recording's root frame.
+        result: .csv or .npz in the recording's root frame.
         loader, options: see open_recording.
 
     Raises:
@@ -45,15 +45,31 @@ def evaluate_result(
     recording = open_recording(path, loader=loader, **(options or {}))
     truth = truth_of(recording)
     rows = read_rows(result)
+    stamps = rows["stamps"]
     about = recording.info()
     late = about.start_stamp + about.duration
-    outside = (rows.stamps < about.start_stamp - 0.5) | (rows.stamps > late + 0.5)
+    outside = (stamps < about.start_stamp - 0.5) | (stamps > late + 0.5)
     if outside.any():
         raise VoodooError(
             f"{result}: expected stamps from {about.start_stamp:.6f} to {late:.6f} s as in {recording.name}, found "
-            f"{rows.stamps[outside][0]:.6f}"
+            f"{stamps[outside][0]:.6f}"
         )
     return score(recording.name, path, truth, rows, seconds=about.duration)
+
+
+def read_rows(result: Path) -> Arrays:
+    """Read a result, see voodoo.export.table.opened_result.
+
+    Raises:
+        VoodooError: it cannot be read, stamps fall, or a person has two rows at one stamp.
+    """
+    with opened_result(result) as content:
+        rows = dict(content)
+        if (np.diff(rows["stamps"]) < 0.0).any():
+            raise VoodooError("stamp_s: expected finite numbers that do not fall, found others")
+        if len(set(zip(rows["stamps"].tolist(), rows["person"].tolist(), strict=True))) != len(rows["stamps"]):
+            raise VoodooError("expected one row for a person and stamp, found several")
+        return rows
 
 
 def judge(recording: Recording, people: People, *, settings: FrontEndSettings | None = None) -> PeopleScore:
@@ -64,8 +80,8 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
     """
     truth = truth_of(recording)
     motmetrics()  # a missing library must be reported before the work
-    steps = list(track_people(recording, people, settings=settings))
-    rows = PeopleTrack.of([step.estimate for step in steps]).rows()
+    steps = list(track(recording, people, settings=settings))
+    rows = PeopleTrack.of([step.estimate for step in steps]).arrays()
     seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan
     about = recording.info()
     return score(recording.name, recording.path, truth, rows, seconds=about.duration, step_s=seconds)

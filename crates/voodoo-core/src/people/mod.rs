@@ -21,7 +21,7 @@ use crate::detect::{
 use crate::error::TrackError;
 use crate::math::Vec3;
 use crate::observation::background::Background;
-use crate::observation::frame::Frame;
+use crate::observation::frame::{DetectedPerson, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
@@ -182,7 +182,8 @@ impl People {
         self.detector.clear_error();
         self.scene.register(frame);
         self.assign_pixels(frame);
-        self.follow(frame, own);
+        let shown = self.match_detections(frame);
+        self.follow(frame, own, &shown);
         for person in &self.persons {
             if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
                 self.scene.release(frame, image, pixels);
@@ -193,7 +194,7 @@ impl People {
             self.scene.learn(frame, self.assignment.owners());
         }
         self.prune_tracks();
-        self.detect_new(frame);
+        self.find_new(frame, &shown);
         self.delete_expired(frame.stamp);
     }
 
@@ -210,16 +211,37 @@ impl People {
         self.assignment.assign(frame, self.scene.known(), predicted);
     }
 
-    /// Steps every tracker with its own pixels and points.
-    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
+    /// Returns the index of the tracked person whom each of the frame's detections shows, if it shows one.
+    fn match_detections(&self, frame: &Frame) -> Vec<Option<usize>> {
+        if frame.detections.is_empty() {
+            return Vec::new();
+        }
+        let tracked: Vec<usize> = (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked()).collect();
+        let distance = |detection: &DetectedPerson, person: &Person| {
+            let body = person.tracker.body();
+            let each = detection.positions.iter();
+            let sum: f64 = each.map(|of| body.site_position(&person.expected, of.site).distance(of.position)).sum();
+            sum / detection.positions.len().max(1) as f64
+        };
+        let costs = |detection| tracked.iter().map(|number| distance(detection, &self.persons[*number])).collect();
+        let costs: Vec<Vec<f64>> = frame.detections.iter().map(costs).collect();
+        assign::assign(&costs, SAME_PERSON).into_iter().map(|column| column.map(|column| tracked[column])).collect()
+    }
+
+    /// Steps every tracker with its own pixels and points, and with the detections that show the person.
+    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], shown: &[Option<usize>]) {
         let (assignment, scene) = (&self.assignment, self.scene.known());
         // With several persons, color pictures only serve to identify them.
         let shared = &Frame { colors: &[], ..*frame };
         let work = |(number, person): (usize, &mut Person)| {
             if person.present {
                 let ownership = assignment.ownership(number, scene);
-                let of = own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
-                person.tracker.step(of, ownership);
+                let mut of = *own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
+                let detection = shown.iter().position(|shown| *shown == Some(number));
+                let positions =
+                    detection.map(|detection| [of.positions, frame.detections[detection].positions].concat());
+                of.positions = positions.as_deref().unwrap_or(of.positions);
+                person.tracker.step(&of, ownership);
                 person.update(frame, ownership);
             }
         };
@@ -248,7 +270,24 @@ impl People {
         }
     }
 
-    /// Searches for new persons in pixels that no person explains.
+    /// Searches for new persons: in the frame's detections that show nobody who is tracked, and in pixels that no person explains.
+    fn find_new(&mut self, frame: &Frame, shown: &[Option<usize>]) {
+        self.tentative.prune(frame.stamp);
+        for (detection, _) in frame.detections.iter().zip(shown).filter(|(_, shown)| shown.is_none()) {
+            let fitted = self.prototype.fit(&sites_of(detection.positions), true);
+            let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
+            if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
+                self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), false);
+            }
+        }
+        self.detect_new(frame);
+        let confirmed = self.tentative.take_confirmed(frame.stamp);
+        if !confirmed.is_empty() {
+            self.associate(frame, &confirmed);
+        }
+    }
+
+    /// Detects persons in pixels that no person explains, if it is time to.
     fn detect_new(&mut self, frame: &Frame) {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
@@ -267,12 +306,7 @@ impl People {
             return;
         }
         self.last_detection = Some(frame.stamp);
-        self.tentative.prune(frame.stamp);
         self.detect(frame, if tracked { DetectionQuery::New } else { DetectionQuery::Any });
-        let confirmed = self.tentative.take_confirmed(frame.stamp);
-        if !confirmed.is_empty() {
-            self.associate(frame, &confirmed);
-        }
     }
 
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
@@ -299,7 +333,7 @@ impl People {
                     continue;
                 }
                 let still = self.everybody && self.scene.is_still(frame, number, &found.detection.pixels);
-                self.tentative.update(frame.stamp, found, number, still);
+                self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), still);
             }
         }
     }
@@ -368,7 +402,12 @@ impl People {
     /// Returns the colors of a tentative track's clothes.
     fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
-        if let Some((body, poses)) = fit_body(&Model::new(self.prototype.clone()), self.detected(track)) {
+        let model = Model::new(self.prototype.clone());
+        let fitted = match track.positions.as_slice() {
+            [] => fit_body(&model, self.detected(track)),
+            positions => model.fit(&sites_of(positions), true).ok(),
+        };
+        if let Some((body, poses)) = fitted {
             let free = |image: usize, pixel: usize| self.assignment.owners()[image].get(pixel) == Some(&NO_OWNER);
             clothes.observe(frame, &body, &poses, free);
         }
@@ -404,7 +443,10 @@ impl People {
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
-        let came = if person.present {
+        let came = if !track.positions.is_empty() {
+            let frame = depth_frame.with_positions(&track.positions);
+            person.tracker.start_at_positions(&frame, ownership, !known)
+        } else if person.present {
             person.tracker.recover(depth_frame, ownership, placed)
         } else {
             person.tracker.start_at_detection(depth_frame, ownership, placed, known)
@@ -431,6 +473,11 @@ impl People {
             person.present || person.followed || remembered
         });
     }
+}
+
+/// Sites and their measured positions.
+fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
+    positions.iter().map(|relation| (relation.site, relation.position)).collect()
 }
 
 /// Cost of a new person in the assignment, nats.
