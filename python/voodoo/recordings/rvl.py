@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError
+from voodoo.recordings.pictures import check_size
 
 _MOST_GROUPS = 6
 """Largest number of groups: a difference of 16-bit pixels has 17 bits; a run has up to 25 bits, of which images use 24."""
@@ -29,11 +30,7 @@ def decode_rvl(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArra
         RecordingError: damage, or another size.
     """
     found = tuple(int(number) for number in np.frombuffer(data[:_HEAD], "<u4")) if len(data) >= _HEAD else ()
-    if found != size:
-        raise RecordingError(
-            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {'x'.join(map(str, found)) or 'nothing'}",
-            reason="of another size than calibrated",
-        )
+    check_size(found, source, size)
     numbers = _numbers(data[_HEAD:])
     image = np.zeros(size[0] * size[1], dtype=np.int64)
     at, pixel = 0, 0
