@@ -198,8 +198,7 @@ def _meeting(
 def _reading(instants: Sequence[Instant], *, sizes: Sequence[float]) -> tuple[Agreement, str] | None:
     """Another reading of the keypoints with which the rays meet best, in words; None: with none they do."""
     tried = [(agreement(instants, change), words) for words, change in readings(instants[0][0].camera, sizes)]
-    for order in _orders(instants[0]):
-        tried.append((agreement(_exchanged(instants, order)), _order_words(instants[0], order)))
+    tried += [(agreement(_exchanged(instants, it)), _order_words(instants[0], it)) for it in _orders(instants[0])]
     tried = [(each, words) for each, words in tried if _human(each) and each.distance < RIGHT_M]
     least = min((each.distance for each, _ in tried), default=np.inf)
     return next((one for one in tried if one[0].distance < least + _ALIKE_M), None)

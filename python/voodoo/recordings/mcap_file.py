@@ -91,7 +91,7 @@ class McapFile(McapReader):
         plausible = iter(range(min(_MOST_LOST, self._file.stat().st_size // _INDEX_BYTES)))
         sources = [
             self._of_chunk(chunk, wanted, first, plausible, as_written=is_back)
-            for chunk in sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
+            for chunk in self._in_file()
             if first <= chunk.message_end_time
             and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
         ]
@@ -100,19 +100,21 @@ class McapFile(McapReader):
             if item is not None:
                 yield item
 
+    def _in_file(self) -> list[ChunkInfo]:
+        """The chunks in the order of the file."""
+        return sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
+
     def _longest_step_back(self) -> float:
         """From the end of a chunk to the beginning of the next one in the file [ns]; infinite for a single chunk."""
-        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
-        pairs = itertools.pairwise(chunks)
+        pairs = itertools.pairwise(self._in_file())
         return max((before.message_end_time - chunk.message_start_time for before, chunk in pairs), default=math.inf)
 
     def _is_back(self, wanted: Collection[int]) -> bool:
         """Whether the clock of the recorder was set back; chunks are unpacked only where times of two are apart."""
         if self._longest_step_back() < BACK_S * 1e9:
             return False
-        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
         try:
-            read = (entry for chunk in chunks for entry in _messages(self._content(chunk)))
+            read = (entry for chunk in self._in_file() for entry in _messages(self._content(chunk)))
             return falls((one, time) for one, time, _, _ in read if one in wanted)
         except Exception:
             return False  # the damage is told where the messages are read
