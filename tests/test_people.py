@@ -145,7 +145,8 @@ def test_two_persons_in_four_pictures_without_names(voodoo_data):
     folder = data_folder(voodoo_data, "pose2sim-two")
     recording, people = open_recording(folder), voodoo.People()
     files = [next(folder.glob(f"*_P{number}_0-100.trc")) for number in (1, 2)]
-    known = [read_trc(file, world_from_file=Z_UP_FROM_Y_UP).of(SITES) for file in files]
+    read = [read_trc(file).of(SITES) for file in files]
+    known = [(names, positions @ Z_UP_FROM_Y_UP.T) for names, positions in read]
     front_end = FrontEnd(people, settings=FrontEndSettings.of(recording))
     errors = []
     for index, recorded in enumerate(islice(paired(recording), 40)):

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import voodoo
 from made_up import places_in, two_people
+from synthetic.people import COLOR, MadeUpRecording
 from voodoo.cli import app
 from voodoo.cli.common import NO_POSE
 from voodoo.errors import VoodooError
@@ -25,7 +26,6 @@ from voodoo.pipeline.run import track
 from voodoo.recordings import SensorInfo
 from voodoo.sensors.adapters import Adapter, register, unregister
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.people import COLOR, MadeUpRecording
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.overlay import Overlay
 

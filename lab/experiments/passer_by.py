@@ -9,6 +9,7 @@ the greatest distance, and those without a pose. The id of the person is the one
 """
 
 import argparse
+import sys
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,10 @@ import numpy as np
 import voodoo
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
-from voodoo.synthetic.passer_by import WithPasserBy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from synthetic.passer_by import WithPasserBy
 
 FAR_M = 0.5
 ROOT = "humanoid_root"

@@ -38,37 +38,29 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     }
 
 
-def stacked(parts: Sequence[Columns]) -> Columns:
-    """Concatenates tables; a column that is missing in one of them is unknown there."""
-    names = dict.fromkeys(name for part in sorted(parts, key=len, reverse=True) for name in part)
-    found: Columns = {}
-    for name in names:
-        kind = next(part[name].dtype for part in parts if name in part)
-        unknown = "" if kind.kind == "U" else np.nan
-        found[name] = np.concatenate(
-            [part[name] if name in part else np.full(len(part["stamp_s"]), unknown, kind) for part in parts]
-        )
-    return found
-
-
-def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
-    """The bytes of a Parquet file with a note in its footer.
+def encode(parts: Sequence[Columns], note: Mapping[str, Any]) -> bytes:
+    """The bytes of a Parquet file of consecutive rows, with a note in its footer; a column that a part lacks is unknown there.
 
     Raises:
         VoodooError: pyarrow is not installed.
     """
     pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
-    arrays = [
-        pa.array([value or None for value in column.tolist()], pa.string())
-        if column.dtype.kind == "U"
-        else pa.array(column, from_pandas=True)
-        for column in columns.values()
-    ]
-    table = pa.Table.from_arrays(arrays, names=list(columns)).replace_schema_metadata({NOTE: json.dumps(note).encode()})
-    words = [name for name, column in columns.items() if column.dtype.kind == "U"]
+
+    def array(column: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - it has no types
+        words = column.dtype.kind == "U"
+        return (
+            pa.array([value or None for value in column.tolist()], pa.string())
+            if words
+            else pa.array(column, from_pandas=True)
+        )
+
+    tables = [pa.table({name: array(column) for name, column in part.items()}) for part in parts or ({},)]
+    table = pa.concat_tables(tables, promote_options="default").combine_chunks()
+    words = [field.name for field in table.schema if pa.types.is_string(field.type)]
     out = io.BytesIO()
     # Neighboring frames have equal high bytes: splitting the numbers by byte improves compression.
-    split = {name: "BYTE_STREAM_SPLIT" for name, column in columns.items() if name not in (*words, "person")}
+    split = {name: "BYTE_STREAM_SPLIT" for name in table.column_names if name not in (*words, "person")}
+    table = table.replace_schema_metadata({NOTE: json.dumps(note).encode()})
     pq.write_table(table, out, compression="zstd", use_dictionary=[*words, "person"], column_encoding=split)
     return out.getvalue()
 

@@ -191,7 +191,7 @@ class _Frames:
 
 
 def _frames(truth: PeopleTruth, rows: Arrays) -> _Frames:
-    own = np.unique(rows["stamps"])
+    own, row = np.unique(rows["stamps"], return_inverse=True)
     near = np.clip(np.searchsorted(truth.stamps, own - SAME_TIME_S), 0, len(truth.stamps) - 1)
     same = np.abs(truth.stamps[near] - own) <= SAME_TIME_S
     if len(own) and not same.any():
@@ -202,13 +202,9 @@ def _frames(truth: PeopleTruth, rows: Arrays) -> _Frames:
     # Stamps of the result without persons in the truth are frames, too.
     stamps = np.concatenate([truth.stamps, own[~same]])
     of_truth = np.concatenate([np.arange(len(truth.stamps)), np.full(int((~same).sum()), -1)])
-    frame_of = np.full(len(own), -1)
-    frame_of[same] = near[same]
-    frame_of[~same] = len(truth.stamps) + np.arange(int((~same).sum()))
+    frame_of = np.where(same, near, len(truth.stamps) - 1 + np.cumsum(~same))
     order = np.argsort(stamps, kind="stable")
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    row_frame = place[frame_of[np.searchsorted(own, rows["stamps"])]] if len(own) else np.empty(0, dtype=np.int64)
+    row_frame = np.argsort(order)[frame_of[row]]
     return _Frames(stamps[order], of_truth[order], [np.flatnonzero(row_frame == index) for index in range(len(stamps))])
 
 

@@ -72,32 +72,6 @@ def read_rows(result: Path) -> Arrays:
         return rows
 
 
-def evaluate_people(
-    path: Path,
-    *,
-    config: Config | None = None,
-    loader: str | None = None,
-    options: Mapping[str, Any] | None = None,
-    model: HumanModel | None = None,
-    use: Sequence[str] | None = None,
-) -> PeopleScore:
-    """Track all persons in a recording, without a start, and evaluate the result.
-
-    Args:
-        path: of the recording, with truth_people.csv beside it.
-        config: None means the defaults.
-        loader, options: see open_recording.
-        model: model of the human; None: that of `voodoo.People`.
-        use: kinds of inputs; None: all.
-
-    Raises:
-        VoodooError: it cannot be read, or a frame was refused.
-    """
-    recording = open_recording(path, loader=loader, **(options or {}))
-    people = People(None if model is None else Body.human(model=model), config=config)
-    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
-
-
 def judge(recording: Recording, people: People, *, settings: FrontEndSettings | None = None) -> PeopleScore:
     """Track all persons in a recording and evaluate the result.
 
@@ -122,11 +96,21 @@ def evaluate_all_people(
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
 ) -> Iterator[PeopleScore]:
-    """Evaluate recordings one after the other; one that fails yields a score with `failure` set."""
+    """Track all persons in recordings, without a start, and evaluate the results; one that fails yields a score with a `failure`.
+
+    Args:
+        paths: of recordings with truth_people.csv beside them.
+        config_file: None means the defaults.
+        loader, options: see open_recording.
+        model: model of the human; None: that of `voodoo.People`.
+        use: kinds of inputs; None: all.
+    """
     for path in paths:
         try:
             config = None if config_file is None else Config.load(config_file)
-            yield evaluate_people(path, config=config, loader=loader, options=options, model=model, use=use)
+            recording = open_recording(path, loader=loader, **(options or {}))
+            people = People(None if model is None else Body.human(model=model), config=config)
+            yield judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
         except (VoodooError, OSError) as error:
             yield PeopleScore(path.name, path, failure=str(error))
 
