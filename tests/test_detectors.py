@@ -16,6 +16,7 @@ from test_people import WORLD_FROM_SENSOR, frame
 from voodoo.detectors import JOINTS, LENGTHS, CallableDetector, DetectedPerson, DetectorImage, OnnxDetector
 from voodoo.errors import ConfigError, MeasurementError
 from voodoo.recordings import sample_path
+from voodoo.synthetic.render import render_depth
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
@@ -275,3 +276,18 @@ def test_a_trained_onnx_file_sees_what_the_shipped_network_sees(someone):
 def test_the_example_finds_the_bundled_person():
     errors = load_script(EXAMPLES / "custom_detector.py").main()
     assert errors < 0.12
+
+
+def test_a_person_at_the_lower_border_is_found_in_images_of_any_size():
+    near = {name: (x - 0.9, y, z) for name, (x, y, z) in STANDING.items()}
+    poses = voodoo.Tracker(BODY).reset(joints=near, fit_sizes=False).world_from_limb
+    for width, height in ((319, 241), (320, 241), (401, 263)):
+        camera = voodoo.Camera(width, height, 0.8 * width, 0.8 * width, width / 2.0, height / 2.0)
+        depth = render_depth(BODY, poses, camera=camera, world_from_sensor=WORLD_FROM_SENSOR).depth
+        assert (depth[-1] > 0.0).any(), "the border cuts the body"
+        image = np.where(depth > 0.0, depth, 4.5).astype(np.float32)
+        observed = voodoo.Frame(0.0)
+        observed.add_depth(image, camera=camera, meters_per_unit=1.0, world_from_sensor=WORLD_FROM_SENSOR)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", voodoo.DetectorWarning)
+            assert voodoo.Tracker(BODY).step(observed).status != "searching", (width, height)

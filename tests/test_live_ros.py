@@ -391,7 +391,7 @@ def test_a_message_lets_everybody_be_searched_for_again():
             pass
         session.finish()
     assert any(message.startswith("reset") for message in messages)
-    assert statuses[14] != "searching" and "searching" in statuses[15:20] and statuses[-1] == "tracking"
+    assert statuses[14] != "searching" and "searching" in statuses[15:] and statuses[-1] == "tracking"
 
 
 @pytest.mark.parametrize(("root", "rate"), [("camera_depth_optical_frame", 3.0), ("base_link", 8.0)])

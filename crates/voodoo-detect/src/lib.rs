@@ -128,6 +128,11 @@ impl Detect for Detector {
         Box::new(Self { network: self.network.clone(), ..Self::default() })
     }
 
+    /// Plants reach log odds of up to 4; persons of whom more than half is visible reach 8.
+    fn static_odds(&self) -> f64 {
+        5.0
+    }
+
     fn detect(
         &mut self,
         image: &DepthImage,

@@ -108,7 +108,8 @@ impl ThinnedImage {
     /// Appends the pixels of the full image that the subsampled pixel with this full-image index stands for.
     pub(crate) fn block(&self, index: usize, into: &mut Vec<usize>) {
         let (row, column) = (index / self.columns, index % self.columns);
-        for row in row..row + self.step {
+        let rows = self.camera.as_ref().map_or(0, Camera::height);
+        for row in row..(row + self.step).min(rows) {
             into.extend((column..(column + self.step).min(self.columns)).map(|column| row * self.columns + column));
         }
     }

@@ -105,6 +105,11 @@ impl BoundDetector {
         self.detector.as_ref().filter(|_| self.error.is_none())?.nearest()
     }
 
+    /// See [`Detect::static_odds`].
+    pub(crate) fn static_odds(&self) -> f64 {
+        self.detector.as_ref().map_or(0.0, |detector| detector.static_odds())
+    }
+
     /// See [`Detect::reject`].
     pub(crate) fn reject(&mut self, index: usize) {
         if let Some(detector) = &mut self.detector {

@@ -111,6 +111,12 @@ pub trait Detect: Debug + Send + Sync {
         None
     }
 
+    /// Log odds up to which it mistakes things that never move (plants, mannequins) for persons. They are subtracted from those of
+    /// a detection of what has not moved since the camera started, and 1 from those of others.
+    fn static_odds(&self) -> f64 {
+        1.0
+    }
+
     /// Reports that the detection with this index in the last image is not followed. [`DetectionQuery::Any`] and
     /// [`DetectionQuery::New`] may then evaluate other candidates first.
     fn reject(&mut self, _index: usize) {}

@@ -281,7 +281,7 @@ impl People {
             let fitted = self.prototype.fit(&sites_of(detection.positions), true);
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
-                self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), false);
+                self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
             }
         }
         self.detect_new(frame);
@@ -336,7 +336,8 @@ impl People {
             }
             for found in found {
                 let still = self.scene.is_still(frame, number, &found.detection.pixels);
-                self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), still);
+                let odds = still.then(|| self.detector.static_odds());
+                self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), odds);
             }
         }
     }

@@ -10,9 +10,6 @@ use crate::relocalize::ENOUGH_ODDS;
 const DETECTION_COST: f64 = 1.0;
 /// Detections within this distance of the last position are of the same person, meters; farther ones are of another.
 pub(super) const SAME_PERSON: f64 = 0.5;
-/// Cost of a detection of something that has stood there from the start, subtracted from its log odds in place of
-/// `DETECTION_COST`. Plants reach log odds of up to 4; persons of whom more than half is visible reach 8.
-const STILL_COSTS: f64 = 5.0;
 /// A tentative track without a detection for this long is deleted, seconds.
 const FORGOTTEN: f64 = 0.5;
 
@@ -55,9 +52,9 @@ impl TentativeTracks {
         self.tracks.retain(|track| stamp - track.stamp < FORGOTTEN);
     }
 
-    /// Updates with a detection. `still`: the detected object has been part of the scene all the time.
-    pub(super) fn update(&mut self, mut found: TentativeTrack, still: bool) {
-        found.sum -= if still { STILL_COSTS } else { DETECTION_COST };
+    /// Updates with a detection, from whose log odds `static_odds` are subtracted if the object has been there from the start.
+    pub(super) fn update(&mut self, mut found: TentativeTrack, static_odds: Option<f64>) {
+        found.sum -= static_odds.unwrap_or(DETECTION_COST);
         let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
         let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track.sum)));
         found.sum = (before.unwrap_or(0.0) + found.sum).max(0.0);

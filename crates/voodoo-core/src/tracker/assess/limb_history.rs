@@ -67,11 +67,16 @@ impl LimbHistory {
         // The exclusive fraction must be twice the one at which images give even odds.
         if self.exclusive >= 2.0 * EVEN && self.contradicted <= LITTLE {
             LimbStatus::Measured
-        } else if self.visible < LITTLE && self.contradicted <= LITTLE {
+        } else if !self.is_visible() && self.contradicted <= LITTLE {
             LimbStatus::Inferred
         } else {
             LimbStatus::Lost
         }
+    }
+
+    /// Whether the cameras see where the limb is.
+    pub(super) fn is_visible(&self) -> bool {
+        self.visible >= LITTLE
     }
 
     /// Returns the status of a limb of an arm or leg: by the evidence of images, or `supported` without any.

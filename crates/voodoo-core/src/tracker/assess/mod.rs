@@ -135,7 +135,7 @@ impl Assessor {
         }
         inherit_status(extremities, internal);
         // By support alone: a lost body starts a search, and arms in front of the trunk must not start one.
-        self.status = overall(internal);
+        self.status = overall(internal, |limb| limbs[limb].is_visible());
         for limb in extremities.iter().flat_map(|chain| [chain.upper, chain.lower]) {
             internal[limb] = limbs[limb].status(internal[limb]);
         }
@@ -171,7 +171,7 @@ impl Assessor {
                 chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
             }
         }
-        let status = if self.is_by_edges_alone() { overall(statuses) } else { self.status };
+        let status = if self.is_by_edges_alone() { overall(statuses, |_| true) } else { self.status };
         let missed = estimate.sources.iter().any(|source| source.residual > MISSED);
         let doubtful = missed || measured_fraction(statuses) < 1.0 - SOME;
         estimate.status = if status == Status::Tracking && doubtful { Status::Degraded } else { status };
@@ -272,11 +272,13 @@ fn measured_fraction(limbs: &[LimbStatus]) -> f64 {
     limbs.iter().filter(|limb| **limb == LimbStatus::Measured).count() as f64 / limbs.len() as f64
 }
 
-/// Returns the body's status: lost without a measured root and half of the limbs, or with less than a quarter of the limbs
-/// measured; degraded when more than a quarter of the limbs are not measured.
-fn overall(limbs: &[LimbStatus]) -> Status {
+/// Returns the body's status: lost without a measured root and half of the limbs that could be seen, or with less than a quarter of
+/// all limbs measured; degraded when more than a quarter of the limbs are not measured.
+fn overall(limbs: &[LimbStatus], is_visible: impl Fn(usize) -> bool) -> Status {
     let measured = measured_fraction(limbs);
-    if measured < SOME || (limbs[0] != LimbStatus::Measured && measured < 2.0 * SOME) {
+    let is_measured = |limb: &usize| limbs[*limb] == LimbStatus::Measured;
+    let visible = (0..limbs.len()).filter(|limb| is_measured(limb) || is_visible(*limb)).count() as f64;
+    if measured < SOME || (!is_measured(&0) && measured * (limbs.len() as f64) < 2.0 * SOME * visible) {
         Status::Lost
     } else if measured < 1.0 - SOME {
         Status::Degraded
@@ -433,10 +435,17 @@ mod tests {
         let (measured, other) = (LimbStatus::Measured, LimbStatus::Inferred);
         let first = |count: usize| [vec![measured; count], vec![other; 16 - count]].concat();
         assert_eq!(
-            [16, 12, 11, 4, 3].map(|count| overall(&first(count))),
+            [16, 12, 11, 4, 3].map(|count| overall(&first(count), |_| true)),
             [Status::Tracking, Status::Tracking, Status::Degraded, Status::Degraded, Status::Lost]
         );
         let last = |count: usize| first(count).into_iter().rev().collect::<Vec<_>>();
-        assert_eq!([8, 7].map(|count| overall(&last(count))), [Status::Degraded, Status::Lost], "without the root");
+        let without_root = |seen: usize| [8, 7, 4, 3].map(|count| overall(&last(count), |limb| limb < seen));
+        assert_eq!(without_root(16), [Status::Degraded, Status::Lost, Status::Lost, Status::Lost]);
+        let [_, half, quarter, few] = without_root(0);
+        assert_eq!(
+            [half, quarter, few],
+            [Status::Degraded, Status::Degraded, Status::Lost],
+            "the others are out of view"
+        );
     }
 }
