@@ -1,8 +1,10 @@
 //! A color camera and its pose.
 
-use crate::body_view::Matrix;
 use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
+
+/// A 4x4 transform, row by row.
+pub type Matrix = [[f64; 4]; 4];
 
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
