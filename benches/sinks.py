@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -26,9 +27,12 @@ from voodoo.live.sinks import sink_of
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.stream import Live
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.gait import path
-from voodoo.synthetic.people import MadeUpRecording, Scene, Walker
-from voodoo.synthetic.stories import base_from_camera
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from synthetic.gait import path
+from synthetic.people import MadeUpRecording, Scene, Walker
+from synthetic.stories import base_from_camera
 
 OSC = "import socket as s; p = s.socket(type=s.SOCK_DGRAM); p.bind(('127.0.0.1', 39540))\nwhile p.recv(65536): pass"
 ROS = """

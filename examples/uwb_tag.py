@@ -14,7 +14,6 @@ import voodoo
 from voodoo.measurements import RecordedFrame
 from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors.adapters import Adapter, Canvas, Context, Log, Memory, register
-from voodoo.synthetic.sequence import VirtualSequence
 
 TAGGED = ("head_center", "l_shoulder", "r_shoulder", "l_wrist", "r_wrist", "l_hip", "r_hip", "l_ankle", "r_ankle")
 SIGMA_M = 0.05
@@ -51,28 +50,35 @@ class UwbAdapter(Adapter[UwbTag]):
         log.send(f"world/uwb/{log.entity(item.sensor)}", log.rr.Points3D(item.position[None], radii=item.sigma))
 
 
-def recorded(sequence: VirtualSequence, rng: np.random.Generator) -> list[tuple[RecordedFrame, dict[str, np.ndarray]]]:
-    """Frames of tags on a body that moves, with the true positions of its sites."""
-    frames = []
-    for index in range(len(sequence)):
+def truth(chain: voodoo.ik.Chain, stamp: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """True poses of the limbs and positions of the sites of a body whose joints swing."""
+    swing = 0.3 * np.sin(0.5 * stamp + np.arange(len(chain.angle_names)))
+    return chain.forward(np.clip(swing, *chain.limits.T))
+
+
+def recorded(chain: voodoo.ik.Chain, frames: int) -> list[tuple[RecordedFrame, dict[str, np.ndarray]]]:
+    """Frames of tags with noise on that body, with the true positions of its sites."""
+    rng = np.random.default_rng(1)
+    found = []
+    for index in range(frames):
         stamp = index / RATE_HZ
-        _, sites = sequence.truth(stamp)
+        _, sites = truth(chain, stamp)
         tags = tuple(
             UwbTag(f"tag_{site}", stamp, site, sites[site] + rng.normal(0.0, SIGMA_M, 3), SIGMA_M) for site in TAGGED
         )
-        frames.append((RecordedFrame(stamp, tags), sites))
-    return frames
+        found.append((RecordedFrame(stamp, tags), sites))
+    return found
 
 
 def main(frames: int = 90) -> float:
     """Track a body by its tags alone; the mean error of the tagged sites [m]."""
-    sequence = VirtualSequence(body=voodoo.Body.human(model="full"), frames=frames)
-    poses, _ = sequence.truth(0.0)
-    tracker = voodoo.Tracker(sequence.body)
+    chain = voodoo.ik.Chain(voodoo.Body.human(model="full"))
+    poses, _ = truth(chain, 0.0)
+    tracker = voodoo.Tracker(chain.body)
     tracker.reset_pose(poses)
     front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("uwb",)))
     errors = []
-    for frame, sites in recorded(sequence, np.random.default_rng(1)):
+    for frame, sites in recorded(chain, frames):
         estimate = front_end.step(frame)
         errors += [np.linalg.norm(estimate.joints[site] - sites[site]) for site in TAGGED]
     return float(np.mean(errors))

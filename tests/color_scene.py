@@ -9,8 +9,8 @@ import numpy as np
 
 import voodoo
 from bag_writer import Messages, write_bag
+from synthetic.sequence import VirtualSequence
 from voodoo.synthetic.render import render_depth
-from voodoo.synthetic.sequence import VirtualSequence
 
 M = Messages()
 CAMERA = voodoo.Camera(240, 180, 190.0, 190.0, 119.5, 89.5)

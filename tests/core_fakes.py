@@ -267,8 +267,6 @@ def install(monkeypatch):
     import voodoo.evaluation.evaluate
     import voodoo.export.spool
     import voodoo.pipeline.front_end
-    import voodoo.pipeline.people
-    import voodoo.pipeline.search
     import voodoo.pipeline.start
     from voodoo.export import collected as results
 

@@ -112,14 +112,11 @@ def is_whole(path: Path) -> bool:
     import cv2
 
     from voodoo.export.people import PeopleTrack
-    from voodoo.export.track import Track
     from voodoo.recordings import open_recording
     from voodoo.recordings.mcap_file import check_mcap
 
     if path.suffix in (".csv", ".npz") and path.name != "summary.csv":
-        people = path.read_bytes().startswith(b"stamp_s,person")
-        people = people or (path.suffix == ".npz" and b"persons.npy" in path.read_bytes())
-        return len((PeopleTrack if people else Track).load(path)) > 0
+        return len(PeopleTrack.load(path)) > 0
     if path.suffix == ".c3d":
         with path.open("rb") as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -222,7 +219,6 @@ def tracked_before(recording: Path) -> None:
     import voodoo.cli
     import voodoo.cli.running
     import voodoo.people
-    import voodoo.pipeline.people
     import voodoo.pipeline.run
     import voodoo.pipeline.start
     import voodoo.visualization.overlay
@@ -232,13 +228,12 @@ def tracked_before(recording: Path) -> None:
     tracker = voodoo.pipeline.start.start_tracker(source)
     steps = list(voodoo.pipeline.run.track(source, tracker))
     people = voodoo.people.People()
-    of_people = list(voodoo.pipeline.people.track_people(source, people))
+    of_people = list(voodoo.pipeline.run.track(source, people))
     assert of_people[-1].estimate
     voodoo.cli.running.opened = lambda *_, **__: source
     voodoo.pipeline.start.start_tracker = lambda *_, **__: tracker
-    voodoo.pipeline.run.track = lambda *_, **__: iter(steps)
-    voodoo.pipeline.people.track_people = lambda *_, **__: iter(of_people)
-    voodoo.people.People = lambda *_, **__: people
+    voodoo.pipeline.start.start_people = lambda *_, **__: people
+    voodoo.pipeline.run.track = lambda _, by, **__: iter(of_people if by is people else steps)
     body, commands = tracker.body.to_toml(), typer.main.get_command(voodoo.cli.app)
     voodoo.Body.to_toml = lambda _: body
     voodoo.visualization.overlay._TARGET_HEIGHT = 60

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.synthetic.sequence import VirtualFrame
+from synthetic.sequence import VirtualFrame
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 
 import voodoo
-from voodoo.synthetic.gait import path
-from voodoo.synthetic.people import MadeUpRecording, Scene, Walker
-from voodoo.synthetic.stories import base_from_camera
+from synthetic.gait import path
+from synthetic.people import MadeUpRecording, Scene, Walker
+from synthetic.stories import base_from_camera
 
 WALL = ((4.6, -4.0, 0.0), (4.8, 4.0, 3.0))
 

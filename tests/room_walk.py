@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import voodoo
-from voodoo.synthetic.boxes import Box, room_depth
-from voodoo.synthetic.gait import Stop, pose_at
+from synthetic.boxes import Box, room_depth
+from synthetic.gait import Stop, pose_at
+from synthetic.sequence import METERS_PER_UNIT, VirtualFrame
 from voodoo.synthetic.render import render_depth
-from voodoo.synthetic.sequence import METERS_PER_UNIT, VirtualFrame
 
 CAMERA = voodoo.Camera(320, 240, 275.0, 275.0, 159.5, 119.5)
 """60 degrees wide: 2.8 m at 2.4 m."""

@@ -129,8 +129,8 @@ def test_track_without_start_searches_for_a_person(run):
     rows = [row.split(",") for row in Path("pose.csv").read_text().splitlines()[1:]]
     assert [float(row[0]) for row in rows] == run.recording.stamps.tolist()
     status = ["searching"] * 2 + ["tracking"] * 4 + ["searching"] * 2
-    assert [row[1] for row in rows] == status
-    assert [set(row[2:]) == {""} for row in rows] == [word == "searching" for word in status]
+    assert [row[2] for row in rows] == status
+    assert [set(row[3:]) == {""} for row in rows] == [word == "searching" for word in status]
     for name in ("pose.csv", "pose.npz"):
         read = Track.load(name)
         assert list(read.status) == status and read.found.tolist() == [word == "tracking" for word in status]

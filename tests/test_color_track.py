@@ -97,7 +97,7 @@ def test_errors_report_what_is_needed(films, tmp_path, monkeypatch):
     done = run("track", plain, "--init", films / "init.json", "--background", "nothing", "--out", "p.csv")
     assert done.exit_code == 1 and "expected pictures NAME.png" in done.stderr
     done = run("track", plain, "--people", "any", "--out", "p.csv")
-    assert done.exit_code == 1 and "several people are found in depth images or keypoints" in done.stderr
+    assert done.exit_code == 1 and "several people are found in depth images" in done.stderr
     (plain / "Calib_scene.toml").unlink()
     done = run("track", plain)
     assert done.exit_code == 1 and "the calibration of the cameras" in done.stderr and "[cam3]" in done.stderr

@@ -16,7 +16,6 @@ from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.files import save
 from voodoo.export.joint_angles import joint_angles
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
 from voodoo.export.skeleton import bones, skeleton
 from voodoo.export.track import Track
 from voodoo.recordings.marker_trajectories import read_c3d
@@ -293,7 +292,7 @@ def test_glb_shows_each_person_while_it_is_there(tmp_path):
     first, second = track_of(body), track_of(body, seed=8)
     late = second.of_frames(np.arange(4, 9))
     people = PeopleTrack(first.stamps, {1: first, 2: late})
-    save_people(people, tmp_path / "all.glb", bodies={1: body, 2: body}, root_frame="odom")
+    save(people, tmp_path / "all.glb", body={1: body, 2: body}, root_frame="odom")
     content = (tmp_path / "all.glb").read_bytes()
     (length,) = struct.unpack_from("<I", content, 12)
     scene = json.loads(content[20 : 20 + length])
@@ -304,7 +303,7 @@ def test_glb_shows_each_person_while_it_is_there(tmp_path):
     assert np.ptp(np.array(list(heads.values())), axis=0).max() == 0.0
     heads, _ = read_glb(tmp_path / "all.glb", 2, "all_2")
     assert np.abs(heads["head"] - heads_of(late, body)["head"][2]).max() < 1e-4
-    save_people(PeopleTrack(first.stamps, {}), tmp_path / "none.glb", bodies={}, root_frame="odom")
+    save(PeopleTrack(first.stamps, {}), tmp_path / "none.glb", body={}, root_frame="odom")
     trimesh = pytest.importorskip("trimesh", reason="pip install trimesh, of the extra test")
     assert not trimesh.load(tmp_path / "none.glb").geometry
 

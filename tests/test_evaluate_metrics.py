@@ -138,11 +138,11 @@ def test_standing_jitter_counts_only_what_stands_still():
     zigzag[:, 0, 1] = 0.001 * (-1.0) ** np.arange(90)
     zigzag[45:, 0, 1] *= 10.0
     zigzag[:, 1, 1] = 0.003 * (-1.0) ** np.arange(90)
-    assert metrics.standing_jitter(zigzag[:, :1], still[:, :1]) == pytest.approx(0.004)
-    assert metrics.standing_jitter(zigzag[:, 1:], still[:, 1:]) == pytest.approx(0.012)
+    assert metrics.jitter(zigzag[:, :1], still[:, :1]) == pytest.approx(0.004)
+    assert metrics.jitter(zigzag[:, 1:], still[:, 1:]) == pytest.approx(0.012)
     # A late estimate stands still later.
-    assert metrics.standing_jitter(zigzag[:, :1], still[:, :1], lag=5) > 0.004
-    assert np.isnan(metrics.standing_jitter(zigzag, np.zeros_like(still)))
+    assert metrics.jitter(zigzag[:, :1], still[:, :1], lag=5) > 0.004
+    assert np.isnan(metrics.jitter(zigzag, np.zeros_like(still)))
     assert not metrics.standing_still(reference[:5], stamps[:5]).any()
 
 

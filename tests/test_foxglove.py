@@ -17,7 +17,6 @@ from test_sinks import opened, step_of, until
 from voodoo.errors import VoodooError
 from voodoo.export.files import save
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
 from voodoo.export.track import Track
 from voodoo.recordings import sample_path
 
@@ -107,7 +106,7 @@ def test_a_file_of_several_people_has_each_while_it_is_there(tmp_path):
     body = voodoo.Body.human()
     first, second = track_of(body), track_of(body, seed=8)
     people = PeopleTrack(first.stamps, {1: first, 2: second.of_frames(np.arange(4, 9))})
-    save_people(people, tmp_path / "all.foxglove.mcap", bodies={1: body, 2: body}, root_frame="camera_optical_frame")
+    save(people, tmp_path / "all.foxglove.mcap", body={1: body, 2: body}, root_frame="camera_optical_frame")
     topics = decoded(tmp_path / "all.foxglove.mcap")
     there = [{entity.id for entity in message.entities} for _, message in topics["/people"]]
     assert there[3] == {"p1"} and there[4] == there[8] == {"p1", "p2"}

@@ -4,7 +4,7 @@ import numpy as np
 
 import voodoo
 from room_walk import Walk
-from voodoo.synthetic.gait import path
+from synthetic.gait import path
 
 ARMS = ("l_elbow", "l_wrist", "r_elbow", "r_wrist")
 REST = tuple(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "hip", "knee", "ankle"))

@@ -224,9 +224,10 @@ def test_command_line_refuses_bad_input(tmp_path):
     refused(run(sample_path(), "--out", tmp_path / "angles.doc"), ".csv")
     refused(run(sample_path(), "--targets", tmp_path / "missing.npz"), "missing.npz")
     # A result of another recording had no position for any frame, and a posture was written for each.
-    for name, rows in (("other.csv", "12.5,tracking,0.01,1,2,3\n"), ("empty.csv", "")):
-        (tmp_path / name).write_text(f"stamp_s,status,residual_m,l_hand_x,l_hand_y,l_hand_z\n{rows}")
-        refused(run(sample_path(), "--targets", tmp_path / name, "--out", tmp_path / "o.npz"), "targets", "bend_scoop")
+    cases = {"other.csv": ("12.5,1,tracking,0.01,1,2,3\n", "targets", "bend_scoop"), "empty.csv": ("", "found nobody")}
+    for name, (rows, *words) in cases.items():
+        (tmp_path / name).write_text(f"stamp_s,person,status,residual_m,l_hand_x,l_hand_y,l_hand_z\n{rows}")
+        refused(run(sample_path(), "--targets", tmp_path / name, "--out", tmp_path / "o.npz"), *words)
     init = tmp_path / "init.json"
     init.write_text(json.dumps({"joints": {"l_shoulder": [0, 0]}}))
     refused(run(sample_path(), "--init", init), "l_shoulder")

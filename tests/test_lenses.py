@@ -9,9 +9,9 @@ import pytest
 import voodoo
 from lenses import LENSES
 from room_walk import Walk
+from synthetic.gait import path
 from voodoo.errors import CameraError
 from voodoo.evaluation.metrics import JOINTS
-from voodoo.synthetic.gait import path
 
 
 def through(name, width=320, height=240, focal=220.0):

@@ -308,11 +308,11 @@ def test_every_bad_image_is_counted_as_received_and_refused():
 def test_after_a_long_gap_the_search_starts_anew():
     bus = Bus()
     bus.good(5)
-    first = bus.rig.follower._one
+    first = bus.rig.follower._front
     bus.rig.clock.at += 6.0
     bus.shift += 6.0
     bus.good(8)
-    assert bus.rig.follower._one is not first
+    assert bus.rig.follower._front is not first
     statuses = [str(step.estimates[1].status) for step in bus.rig.steps[5:]]
     assert statuses[0] == "searching"
     assert statuses[-1] == "tracking"

@@ -15,7 +15,7 @@ from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import FOLLOW, Ros2Sink
 from voodoo.live.sources.played import PlayedSource
 from voodoo.measurements import DepthImage
-from voodoo.pipeline.search import nobody
+from voodoo.pipeline.front_end import nobody
 from voodoo.sensors.settings import FrontEndSettings
 
 SETTINGS = FrontEndSettings(use=("depth",))

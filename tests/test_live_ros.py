@@ -25,8 +25,8 @@ from voodoo.live.sources.played import PlayedSource
 from voodoo.live.sources.ros2 import Ros2Source
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
 from voodoo.pipeline.floor import seen_floor
+from voodoo.pipeline.front_end import nobody
 from voodoo.pipeline.run import start_tracker, track
-from voodoo.pipeline.search import nobody
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.transforms import TransformTree
 

@@ -31,10 +31,10 @@ TRC = (
 def test_trc_units_axes_and_missing_markers(tmp_path):
     path = tmp_path / "x.trc"
     path.write_text(TRC)
-    markers = read_trc(path, world_from_file=Z_UP_FROM_Y_UP)
+    markers = read_trc(path)
     assert (markers.names, markers.rate_hz) == (("A", "B"), 100.0)
     np.testing.assert_allclose(markers.stamps, [0.0, 0.01])
-    np.testing.assert_allclose(markers.positions[1], [[0.003, 0.001, 0.002], [0.006, 0.004, 0.005]])
+    np.testing.assert_allclose(markers.positions[1] @ Z_UP_FROM_Y_UP.T, [[0.003, 0.001, 0.002], [0.006, 0.004, 0.005]])
     assert np.isnan(markers.positions[0, 1]).all() and np.isfinite(markers.positions[0, 0]).all()
 
 

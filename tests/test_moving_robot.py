@@ -7,13 +7,13 @@ import pytest
 
 import voodoo
 from made_up import WALL
+from synthetic.gait import path
+from synthetic.people import MadeUpRecording, Scene, Walker
+from synthetic.stories import base_from_camera
 from voodoo.evaluation import metrics
 from voodoo.evaluation.people_evaluate import judge
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_tracker
-from voodoo.synthetic.gait import path
-from voodoo.synthetic.people import MadeUpRecording, Scene, Walker
-from voodoo.synthetic.stories import base_from_camera
 
 CUPBOARD = ((3.9, 0.9, 0.0), (4.4, 1.7, 1.8))
 SECONDS, MORE_M = 3.4, 0.01

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from synthetic.passer_by import WithPasserBy
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage
 from voodoo.recordings import open_recording, sample_path
-from voodoo.synthetic.passer_by import WithPasserBy
 
 
 @pytest.fixture(scope="module")

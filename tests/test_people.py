@@ -9,8 +9,9 @@ import pytest
 import voodoo
 from measurement_data import data_folder
 from voodoo.errors import BodyError, ConfigError, MeasurementError
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.people import PeopleFrontEnd
+from voodoo.pipeline.run import track
 from voodoo.recordings import open_recording
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.pose2sim import SITES
@@ -144,8 +145,9 @@ def test_two_persons_in_four_pictures_without_names(voodoo_data):
     folder = data_folder(voodoo_data, "pose2sim-two")
     recording, people = open_recording(folder), voodoo.People()
     files = [next(folder.glob(f"*_P{number}_0-100.trc")) for number in (1, 2)]
-    known = [read_trc(file, world_from_file=Z_UP_FROM_Y_UP).of(SITES) for file in files]
-    front_end = PeopleFrontEnd(people, settings=FrontEndSettings.of(recording))
+    read = [read_trc(file).of(SITES) for file in files]
+    known = [(names, positions @ Z_UP_FROM_Y_UP.T) for names, positions in read]
+    front_end = FrontEnd(people, settings=FrontEndSettings.of(recording))
     errors = []
     for index, recorded in enumerate(islice(paired(recording), 40)):
         found = front_end.step(recorded)
@@ -165,12 +167,26 @@ def test_two_persons_in_four_pictures_without_names(voodoo_data):
     assert np.nanmean(errors) < 0.05
 
 
+def test_persons_who_touch_are_one_segment_and_several_bodies(voodoo_data):
+    recording = open_recording(data_folder(voodoo_data, "real", "pcl_five"))
+    steps = [step.estimate for step in track(recording, voodoo.People())]
+    assert len(steps[17]) == 5  # 0.57 s
+    roots = np.array([person.estimate.joints["humanoid_root"] for person in steps[-1]])
+    apart = np.linalg.norm(roots[:, None] - roots, axis=2) + 9.0 * np.eye(len(roots))
+    assert len(roots) == 5 and apart.min() > 0.4
+    shoulders = [
+        np.linalg.norm(person.estimate.joints["l_shoulder"] - person.estimate.joints["r_shoulder"])
+        for person in steps[-1]
+    ]
+    assert max(shoulders) < 0.5, "no body spans two persons"
+
+
 def test_two_who_cross_keep_their_numbers(voodoo_data):
     folder = data_folder(voodoo_data, "people", "pp_p2_two_cross_twice_cmu")
     with (folder / "truth_people.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if float(row["in_view"]) > 0.3]
     recording, people = open_recording(folder / "bag"), voodoo.People()
-    front_end, numbers = PeopleFrontEnd(people, settings=FrontEndSettings.of(recording)), {}
+    front_end, numbers = FrontEnd(people, settings=FrontEndSettings.of(recording)), {}
     for recorded in islice(paired(recording), 72):
         for person in front_end.step(recorded):
             root = person.estimate.joints["humanoid_root"]

@@ -2,7 +2,6 @@
 
 import csv
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +12,15 @@ from voodoo.cli import app
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.people import PeopleScore, score, together
+from voodoo.evaluation.people_evaluate import read_rows
 from voodoo.evaluation.people_report import people_markdown
-from voodoo.export.people_rows import FIRST, PeopleRows, is_people_file, read_rows, write_rows
+from voodoo.export.table import save_result
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PeopleTruth, read_people_truth
 
 pytest.importorskip("motmetrics")
 NAMES = ("humanoid_root", *metrics.JOINTS)
+FIRST = ("stamp_s", "person", "status", "residual_m")
 
 
 def truth(places, in_view=None, persons=(1, 2)):
@@ -30,6 +31,22 @@ def truth(places, in_view=None, persons=(1, 2)):
     positions[np.isnan(places)] = np.nan
     observed = np.where(np.isnan(places), 0.0, 1.0) if in_view is None else np.asarray(in_view, dtype=float)
     return PeopleTruth(np.arange(len(places)) / 10.0, np.array(persons), observed, NAMES, positions)
+
+
+def rows_of(stamps, persons, joints, names=NAMES):
+    """Rows without angles, limbs and covariances."""
+    count = len(stamps)
+    return {
+        "stamps": stamps,
+        "person": persons,
+        "status": np.full(count, "tracking"),
+        "residual": np.full(count, np.nan),
+        "joint_names": np.array(names),
+        "joints": joints,
+        **{name: np.empty(0, dtype=np.str_) for name in ("angle_names", "limb_status_names")},
+        **{name: np.empty((count, 0)) for name in ("angles", "limb_status")},
+        "covariance": np.empty((count, 0, 3, 3)),
+    }
 
 
 def result(bodies):
@@ -44,8 +61,7 @@ def result(bodies):
     joints[..., 1] = np.array([row[2] for row in rows])[:, None]
     ids = np.array([row[1] for row in rows], dtype=np.int64)
     stamps = np.array([row[0] for row in rows])
-    count = len(rows)
-    return PeopleRows(stamps, ids, ("tracking",) * count, np.zeros(count), NAMES, joints, (), np.empty((count, 0)))
+    return rows_of(stamps, ids, joints)
 
 
 def judged(known, found, **options):
@@ -146,21 +162,21 @@ def test_recordings_add_up():
 
 
 def test_rows_are_read_as_they_are_written(tmp_path):
-    rows = replace(result({1: [0.5, N, 0.7], 12: [1.0, 1.1, 1.2]}), residual=np.array([0.01, N, 0.02, 0.03, 0.04]))
-    write_rows(tmp_path / "r.csv", [rows])
+    rows = {**result({1: [0.5, N, 0.7], 12: [1.0, 1.1, 1.2]}), "residual": np.array([0.01, N, 0.02, 0.03, 0.04])}
+    rows["joints"][2, 1:] = np.nan
+    save_result(tmp_path / "r.csv", rows)
     assert (tmp_path / "r.csv").read_text().startswith("stamp_s,person,status,residual_m,humanoid_root_x,")
     again = read_rows(tmp_path / "r.csv")
-    assert again.persons.tolist() == rows.persons.tolist() == [1, 12, 12, 1, 12]
-    np.testing.assert_array_equal(again.stamps, rows.stamps)
-    np.testing.assert_allclose(again.joints, rows.joints, atol=1e-6)
-    np.testing.assert_array_equal(np.isnan(again.residual), np.isnan(rows.residual))
-    assert is_people_file(tmp_path / "r.csv")
+    assert again["person"].tolist() == rows["person"].tolist() == [1, 12, 12, 1, 12]
+    np.testing.assert_array_equal(again["stamps"], rows["stamps"])
+    np.testing.assert_allclose(again["joints"], rows["joints"], atol=1e-6)
+    np.testing.assert_array_equal(np.isnan(again["residual"]), np.isnan(rows["residual"]))
 
 
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (["stamp_s,status,residual_m,a_x,a_y,a_z"], "expected columns stamp_s, person"),
+        (["stamp_s,person,residual_m,a_x,a_y,a_z"], "expected columns stamp_s, person"),
         (
             [",".join([*FIRST, "a_x", "a_y", "a_z"]), "0,0,tracking,,1,1,1"],
             "line 2: person: expected an integer from 1",
@@ -217,7 +233,7 @@ def test_a_result_of_another_time_is_refused():
     known = truth([[0.0]] * 3, persons=(1,))
     later = result({1: [0.0] * 3})
     with pytest.raises(VoodooError, match="none in common"):
-        judged(known, replace(later, stamps=later.stamps + 50.0))
+        judged(known, {**later, "stamps": later["stamps"] + 50.0})
 
 
 def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
@@ -225,17 +241,10 @@ def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
     known = open_recording(path).people
     frame, person = np.nonzero(known.in_view >= 0.3)
     count = len(frame)
-    rows = PeopleRows(
-        known.stamps[frame],
-        known.persons[person] + 6,
-        ("tracking",) * count,
-        np.full(count, np.nan),
-        known.names,
-        known.positions[frame, person] + [0.03, 0.0, 0.0],
-        (),
-        np.empty((count, 0)),
+    places = known.positions[frame, person] + [0.03, 0.0, 0.0]
+    save_result(
+        tmp_path / "theirs.csv", rows_of(known.stamps[frame], known.persons[person] + 6, places, names=known.names)
     )
-    write_rows(tmp_path / "theirs.csv", [rows])
     command = ["eval", str(path), "--result", str(tmp_path / "theirs.csv"), "--out", str(tmp_path / "out")]
     message = CliRunner().invoke(app, command)
     assert message.exit_code == 0, message.output

@@ -12,20 +12,20 @@ from typer.testing import CliRunner
 
 import voodoo
 from made_up import places_in, two_people
+from synthetic.people import COLOR, MadeUpRecording
 from voodoo.cli import app
 from voodoo.cli.common import NO_POSE
 from voodoo.errors import VoodooError
 from voodoo.evaluation.people_evaluate import judge
+from voodoo.export.files import save
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
 from voodoo.export.track import Track
 from voodoo.measurements import MarkerSet, RecordedFrame
 from voodoo.names import SEARCHING
-from voodoo.pipeline.people import track_people
+from voodoo.pipeline.run import track
 from voodoo.recordings import SensorInfo
 from voodoo.sensors.adapters import Adapter, register, unregister
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.people import COLOR, MadeUpRecording
 from voodoo.visualization.ink import person_color
 from voodoo.visualization.overlay import Overlay
 
@@ -34,7 +34,7 @@ from voodoo.visualization.overlay import Overlay
 def followed():
     """Estimates of all frames, and the bodies of everybody."""
     people, bodies, estimates = voodoo.People(), {}, []
-    for step in track_people(two_people(), people):
+    for step in track(two_people(), people):
         estimates.append(step.estimate)
         bodies |= {person.id: people.body(person.id) for person in step.estimate}
     return PeopleTrack.of(estimates, bodies=bodies), bodies
@@ -126,16 +126,29 @@ def test_the_npz_holds_everybody_exactly(followed, tmp_path):
     result.save(tmp_path / "all.npz")
     again = PeopleTrack.load(tmp_path / "all.npz")
     np.testing.assert_array_equal(again.stamps, result.stamps)
-    for one, track in result.tracks.items():
+    for one, own in result.tracks.items():
         for name in ("stamps", "residual", "joints", "world_from_limb", "angles"):
-            np.testing.assert_array_equal(getattr(again.tracks[one], name), getattr(track, name))
-        assert again.tracks[one].status == track.status
+            np.testing.assert_array_equal(getattr(again.tracks[one], name), getattr(own, name))
+        assert (again.tracks[one].status, again.tracks[one].limb_status) == (own.status, own.limb_status)
+
+
+def test_the_csv_holds_of_everybody_what_it_holds_of_one(followed, tmp_path):
+    result, _ = followed
+    result.save(tmp_path / "all.csv")
+    again = PeopleTrack.load(tmp_path / "all.csv")
+    for one, alone in result.tracks.items():
+        np.testing.assert_allclose(again.tracks[one].joints, alone.joints, atol=1e-6)
+        assert (again.tracks[one].status, again.tracks[one].limb_status) == (alone.status, alone.limb_status)
+        alone.save(tmp_path / "one.csv")
+        with (tmp_path / "one.csv").open(newline="") as first, (tmp_path / "all.csv").open(newline="") as together:
+            own = [{**row, "person": str(one)} for row in csv.DictReader(first)]
+            assert own == [row for row in csv.DictReader(together) if row["person"] == str(one)]
 
 
 def test_there_is_a_bvh_and_a_trc_for_every_person(followed, tmp_path):
     result, bodies = followed
     for suffix in (".bvh", ".trc"):
-        written = save_people(result, tmp_path / f"all{suffix}", bodies=bodies, root_frame="base_link")
+        written = save(result, tmp_path / f"all{suffix}", body=bodies, root_frame="base_link")
         assert [path.name for path in written] == [f"all_1{suffix}", f"all_2{suffix}"]
         assert all(path.is_file() for path in written)
     frames = [line for line in (tmp_path / "all_2.bvh").read_text().splitlines() if line.startswith("Frames:")]
@@ -144,7 +157,7 @@ def test_there_is_a_bvh_and_a_trc_for_every_person(followed, tmp_path):
 
 def test_the_bag_has_the_frames_of_everybody(followed, tmp_path):
     result, bodies = followed
-    save_people(result, tmp_path / "all", bodies=bodies, root_frame="odom")
+    save(result, tmp_path / "all", body=bodies, root_frame="odom")
     children, stamps = {}, []
     with AnyReader([tmp_path / "all"]) as bag:
         topics = {connection.topic for connection in bag.connections}
@@ -166,8 +179,8 @@ def test_files_of_nobody_are_written_all_the_same(tmp_path):
     nobody.save(tmp_path / "nobody.csv")
     nobody.save(tmp_path / "nobody.npz")
     assert PeopleTrack.load(tmp_path / "nobody.npz").tracks == {}
-    assert save_people(nobody, tmp_path / "nobody.bvh", bodies={}, root_frame="odom") == []
-    save_people(nobody, tmp_path / "nobody.mcap", bodies={}, root_frame="odom")
+    assert save(nobody, tmp_path / "nobody.bvh", body={}, root_frame="odom") == []
+    save(nobody, tmp_path / "nobody.mcap", body={}, root_frame="odom")
     assert (tmp_path / "nobody.mcap").is_file()
     assert PeopleTrack.load(tmp_path / "nobody.csv").tracks == {}
 
@@ -189,13 +202,13 @@ def test_readers_of_one_person_take_the_only_one_and_refuse_several(followed, tm
     PeopleTrack(result.stamps, {2: result.tracks[2]}).save(tmp_path / f"one{suffix}")
     assert len(Track.load(tmp_path / f"one{suffix}")) == len(result.tracks[2])
     result.save(tmp_path / f"two{suffix}")
-    with pytest.raises(VoodooError, match="expected the result of one person, found persons 1, 2"):
+    with pytest.raises(VoodooError, match=r"found persons 1, 2; PeopleTrack\.load reads them"):
         Track.load(tmp_path / f"two{suffix}")
 
 
 def test_the_overlay_shows_everybody_in_a_color_of_their_own():
     people = voodoo.People()
-    *_, last = track_people(two_people(), people)
+    *_, last = track(two_people(), people)
     bodies = {person.id: people.body(person.id) for person in last.estimate}
     picture = Overlay(two_people()).draw_people(last.recorded, last.estimate, bodies, index=last.index)
     assert sorted(bodies) == [1, 2]
@@ -228,7 +241,7 @@ def test_a_frame_that_is_refused_costs_no_other_one(run, monkeypatch):
 def test_boxes_and_the_floor_reach_the_frame():
     recording = two_people()
     everywhere = FrontEndSettings(use=("depth",), exclude=(((0.0, -5.0, -1.0), (9.0, 5.0, 3.0)),))
-    steps = list(track_people(recording, voodoo.People(), settings=everywhere))
+    steps = list(track(recording, voodoo.People(), settings=everywhere))
     assert all(len(step.estimate) == 0 for step in steps)
 
 
@@ -236,7 +249,7 @@ def test_skin_is_searched_for_on_everybody_where_it_is_asked_for():
     recording = two_people()
     used = {}
     for use in (None, ("depth", "skin")):
-        steps = track_people(recording, voodoo.People(), settings=FrontEndSettings.of(recording, use=use))
+        steps = track(recording, voodoo.People(), settings=FrontEndSettings.of(recording, use=use))
         sources = [[person.estimate.sources for person in step.estimate] for step in steps]
         *_, last = [persons for persons in sources if persons and COLOR in persons[0]]
         used[use] = [person[COLOR][1] for person in last]
@@ -285,12 +298,10 @@ shape = { length = 0.2, a0 = 0.10, b0 = 0.10, a1 = 0.08, b1 = 0.08 }
 
 
 REFUSED = {
-    "markers": ("found markers, which are of one person; --use depth,skin leaves", ()),
-    "any other registered adapter": ("found tag, which are of one person", ()),
     "`--init FILE`": ("init: expected none", ("--init", "start.json")),
-    "`--draw-regions`, `--background`, `--marker-map`": ("draw-regions: expected none with", ("--draw-regions",)),
+    "`--draw-regions`, `--background`": ("draw-regions: expected none with", ("--draw-regions",)),
     "a body that the detector does not know": (
-        "that the detector of persons knows, found 'lamp'",
+        "by depth, skin alone the body 'lamp' is not found",
         ("--body", "lamp.toml"),
     ),
 }
@@ -298,6 +309,8 @@ USED = {
     "depth images": (),
     "`--use depth,skin`": ("--use", "depth,skin"),
     "color images": ("--use", "depth,color"),
+    "markers, `--marker-map`": (),
+    "any other registered adapter": (),
     "an adapter with `while_searching`": (),
     "`--exclude`, `--depth-range`, `--height`, `--upright`": (
         *("--exclude", "8,8,8,9,9,9", "--depth-range", "0.5,7", "--height", "1.7", "--upright"),
@@ -324,7 +337,7 @@ def test_what_works_with_several_people(run, with_sensor, what, tmp_path):
         adapter.while_searching = "while_searching" in what
         register(adapter)
     try:
-        if what == "markers":
+        if "markers" in what:
             with_sensor("markers", MarkerSet("m", 1.0, {"l_wrist": (0.0, 0.0, 1.0)}))
         elif "adapter" in what:
             with_sensor("tag", Tag())
@@ -332,7 +345,7 @@ def test_what_works_with_several_people(run, with_sensor, what, tmp_path):
             Path("lamp.toml").write_text(LAMP)
         done = run("--people", "2", *options, "--out", "x.csv")
         assert (done.exit_code, words in done.stderr) == (1 if words else 0, True), done.output
-        if "while_searching" in what:
+        if "adapter" in what:
             assert TagAdapter.seen > 0
     finally:
         if "adapter" in what:

@@ -9,7 +9,7 @@ from pydantic_core.core_schema import ErrorType
 
 import voodoo
 from voodoo.errors import BodyError, ConfigError, MeasurementError, RecordingError, VoodooError
-from voodoo.export.people_rows import read_rows
+from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
@@ -205,7 +205,9 @@ def test_no_kind_of_pydantics_errors_is_passed_on():
 
 
 @pytest.mark.parametrize(
-    "read", [Track.load, read_rows, lambda path: read_positions(path, ("stamp_s",))], ids=["track", "people", "truth"]
+    "read",
+    [Track.load, PeopleTrack.load, lambda path: read_positions(path, ("stamp_s",))],
+    ids=["track", "people", "truth"],
 )
 def test_a_header_is_not_dumped(read, tmp_path):
     (tmp_path / "a.csv").write_text("time," + ",".join(f"{'column' * 8}{number}" for number in range(50)) + "\n1,2\n")

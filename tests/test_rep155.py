@@ -11,13 +11,13 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import voodoo
 from made_up import two_people
+from voodoo.export.files import save
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
 from voodoo.export.ros2 import person_id, write_bag
 from voodoo.export.track import Track
 from voodoo.export.urdf import urdf
 from voodoo.live.sinks.ros2 import FOLLOW
-from voodoo.pipeline.people import track_people
+from voodoo.pipeline.run import track
 from voodoo.pipeline.run import track as run_track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import sample_path
@@ -39,10 +39,10 @@ def one_person(folder):
 
 def several(folder):
     people, bodies, estimates = voodoo.People(), {}, []
-    for step in track_people(two_people(), people):
+    for step in track(two_people(), people):
         estimates.append(step.estimate)
         bodies |= {person.id: people.body(person.id) for person in step.estimate}
-    save_people(PeopleTrack.of(estimates, bodies=bodies), folder, bodies=bodies, root_frame="odom")
+    save(PeopleTrack.of(estimates, bodies=bodies), folder, body=bodies, root_frame="odom")
     return 2
 
 

@@ -9,6 +9,7 @@ import voodoo
 from core_fakes import T_POSE, pose, searching
 from scene import standing_joints
 from voodoo.errors import VoodooError
+from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.pipeline.start import Init
 
@@ -48,8 +49,9 @@ def test_csv_columns(tmp_path):
     track.save(tmp_path / "new" / "pose.csv")
     with (tmp_path / "new" / "pose.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert list(rows[0])[:6] == [
+    assert list(rows[0])[:7] == [
         "stamp_s",
+        "person",
         "status",
         "residual_m",
         "humanoid_root_x",
@@ -57,7 +59,8 @@ def test_csv_columns(tmp_path):
         "humanoid_root_z",
     ]
     assert list(rows[0])[-len(track.limb_names) :] == [f"{limb}_status" for limb in track.limb_names]
-    assert len(rows[0]) == 3 + 3 * len(T_POSE) + len(track.limb_names)
+    assert [row["person"] for row in rows] == ["1", "1"]
+    assert len(rows[0]) == 4 + 3 * len(T_POSE) + len(track.limb_names)
     assert float(rows[1]["l_wrist_y"]) == pytest.approx(
         track.joints[1, track.joint_names.index("l_wrist"), 1], abs=1e-6
     )
@@ -200,15 +203,32 @@ def test_readers_pass_over_columns_and_arrays_of_later_versions(tmp_path, suppor
     assert np.array_equal(later.angles, now.angles, equal_nan=True) and later.angle_names == now.angle_names
     supported.save(tmp_path / "pose.npz")
     content = dict(np.load(tmp_path / "pose.npz"))
-    assert content["format_version"] == 2
+    assert content["format_version"] == 3
     np.savez(tmp_path / "more.npz", **content, mood=np.ones(3))
     assert len(Track.load(tmp_path / "more.npz")) == 4
     np.savez(tmp_path / "late.npz", **{**content, "format_version": np.array(99)})
-    with pytest.raises(VoodooError, match="format_version: expected 2 at most, found 99"):
+    with pytest.raises(VoodooError, match="format_version: expected 3 at most, found 99"):
         Track.load(tmp_path / "late.npz")
     old = {name: content[name] for name in content if not name.startswith(("format", "limb_status", "left_out"))}
     np.savez(tmp_path / "old.npz", **old)
     assert Track.load(tmp_path / "old.npz").limb_status == {}
+
+
+def test_a_file_of_before_is_person_1(tmp_path, supported):
+    """It had no persons."""
+    for suffix in (".csv", ".npz"):
+        supported.save(tmp_path / f"pose{suffix}")
+    lines = [line.split(",") for line in (tmp_path / "pose.csv").read_text().splitlines()]
+    (tmp_path / "old.csv").write_text("".join(",".join([line[0], *line[2:]]) + "\n" for line in lines))
+    content = dict(np.load(tmp_path / "pose.npz"))
+    assert np.array_equal(content.pop("frame_stamps"), supported.stamps) and content.pop("person").tolist() == [1] * 4
+    np.savez(tmp_path / "old.npz", **{**content, "format_version": np.array(2)})
+    for suffix in (".csv", ".npz"):
+        old, now = Track.load(tmp_path / f"old{suffix}"), Track.load(tmp_path / f"pose{suffix}")
+        assert np.array_equal(old.joints, now.joints, equal_nan=True) and old.limb_status == now.limb_status
+        assert old.status == now.status == supported.status
+        people = PeopleTrack.load(tmp_path / f"old{suffix}")
+        assert list(people.tracks) == [1] and people.stamps.tolist() == supported.stamps.tolist()
 
 
 def test_a_first_pose_carries_a_format_version():

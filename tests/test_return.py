@@ -7,8 +7,8 @@ import pytest
 
 import voodoo
 from room_walk import Walk
+from synthetic.gait import Stop
 from voodoo.evaluation import metrics
-from voodoo.synthetic.gait import Stop
 
 LEFT, RIGHT, TO_CAMERA, AWAY = math.pi / 2, -math.pi / 2, math.pi, 0.0
 STANDING = (Stop(0.0, 2.8, 0.0, TO_CAMERA), Stop(0.5, 2.8, 0.0, TO_CAMERA))

@@ -109,7 +109,7 @@ def test_what_others_left_is_not_followed_out_of_the_folder(tmp_path):
     assert done.exit_code == 0 and [file.name for file in tmp_path.iterdir()] == ["in"]
     assert (tmp_path / "in" / "out.mcap").read_text() == "recorded"
     hidden.mkdir()
-    for note in ("[]", '{"paths": 3}', "{", '{"paths": ["a.csv"], "several": false}'):
+    for note in ("[]", '{"paths": 3}', "{", '{"paths": ["a.csv"], "root_frame": "a"}'):
         (hidden / KEPT).write_text(note)
         assert run("recover", tmp_path / "in").exit_code == 1
     assert [file.name for file in (tmp_path / "in").iterdir()] == ["out.mcap", hidden.name]

@@ -5,6 +5,7 @@ import pytest
 
 import voodoo
 from scene import standing_joints
+from synthetic.sequence import CAMERA, METERS_PER_UNIT, VirtualSequence
 from voodoo.evaluation import metrics
 from voodoo.export import write_trc
 from voodoo.export.track import Track
@@ -15,7 +16,6 @@ from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.keypoints import KeypointSensor
 from voodoo.synthetic.render import render_depth
-from voodoo.synthetic.sequence import CAMERA, METERS_PER_UNIT, VirtualSequence
 
 WALL_M, NOISE_M = 3.6, 0.004
 HELD = {"gate_start": 0.001, "gate_end": 0.001, "hypotheses": False, "depth_contour": False, "relocalization": False}

@@ -14,10 +14,9 @@ from made_up import two_people
 from voodoo.errors import VoodooError
 from voodoo.model.limb_mesh import limb_mesh
 from voodoo.people import PeopleEstimate
-from voodoo.pipeline.front_end import FrontEnd
+from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.people import track_people
-from voodoo.pipeline.search import nobody
+from voodoo.pipeline.run import track
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
@@ -132,7 +131,7 @@ def test_a_body_that_is_gone_is_cleared_and_sent_again(tmp_path, steps):
 def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path):
     pytest.importorskip("rerun", reason="Rerun is not installed")
     people, bodies, steps = voodoo.People(), {}, []
-    for step in track_people(two_people(), people):
+    for step in track(two_people(), people):
         bodies |= {person.id: people.body(person.id) for person in step.estimate}
         steps.append(step)
     path = tmp_path / "people.rrd"

@@ -7,11 +7,11 @@ import pytest
 
 import voodoo
 from disturbance import Disturbance, disturbed
+from synthetic.grown import grown
+from synthetic.sequence import VirtualSequence
 from voodoo.evaluation import metrics
 from voodoo.ik import Chain
 from voodoo.ik.angles import angles_of
-from voodoo.synthetic.grown import grown
-from voodoo.synthetic.sequence import VirtualSequence
 
 SMALL = voodoo.Camera(320, 240, 275.0, 275.0, 159.5, 119.5)
 

@@ -8,7 +8,7 @@ fisheye lens that show as much of the scene:
 
 - Rendered recordings, whose depth images are resampled through each lens (through_lens.py). The pinhole is resampled as well,
   through a camera with a slightly different focal length and center, so that all images have the same sampling noise.
-- A person who walks about a room and one who swings every joint (`voodoo.synthetic`), rendered through each lens, pixel by pixel;
+- A person who walks about a room and one who swings every joint (`tests/synthetic`), rendered through each lens, pixel by pixel;
   the cameras are 100 degrees wide.
 
 Prints, and writes to table.md, the mean joint error, the share of limbs called lost, and the share of frames in which the person
@@ -35,14 +35,14 @@ from voodoo.model.projection import CameraView
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.gait import path
-from voodoo.synthetic.sequence import VirtualFrame, VirtualSequence
 from voodoo.visualization.body_drawing import draw_body
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from lenses import LENSES
 from room_walk import Walk
+from synthetic.gait import path
+from synthetic.sequence import VirtualFrame, VirtualSequence
 
 RECORDINGS = ("dev_01_bend_scoop_cmu", "dev_02_arms_cmu", "dev_04_kick_ball_cmu", "dev_05_walk")
 MODELS = {

@@ -24,11 +24,11 @@ from one_of_many import ELSE, follow, stretches
 
 import voodoo
 from voodoo.names import SEARCHING
-from voodoo.synthetic.gait import Stop
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from room_walk import Walk
+from synthetic.gait import Stop
 
 
 @dataclass(frozen=True)

@@ -88,8 +88,8 @@ class Trial:
 
 def four_cameras(path: Path) -> Trial:
     recording = voodoo.open_recording(path)
-    names, positions = read_trc(next(path.glob("*_butterworth.trc")), world_from_file=Z_UP_FROM_Y_UP).of(SITES)
-    truth = {name: positions[:, i] for i, name in enumerate(names)}
+    names, positions = read_trc(next(path.glob("*_butterworth.trc"))).of(SITES)
+    truth = {name: positions[:, i] @ Z_UP_FROM_Y_UP.T for i, name in enumerate(names)}
     pictures = {
         placed.name: (*read(video, placed.camera), placed.world_from_sensor)
         for placed, video in zip(recording.cameras, sorted((path / "videos").glob("*.mp4")), strict=True)

@@ -8,14 +8,19 @@ somebody else comes meanwhile. In `passing` somebody walks by 0.8 m in front of 
 """
 
 import argparse
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import voodoo
 from voodoo.evaluation.people import PeopleScore, together
 from voodoo.evaluation.people_evaluate import judge
 from voodoo.evaluation.people_report import people_markdown
-from voodoo.synthetic import stories
-from voodoo.synthetic.people import MadeUpRecording
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from synthetic import stories
+from synthetic.people import MadeUpRecording
 
 KINDS: dict[str, tuple[Callable[[int], MadeUpRecording], int]] = {
     "returning": (stories.returning, 10),

@@ -7,6 +7,8 @@ itself and of `voodoo.People`, standing, moving, and the difference.
 """
 
 import argparse
+import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -15,8 +17,11 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.people_evaluate import judge
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_tracker
-from voodoo.synthetic import stories
-from voodoo.synthetic.people import MadeUpRecording
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from synthetic import stories
+from synthetic.people import MadeUpRecording
 
 
 def alone(recording: MadeUpRecording) -> float:

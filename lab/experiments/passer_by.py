@@ -9,6 +9,7 @@ the greatest distance, and those without a pose. The id of the person is the one
 """
 
 import argparse
+import sys
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import voodoo
-from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
-from voodoo.synthetic.passer_by import WithPasserBy
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from synthetic.passer_by import WithPasserBy
 
 FAR_M = 0.5
 ROOT = "humanoid_root"
@@ -66,7 +69,7 @@ def alone(recording: WithPasserBy) -> list[voodoo.Estimate | None]:
 
 def among_others(recording: WithPasserBy) -> list[voodoo.Estimate | None]:
     """The person's estimates of `voodoo.People`."""
-    steps = [step.estimate for step in track_people(recording, voodoo.People())]
+    steps = [step.estimate for step in track(recording, voodoo.People())]
     truth = recording.people
     near: Counter[int] = Counter()
     for step in steps:

@@ -8,6 +8,7 @@ which each speed is farthest off: truth, estimate over the image). Errors are of
 """
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,10 +21,13 @@ import numpy as np
 import voodoo
 from voodoo.evaluation import metrics
 from voodoo.model.projection import CameraView
-from voodoo.synthetic.grown import grown
-from voodoo.synthetic.sequence import VirtualFrame, VirtualSequence
 from voodoo.visualization.body_drawing import draw_body
 from voodoo.visualization.image_writer import save_picture
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from synthetic.grown import grown
+from synthetic.sequence import VirtualFrame, VirtualSequence
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -29,11 +29,11 @@ from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, RecordedFrame
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.sequence import VirtualSequence
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from disturbance import Disturbance, disturbed, disturbed_image
+from synthetic.sequence import VirtualSequence
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

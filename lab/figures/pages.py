@@ -22,6 +22,7 @@ PAGES = tuple(
         "python/README.md",
         "docs/index.md",
         "docs/figures.md",
+        "docs/explanation/tried-on.md",
         "lab/training/CARD.md",
         "lab/figures/README.md",
     )

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lab_scripts import load_experiment
+from synthetic.passer_by import WithPasserBy
 from voodoo.recordings import open_recording, sample_path
-from voodoo.synthetic.passer_by import WithPasserBy
 
 
 @pytest.fixture(scope="module")

@@ -83,26 +83,6 @@ _HOMES = {
     "voodoo.tracker": ("Tracker",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-_ROOMS = (
-    "_core",
-    "cli",
-    "config",
-    "detectors",
-    "errors",
-    "evaluation",
-    "export",
-    "ik",
-    "live",
-    "measurements",
-    "model",
-    "people",
-    "pipeline",
-    "recordings",
-    "sensors",
-    "synthetic",
-    "tracker",
-    "visualization",
-)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
@@ -110,10 +90,14 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands fo
         value = getattr(import_module(_HOME_OF[name]), name)
         globals()[name] = value
         return value
-    if name in _ROOMS:
+    from importlib.util import find_spec
+
+    if name.isidentifier() and find_spec(f"voodoo.{name}") is not None:
         return import_module(f"voodoo.{name}")
     raise AttributeError(f"module 'voodoo' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_ROOMS})
+    from pkgutil import iter_modules
+
+    return sorted({*globals(), *__all__, *(room.name for room in iter_modules(__path__))})

@@ -503,6 +503,30 @@ class Frame:
         Raises:
             MeasurementError: not three numbers.
         """
+    def add_detection(
+        self,
+        joints: Mapping[str, Sequence[float] | npt.NDArray[np.float64]],
+        *,
+        log_odds: float = ...,
+        weight: float = 1.0,
+        source: str = "detections",
+    ) -> None:
+        """Add a person whom something else found in this instant: a network, several cameras, markers.
+
+        The joints measure the tracked person whom they are nearest to, as `add_position` does. Where they show nobody who is
+        tracked, that person is tracked from this frame on: a lost or absent one who may have moved there, or a new one. Joints
+        that do not determine the pose start nobody.
+
+        Args:
+            joints: site name -> (x, y, z) [m] in the world; three that are not collinear determine the pose.
+            log_odds: ln(p / (1 - p)) that it is a person, infinite by default; successive detections with a sum of some 4 start a
+                track.
+            weight, source: as in `add_position`.
+
+        Raises:
+            MeasurementError: a position that is not three numbers.
+        """
+    def _distance(self, sites: Mapping[str, npt.NDArray[np.float64]]) -> float: ...
     def _add_site_rays(
         self, rays: Sequence[SiteRay], *, reference_sigma: float, max_weight: float, min_trust: float
     ) -> int: ...
@@ -772,6 +796,7 @@ class People:
     def step(self, frame: Frame, own: Sequence[tuple[int, Frame]]) -> list[tuple[int, Estimate]]: ...
     def add(self, joints: Mapping[str, tuple[float, float, float]], fit_sizes: bool) -> int: ...
     def needs_colors(self) -> bool: ...
+    def present(self) -> list[int]: ...
     def only(self, ids: Sequence[int] | None) -> None: ...
     def estimate(self, id: int) -> Estimate | None: ...
     def body(self, id: int) -> Body | None: ...

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 import voodoo._core as _core
 from voodoo.errors import ConfigError, naming
 from voodoo.model.joint import valid
-from voodoo.model.toml_io import commented, edited, parse_toml, read_text
+from voodoo.model.toml_io import commented, parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
 
@@ -67,19 +67,8 @@ class Config(ConfigFields, frozen=True):
         """
         return cls.from_toml(read_text(path, error=ConfigError), source=str(path))
 
-    def to_toml(self, *, edit: str | None = None) -> str:
-        """The configuration as TOML, each entry with its meaning, unit and range.
-
-        Args:
-            edit: a configuration in TOML whose comments, order and layout are kept: only values that differ are changed, and
-                only entries that are not at their defaults are added.
-
-        Raises:
-            ConfigError: `edit` is not TOML.
-        """
-        if edit is not None:
-            defaults = type(self)().values()
-            return edited(edit, self.values(), defaults=defaults, source="edit", error=ConfigError)
+    def to_toml(self) -> str:
+        """The configuration as TOML, each entry with its meaning, unit and range."""
         notes = {}
         for name, (doc, unit, _, limits, words) in _FIELDS.items():
             facts = [f"unit: {unit}"] if unit else []

@@ -126,6 +126,11 @@ class People:
         """Steps in which a detector failed; each of them warned (`voodoo.DetectorWarning`)."""
         return self._core.detector_failures
 
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Numbers of the persons who are present."""
+        return tuple(self._core.present())
+
     def step(self, frame: Frame, *, own: Mapping[int, Frame] | None = None) -> PeopleEstimate:
         """Estimate all persons at the time of the frame. Releases the GIL; a rejected frame leaves the state unchanged.
 

@@ -81,16 +81,16 @@ class Unpacking:
         most = self.room(len(data))
         if declared is not None and declared > most:
             raise self.error(len(data), declared)
-        pieces, size = [], 0
-        for piece in _pieces(data, _decompressor(kind), most if declared is None else declared):
-            pieces.append(piece)
-            size += len(piece)
+        parts = iter((data,))
+        content = b"".join(
+            _pieces(lambda: next(parts, b""), _decompressor(kind), most if declared is None else declared)
+        )
+        size = len(content)
         if declared is not None and size != declared:
             raise ValueError(f"expected {declared} bytes as declared, found {'more' if size > declared else size}")
         if size > most:
             raise self.error(len(data), "more")
-        content = b"".join(pieces)
-        self.check(len(data), len(content))
+        self.check(len(data), size)
         return content
 
 
@@ -112,9 +112,9 @@ def _decompressor(kind: str) -> Callable[[], Any]:
     raise ValueError(f"expected a known compression, found {kind!r}")
 
 
-def _pieces(data: bytes, decompressor: Callable[[], Any], most: int) -> Iterator[bytes]:
-    """The content of consecutive compressed streams; ends one byte above the limit."""
-    size = 0
+def _pieces(read: Callable[[], bytes], decompressor: Callable[[], Any], most: int) -> Iterator[bytes]:
+    """The content of consecutive compressed streams, which are read part by part; ends one byte above the limit."""
+    size, data = 0, read()
     while data:
         one = decompressor()
         while not one.eof:
@@ -124,10 +124,10 @@ def _pieces(data: bytes, decompressor: Callable[[], Any], most: int) -> Iterator
             if size > most:
                 return
             data = getattr(one, "unconsumed_tail", b"")  # only zlib gives back what it did not use
-            if not piece and not data and not one.eof:
+            if not piece and not data and not one.eof and not (data := read()):
                 raise ValueError("expected complete compressed data, found it cut off")
         # Later streams belong to the data; zlib has one, after which there may be padding.
-        data = b"" if decompressor is zlib.decompressobj else one.unused_data or b""
+        data = b"" if decompressor is zlib.decompressobj else one.unused_data or read()
 
 
 def count_zstd(path: Path, unpacking: Unpacking) -> None:
@@ -136,24 +136,14 @@ def count_zstd(path: Path, unpacking: Unpacking) -> None:
     Raises:
         ValueError: it is too large, or damaged.
     """
-    packed, size = path.stat().st_size, 0
+    packed = path.stat().st_size
+    if not packed:
+        raise ValueError("expected compressed data, found none")
     most = unpacking.room(packed)
     with path.open("rb") as file:
-        one = _decompressor("zstd")()
-        data = file.read(_PIECE)
-        while True:
-            size += len(one.decompress(data, _PIECE))
-            if size > most:
-                raise unpacking.error(packed, "more")
-            if one.eof:
-                data = one.unused_data or file.read(_PIECE)
-                if not data:
-                    break
-                one = _decompressor("zstd")()
-            else:
-                data = file.read(_PIECE) if one.needs_input else b""
-                if not data and one.needs_input:
-                    raise ValueError("expected complete compressed data, found it cut off")
+        size = sum(map(len, _pieces(lambda: file.read(_PIECE), _decompressor("zstd"), most)))
+    if size > most:
+        raise unpacking.error(packed, "more")
     unpacking.check(packed, size)
 
 

@@ -193,7 +193,7 @@ pub use config::{Config, ConfigError, Field, Overlap, RawValue, SolverKind, Valu
 pub use detect::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 pub use error::{BodyError, CameraError, TrackError};
 pub use observation::frame::{
-    Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
+    Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
 };
 pub use observation::picture::{ColorImage, ColorPixels};
 pub use people::one::Tracker;

@@ -15,7 +15,7 @@ macro_rules! arguments {
     };
 }
 
-arguments!(number, f64: stamp weight bias offset meters_per_unit);
+arguments!(number, f64: stamp weight bias offset meters_per_unit log_odds);
 arguments!(dimension, f64: length a0 b0 a1 b1);
 arguments!(word, String: site);
 

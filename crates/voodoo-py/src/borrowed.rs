@@ -6,7 +6,9 @@ use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArra
 use pyo3::prelude::*;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Camera};
-use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PositionRelation, RayRelation, Scope};
+use voodoo_core::{
+    Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PositionRelation, RayRelation, Scope,
+};
 use voodoo_core::{ColorImage, ColorPixels};
 
 use crate::arrays::{PointArray, PointView, contiguous};
@@ -119,12 +121,27 @@ pub(crate) struct SiteData {
     pub source: u16,
 }
 
+impl SiteData {
+    /// The measured position, of the site with this index.
+    fn relation(&self, site: usize) -> PositionRelation {
+        let Self { position, weight, bias, source, .. } = *self;
+        PositionRelation { site, position, weight, bias, source }
+    }
+}
+
+/// A person who was found in this instant: positions of sites, and log odds.
+pub(crate) struct PersonData {
+    pub positions: Vec<SiteData>,
+    pub person: f64,
+}
+
 /// Everything a step borrows: the views keep the arrays alive and readable.
 pub struct Borrowed<'py> {
     clouds: Vec<(PointView<'py>, Pose, f64, Scope, u16)>,
     images: Vec<ImageView<'py>>,
     pub positions: Vec<PositionRelation>,
     pub rays: Vec<RayRelation>,
+    detections: Vec<(Vec<PositionRelation>, f64)>,
     pub ground: Option<Ground>,
 }
 
@@ -161,6 +178,7 @@ impl Borrowed<'_> {
         clouds: &'a [Cloud<'a>],
         images: &'a [DepthImage<'a>],
         colors: &'a [ColorImage<'a>],
+        detections: &'a [DetectedPerson<'a>],
     ) -> Frame<'a> {
         Frame::empty(held.stamp)
             .with_clouds(clouds)
@@ -168,8 +186,14 @@ impl Borrowed<'_> {
             .with_colors(colors)
             .with_positions(&self.positions)
             .with_rays(&self.rays)
+            .with_detections(detections)
             .with_ground(self.ground)
             .with_excluded(&held.excluded)
+    }
+
+    /// The detected persons.
+    pub fn detections(&self) -> Vec<DetectedPerson<'_>> {
+        self.detections.iter().map(|(positions, person)| DetectedPerson { positions, person: *person }).collect()
     }
 
     pub fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
@@ -193,6 +217,7 @@ pub(crate) struct Held<'a> {
     pub clouds: &'a [CloudData],
     pub images: &'a [ImageData],
     pub sites: &'a [SiteData],
+    pub detections: &'a [PersonData],
     pub ground: Option<Ground>,
 }
 
@@ -230,16 +255,11 @@ impl Held<'_> {
             })
             .collect();
         let (mut positions, mut rays) = (Vec::new(), Vec::new());
+        let index = |data: &SiteData| body.site_index(&data.site).map_err(|error| error.into_py(py));
         for data in self.sites {
-            let site = body.site_index(&data.site).map_err(|error| error.into_py(py))?;
+            let site = index(data)?;
             match data.direction {
-                None => positions.push(PositionRelation {
-                    site,
-                    position: data.position,
-                    weight: data.weight,
-                    bias: data.bias,
-                    source: data.source,
-                }),
+                None => positions.push(data.relation(site)),
                 Some(direction) => rays.push(RayRelation {
                     site,
                     origin: data.position,
@@ -250,7 +270,12 @@ impl Held<'_> {
                 }),
             }
         }
-        Ok(Borrowed { clouds, images, positions, rays, ground: self.ground })
+        let person = |data: &PersonData| {
+            let positions = data.positions.iter().map(|data| Ok(data.relation(index(data)?)));
+            Ok((positions.collect::<PyResult<_>>()?, data.person))
+        };
+        let detections = self.detections.iter().map(person).collect::<PyResult<_>>()?;
+        Ok(Borrowed { clouds, images, positions, rays, detections, ground: self.ground })
     }
 }
 

@@ -2,13 +2,16 @@
 
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use voodoo_core::Body;
 use voodoo_core::Ground;
-use voodoo_core::math::Aabb;
+use voodoo_core::math::{Aabb, Vec3};
 
 use crate::arguments;
 use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
-use crate::borrowed::{Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, SiteData};
+use crate::borrowed::{
+    Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, PersonData, SiteData,
+};
 use crate::camera::camera_of;
 use crate::errors::{exception, wrong_argument};
 use crate::sites::PySiteRay;
@@ -23,6 +26,7 @@ pub struct PyFrame {
     pub(crate) images: Vec<ImageData>,
     pub(crate) colors: Vec<ColorData>,
     pub(crate) sites: Vec<SiteData>,
+    pub(crate) detections: Vec<PersonData>,
     pub(crate) ground: Option<Ground>,
     pub(crate) excluded: Vec<Aabb>,
     pub sources: Vec<String>,
@@ -31,13 +35,14 @@ pub struct PyFrame {
 impl PyFrame {
     /// Borrows the arrays and looks the names up in `body`.
     pub fn borrow_for<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
-        let Self { clouds, images, sites, ground, .. } = self;
-        Held { clouds, images, sites, ground: *ground }.borrow_for(py, body)
+        let Self { clouds, images, sites, detections, ground, .. } = self;
+        Held { clouds, images, sites, detections, ground: *ground }.borrow_for(py, body)
     }
 
     /// Borrows the depth images alone.
     pub fn borrow_images<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
-        Held { clouds: &[], images: &self.images, sites: &[], ground: self.ground }.borrow_for(py, body)
+        Held { clouds: &[], images: &self.images, sites: &[], detections: &[], ground: self.ground }
+            .borrow_for(py, body)
     }
 
     /// Borrows the color images.
@@ -59,8 +64,8 @@ impl PyFrame {
     #[new]
     #[pyo3(signature = (stamp))]
     fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
-        let (clouds, images, colors, sites, excluded, sources) = Default::default();
-        Self { stamp, clouds, images, colors, sites, ground: None, excluded, sources }
+        let (clouds, images, colors, sites, detections, excluded, sources) = Default::default();
+        Self { stamp, clouds, images, colors, sites, detections, ground: None, excluded, sources }
     }
 
     #[doc = stub!("Frame.add_points")]
@@ -212,6 +217,40 @@ impl PyFrame {
         Ok(())
     }
 
+    #[doc = stub!("Frame.add_detection")]
+    #[pyo3(signature = (joints, *, log_odds=f64::INFINITY, weight=1.0, source="detections"))]
+    fn add_detection(
+        &mut self,
+        joints: &Bound<'_, PyDict>,
+        #[pyo3(from_py_with = arguments::log_odds)] log_odds: f64,
+        #[pyo3(from_py_with = arguments::weight)] weight: f64,
+        source: &str,
+    ) -> PyResult<()> {
+        let source = self.source(source);
+        let position = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+            let site = arguments::site(&name)?;
+            let position = vector(&format!("joints[{site}]"), &position)?;
+            Ok(SiteData { site, position, direction: None, weight, bias: 0.0, source })
+        };
+        let positions = joints.iter().map(position).collect::<PyResult<_>>()?;
+        self.detections.push(PersonData { positions, person: log_odds });
+        Ok(())
+    }
+
+    /// Mean distance of the measured positions and rays from the predicted positions of their sites, meters; infinite without any.
+    fn _distance(&self, sites: &Bound<'_, PyDict>) -> PyResult<f64> {
+        let (mut sum, mut count) = (0.0, 0);
+        for data in &self.sites {
+            if let Some(place) = sites.get_item(&data.site)? {
+                let away = vector(&data.site, &place)? - data.position;
+                let along = data.direction.and_then(Vec3::try_normalize);
+                sum += along.map_or(away, |along| away.reject_from_normalized(along)).length();
+                count += 1;
+            }
+        }
+        Ok(if count == 0 { f64::INFINITY } else { sum / f64::from(count) })
+    }
+
     /// Adds the rays with sufficient trust, weighted by their standard deviations; returns their number.
     #[pyo3(signature = (rays, *, reference_sigma, max_weight, min_trust))]
     fn _add_site_rays(
@@ -264,12 +303,13 @@ impl PyFrame {
 
     fn __repr__(&self) -> String {
         format!(
-            "Frame(stamp={}, clouds={}, depth_images={}, colors={}, sites={}, sources={:?})",
+            "Frame(stamp={}, clouds={}, depth_images={}, colors={}, sites={}, detections={}, sources={:?})",
             self.stamp,
             self.clouds.len(),
             self.images.len(),
             self.colors.len(),
             self.sites.len(),
+            self.detections.len(),
             self.sources
         )
     }

@@ -89,7 +89,8 @@ impl PyPeople {
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
         let colors = numbered.map(|(view, camera)| view.image(camera)).collect::<PyResult<Vec<_>>>()?;
-        let input = all.frame(frame, &clouds, &images, &colors);
+        let detections = all.detections();
+        let input = all.frame(frame, &clouds, &images, &colors, &detections);
         // A person's own measurements follow the common ones; their sources are numbered consecutively.
         let owned = own.iter().map(|(_, frame)| frame.borrow_for(py, body)).collect::<PyResult<Vec<_>>>()?;
         let parts = owned
@@ -120,6 +121,11 @@ impl PyPeople {
     fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
         let positions = site_positions(self.people.prototype(), joints)?;
         self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
+    }
+
+    /// Ids of the present persons.
+    fn present(&self) -> Vec<usize> {
+        self.people.present().map(|(id, _)| id).collect()
     }
 
     /// Whether color images would be used in the next frame.

@@ -154,7 +154,8 @@ impl PyTracker {
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
-        let input = borrowed.frame(frame, &clouds, &images, &colors);
+        let detections = borrowed.detections();
+        let input = borrowed.frame(frame, &clouds, &images, &colors, &detections);
         let tracker = &mut self.tracker;
         py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
         self.sources.clone_from(&frame.sources);

@@ -60,15 +60,12 @@ class Row:
         Raises:
             ValueError, TypeError: fields are missing or invalid.
         """
-        kinds: dict[str, type] = {
-            field.name: {"int": int, "float": float}.get(str(field.type), str) for field in fields(cls)
-        }
+        kinds: dict[str, tuple[type, object]] = {"int": (int, 0), "float": (float, math.nan)}
         found: dict[str, Any] = {}
-        for name, kind in kinds.items():
-            value = values.get(name)
-            if value is None or value == "":
-                value = math.nan if kind is float else 0 if kind is int else ""
-            found[name] = kind(value)
+        for field in fields(cls):
+            kind, unknown = kinds.get(str(field.type), (str, ""))
+            value = values.get(field.name)
+            found[field.name] = kind(unknown if value is None or value == "" else value)
         return cls(**found)
 
 

@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import installed
-from voodoo.export.people import by_time
+from voodoo.export.people import PeopleTrack
+from voodoo.export.table import columns_of as columns_of_rows
 from voodoo.export.track import Track
 
-Columns: TypeAlias = dict[str, npt.NDArray[Any] | list[str]]
+Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 
 NOTE = b"voodoo"
 """Key in the metadata of the file; the value is JSON with the recording's summary row and the settings."""
@@ -29,66 +30,37 @@ def columns_of(tracks: Mapping[int, Track]) -> Columns:
     Args:
         tracks: of each person, from 1; with the same joints.
     """
-    if not tracks:
-        return {
-            "stamp_s": np.empty(0),
-            "person": np.empty(0, np.int32),
-            "status": [],
-            "residual_m": np.empty(0, np.float32),
-        }
-    persons, rows = by_time(tracks)
-    residual, joints, angles = (values.astype(np.float32) for values in (rows.residual, rows.joints, rows.angles))
-    found: Columns = {"stamp_s": rows.stamps, "person": persons.astype(np.int32), "status": list(rows.status)}
-    found["residual_m"] = residual
-    for number, name in enumerate(rows.joint_names):
-        found |= {f"{name}_{axis}": joints[:, number, place] for place, axis in enumerate("xyz")}
-    found |= {f"{name}_rad": angles[:, number] for number, name in enumerate(rows.angle_names)}
-    found |= {f"{limb}_status": list(words) for limb, words in rows.limb_status.items()}
-    if np.isfinite(rows.joint_sigma).any():
-        sigmas = rows.joint_sigma.astype(np.float32)
-        found |= {f"{name}_sigma_m": sigmas[:, number] for number, name in enumerate(rows.joint_names)}
-    return found
+    rows = PeopleTrack(np.empty(0), tracks).arrays()
+    kinds = {"stamp_s": np.float64, "person": np.int32}
+    return {
+        name: column if column.dtype.kind == "U" else column.astype(kinds.get(name, np.float32))
+        for name, column in columns_of_rows(rows, sure=rows["covariance"].size > 0).items()
+    }
 
 
-def stacked(parts: Sequence[Columns]) -> Columns:
-    """Concatenates tables; a column that is missing in one of them is unknown there."""
-    counts = [len(part["stamp_s"]) for part in parts]
-    names = dict.fromkeys(name for part in sorted(parts, key=len, reverse=True) for name in part)
-    found: Columns = {}
-    for name in names:
-        kind = next(part[name] for part in parts if name in part)
-        if isinstance(kind, list):
-            words: list[str] = []
-            for part, count in zip(parts, counts, strict=True):
-                words += part.get(name, [""] * count)
-            found[name] = words
-        else:
-            pieces = [
-                part[name] if name in part else np.full(count, np.nan, kind.dtype)
-                for part, count in zip(parts, counts, strict=True)
-            ]
-            found[name] = np.concatenate(pieces)
-    return found
-
-
-def encode(columns: Columns, note: Mapping[str, Any]) -> bytes:
-    """The bytes of a Parquet file with a note in its footer.
+def encode(parts: Sequence[Columns], note: Mapping[str, Any]) -> bytes:
+    """The bytes of a Parquet file of consecutive rows, with a note in its footer; a column that a part lacks is unknown there.
 
     Raises:
         VoodooError: pyarrow is not installed.
     """
     pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
-    arrays = [
-        pa.array([value or None for value in column], pa.string())
-        if isinstance(column, list)
-        else pa.array(column, from_pandas=True)
-        for column in columns.values()
-    ]
-    table = pa.Table.from_arrays(arrays, names=list(columns)).replace_schema_metadata({NOTE: json.dumps(note).encode()})
-    words = [name for name, column in columns.items() if isinstance(column, list)]
+
+    def array(column: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - it has no types
+        words = column.dtype.kind == "U"
+        return (
+            pa.array([value or None for value in column.tolist()], pa.string())
+            if words
+            else pa.array(column, from_pandas=True)
+        )
+
+    tables = [pa.table({name: array(column) for name, column in part.items()}) for part in parts or ({},)]
+    table = pa.concat_tables(tables, promote_options="default").combine_chunks()
+    words = [field.name for field in table.schema if pa.types.is_string(field.type)]
     out = io.BytesIO()
     # Neighboring frames have equal high bytes: splitting the numbers by byte improves compression.
-    split = {name: "BYTE_STREAM_SPLIT" for name, column in columns.items() if name not in (*words, "person")}
+    split = {name: "BYTE_STREAM_SPLIT" for name in table.column_names if name not in (*words, "person")}
+    table = table.replace_schema_metadata({NOTE: json.dumps(note).encode()})
     pq.write_table(table, out, compression="zstd", use_dictionary=[*words, "person"], column_encoding=split)
     return out.getvalue()
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from voodoo.batch.storage import Store, on_disk
 from voodoo.batch.summary import DONE, FAILED, REPORTS, Row
-from voodoo.batch.table import Columns, columns_of, encode, note_of, stacked
+from voodoo.batch.table import Columns, columns_of, encode, note_of
 from voodoo.config import Config
 from voodoo.errors import RecordingError
 from voodoo.evaluation import metrics
@@ -26,7 +26,6 @@ from voodoo.model.body import Body
 from voodoo.names import HumanModel
 from voodoo.people import People, PeopleEstimate
 from voodoo.pipeline.inputs import pictures_alone
-from voodoo.pipeline.people import track_people
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_tracker
 from voodoo.recordings.left_out import LeftOut
@@ -141,7 +140,7 @@ def stored_row(out: str, name: str, settings: Settings) -> Row | None:
     return row if row.status == DONE else None
 
 
-def _track(job: Job, path: Path) -> tuple[Row, Columns]:
+def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
     chosen = job.settings
     left_out = None if chosen.strict else LeftOut()
     options = {"loader": chosen.loader, **(chosen.options or {})} | pictures_alone(path, chosen.loader, chosen.use)
@@ -149,11 +148,10 @@ def _track(job: Job, path: Path) -> tuple[Row, Columns]:
     settings = FrontEndSettings.of(recording, use=chosen.use)
     config = Config(**dict(chosen.config or {}))
     one_only = chosen.people == 1
-    parts = (_one_person if one_only else _people)(job, recording, settings, config, left_out)
     columns: list[Columns] = []
     found: dict[int, list[Track]] = {}
     whole: dict[int, list[Track]] = {}
-    for part in parts:
+    for part in _tracks(job, recording, settings, config, left_out):
         columns.append(columns_of(part))
         for one, own in part.items():
             found.setdefault(one, []).append(joined([own]))
@@ -177,34 +175,32 @@ def _track(job: Job, path: Path) -> tuple[Row, Columns]:
         left_out=0 if left_out is None else len(left_out),
         source=job.source,
     )
-    return row, stacked(columns)
+    return row, columns
 
 
-def _one_person(
+def _tracks(
     job: Job, recording: Recording, settings: FrontEndSettings, config: Config, left_out: LeftOut | None
 ) -> Iterator[Mapping[int, Track]]:
+    """The tracks of all persons, part by part."""
     model = cast(HumanModel | None, job.settings.model)
-    init = AUTO if job.settings.init == AUTO else None
-    tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
-    steps = track(recording, tracker, settings=settings, left_out=left_out)
-    for part in _parts((step.estimate for step in steps), job.limit_s):
-        yield {1: Track.of(part, body=tracker.body)}
-
-
-def _people(
-    job: Job, recording: Recording, settings: FrontEndSettings, config: Config, _: LeftOut | None
-) -> Iterator[Mapping[int, Track]]:
-    body = None if job.settings.model is None else Body.human(model=cast(HumanModel, job.settings.model))
+    if job.settings.people == 1:
+        init = AUTO if job.settings.init == AUTO else None
+        tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
+        steps = track(recording, tracker, settings=settings, left_out=left_out)
+        for part in _parts((step.estimate for step in steps), job.limit_s):
+            yield {1: Track.of(part, body=tracker.body)}
+        return
+    body = None if model is None else Body.human(model=model)
     people = People(body, config=config, limit=job.settings.people)
     bodies: dict[int, Body] = {}
 
     def estimates() -> Iterator[PeopleEstimate]:
-        for step in track_people(recording, people, settings=settings):
+        for step in track(recording, people, settings=settings):
             bodies.update({person.id: people.body(person.id) for person in step.estimate})
             yield step.estimate
 
-    for part in _parts(estimates(), job.limit_s):
-        yield PeopleTrack.of(part, bodies=bodies).tracks
+    for several in _parts(estimates(), job.limit_s):
+        yield PeopleTrack.of(several, bodies=bodies).tracks
 
 
 def _parts(items: Iterable[T], limit_s: float | None) -> Iterator[list[T]]:

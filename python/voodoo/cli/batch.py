@@ -7,20 +7,8 @@ from typing import Annotated
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import clear_errors, loader_words, print_interrupted, print_message, progressing, reporting
-from voodoo.cli.options import (
-    ConfigOption,
-    FrameOption,
-    JsonOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    PeopleOption,
-    StrictOption,
-    TopicOption,
-    UseOption,
-)
 from voodoo.cli.signals import deferred
 
 
@@ -45,23 +33,23 @@ def batch_command(
     time_limit: Annotated[
         float | None, typer.Option(metavar="S", min=0.001, help="A recording that takes longer has failed.")
     ] = None,
-    config: ConfigOption = None,
-    model: ModelOption = None,
-    use: UseOption = None,
-    people: PeopleOption = "1",
-    topic: TopicOption = None,
-    frame: FrameOption = None,
-    loader: LoaderOption = None,
-    option: LoaderNumberOption = None,
-    layout: LayoutOption = None,
-    strict: StrictOption = False,
+    config: options.ConfigOption = None,
+    model: options.ModelOption = None,
+    use: options.UseOption = None,
+    people: options.PeopleOption = "1",
+    topic: options.TopicOption = None,
+    frame: options.FrameOption = None,
+    loader: options.LoaderOption = None,
+    option: options.LoaderNumberOption = None,
+    layout: options.LayoutOption = None,
+    strict: options.StrictOption = False,
     pages: Annotated[
         bool,
         typer.Option(
             "--pages", help="Also write a page for each recording that is tracked, and index.html with links."
         ),
     ] = False,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Track many recordings, on this machine or on a cluster, one task each.
 

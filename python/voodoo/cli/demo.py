@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -37,11 +37,9 @@ def demo_command(
         source = opened(sample_path(), None, None)
         tracker = start_tracker(source, init=AUTO)
         estimates: list[Estimate] = []
-        how: dict[str, Any] = {"overlay": out / "overlay.mp4", "sheet": 6, **pictured(tracker)}
+        how = pictured(tracker, lambda estimate, _: estimates.append(estimate))
         steps = track(source, tracker)
-        seconds, sheet, interrupted, _, failures = run(
-            source, steps, take=lambda step: estimates.append(step.estimate), **how
-        )
+        seconds, sheet, interrupted, _, failures = run(source, steps, overlay=out / "overlay.mp4", sheet=6, **how)
         if interrupted:
             raise typer.Exit(INTERRUPTED)
         result = Track.of(estimates, body=tracker.body)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
     loader_words,
@@ -17,17 +18,6 @@ from voodoo.cli.common import (
     progressing,
     reporting,
     until_interrupted,
-)
-from voodoo.cli.options import (
-    ConfigOption,
-    FrameOption,
-    JsonOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    TopicOption,
-    UseOption,
 )
 from voodoo.cli.signals import deferred
 
@@ -41,15 +31,15 @@ def eval_command(
         str | None,
         typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
     ] = None,
-    config: ConfigOption = None,
+    config: options.ConfigOption = None,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Number of parallel recordings; by default one per core.")
     ] = None,
     only: Annotated[
         list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
     ] = None,
-    model: ModelOption = None,
-    use: UseOption = None,
+    model: options.ModelOption = None,
+    use: options.UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
     result: Annotated[
         Path | None,
@@ -57,12 +47,12 @@ def eval_command(
             metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
         ),
     ] = None,
-    topic: TopicOption = None,
-    frame: FrameOption = None,
-    loader: LoaderOption = None,
-    option: LoaderNumberOption = None,
-    layout: LayoutOption = None,
-    as_json: JsonOption = False,
+    topic: options.TopicOption = None,
+    frame: options.FrameOption = None,
+    loader: options.LoaderOption = None,
+    option: options.LoaderNumberOption = None,
+    layout: options.LayoutOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Track recordings with ground truth or a reference skeleton, and evaluate the result.
 
@@ -101,13 +91,13 @@ def eval_command(
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         automatic = None if init is None else AUTO
-        options = loader_words(topic, option, frame=frame, layout=layout)
+        words = loader_words(topic, option, frame=frame, layout=layout)
         config_of(config)  # an invalid file is one error here instead of one per recording
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
             check_outputs([out], paths)
         if result is not None:
-            show_people([judged(paths, result, loader, options)], out, report=report)
+            show_people([judged(paths, result, loader, words)], out, report=report)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
@@ -115,7 +105,7 @@ def eval_command(
         how: dict[str, Any] = {
             "config_file": config,
             "loader": loader,
-            "options": options,
+            "options": words,
             "model": model,
             "use": kinds,
         }

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
     loader_words,
@@ -19,26 +20,13 @@ from voodoo.cli.common import (
     states,
     wrote,
 )
-from voodoo.cli.options import (
-    RESULTS,
-    BodyOption,
-    FrameOption,
-    HeightOption,
-    InitOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    RecordingArgument,
-    TopicOption,
-)
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError
 
 
 def ik_command(
     context: typer.Context,
-    recording: RecordingArgument,
+    recording: options.RecordingArgument,
     targets: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Known positions: a result of voodoo track. By default the reference's."),
@@ -61,22 +49,22 @@ def ik_command(
             help="Regularize undetermined angles to the mean of the postures so far, or keep them (not with --alone).",
         ),
     ] = True,
-    init: InitOption = None,
-    body: BodyOption = None,
-    height: HeightOption = None,
-    model: ModelOption = None,
+    init: options.InitOption = None,
+    body: options.BodyOption = None,
+    height: options.HeightOption = None,
+    model: options.ModelOption = None,
     out: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="FILE",
-            help=f"{RESULTS}; by default NAME_ik.csv.",
+            help=f"{options.RESULTS}; by default NAME_ik.csv.",
         ),
     ] = None,
-    topic: TopicOption = None,
-    frame: FrameOption = None,
-    loader: LoaderOption = None,
-    option: LoaderNumberOption = None,
-    layout: LayoutOption = None,
+    topic: options.TopicOption = None,
+    frame: options.FrameOption = None,
+    loader: options.LoaderOption = None,
+    option: options.LoaderNumberOption = None,
+    layout: options.LayoutOption = None,
 ) -> None:
     """Compute postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 

@@ -7,26 +7,13 @@ from typing import Annotated
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import clear_errors, loader_words, refuse_both
-from voodoo.cli.options import (
-    BodyOption,
-    ConfigOption,
-    ExcludeOption,
-    FrameOption,
-    HeightOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    RecordingArgument,
-    TopicOption,
-    UseOption,
-)
 from voodoo.errors import NoPoseError, VoodooError
 
 
 def init_command(
-    recording: RecordingArgument,
+    recording: options.RecordingArgument,
     at: Annotated[
         float | None,
         typer.Option(
@@ -35,17 +22,17 @@ def init_command(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write; by default stdout.")] = None,
-    body: BodyOption = None,
-    height: HeightOption = None,
-    model: ModelOption = None,
-    config: ConfigOption = None,
-    use: UseOption = None,
-    exclude: ExcludeOption = None,
-    topic: TopicOption = None,
-    frame: FrameOption = None,
-    loader: LoaderOption = None,
-    option: LoaderNumberOption = None,
-    layout: LayoutOption = None,
+    body: options.BodyOption = None,
+    height: options.HeightOption = None,
+    model: options.ModelOption = None,
+    config: options.ConfigOption = None,
+    use: options.UseOption = None,
+    exclude: options.ExcludeOption = None,
+    topic: options.TopicOption = None,
+    frame: options.FrameOption = None,
+    loader: options.LoaderOption = None,
+    option: options.LoaderNumberOption = None,
+    layout: options.LayoutOption = None,
 ) -> None:
     """Find the first pose and write it as JSON for --init of voodoo track.
 
@@ -72,8 +59,8 @@ def init_command(
         refuse_both("--body", body, **{"--height": height, "--model": model})
         kinds, boxes = kinds_of(use), boxes_of(exclude)
         left_out = LeftOut()
-        options = loader_words(topic, option, layout=layout)
-        source = opened(recording, loader, frame, bare=True, left_out=left_out, **options)
+        words = loader_words(topic, option, layout=layout)
+        source = opened(recording, loader, frame, bare=True, left_out=left_out, **words)
         about = source.info()
         after = about.start_stamp
         if at is not None:

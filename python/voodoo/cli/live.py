@@ -7,32 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
     loader_words,
     print_message,
     print_text,
     refuse_both,
-)
-from voodoo.cli.options import (
-    BodyOption,
-    ConfigOption,
-    DepthRangeOption,
-    DetectorOption,
-    ExcludeOption,
-    FrameOption,
-    HeightOption,
-    InitOption,
-    KeypointsOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    OutOption,
-    PeopleOption,
-    TopicOption,
-    UseOption,
-    ViewOption,
 )
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError, VoodooError
@@ -46,14 +27,14 @@ def live_command(
             help="realsense[:SERIAL], ros2:TOPIC[,TOPIC...], grow:FOLDER, or a recording to play.",
         ),
     ],
-    init: InitOption = None,
-    body: BodyOption = None,
-    height: HeightOption = None,
-    model: ModelOption = None,
-    config: ConfigOption = None,
-    detector: DetectorOption = None,
-    people: PeopleOption = "1",
-    out: OutOption = None,
+    init: options.InitOption = None,
+    body: options.BodyOption = None,
+    height: options.HeightOption = None,
+    model: options.ModelOption = None,
+    config: options.ConfigOption = None,
+    detector: options.DetectorOption = None,
+    people: options.PeopleOption = "1",
+    out: options.OutOption = None,
     record: Annotated[
         Path | None,
         typer.Option(
@@ -82,28 +63,28 @@ def live_command(
             help="Publish transforms, joint states and markers on ROS 2; by default if a source is ros2.",
         ),
     ] = None,
-    view: ViewOption = False,
+    view: options.ViewOption = False,
     serve: Annotated[
         str | None,
         typer.Option(
             metavar="[HOST:]PORT", help="Show it in a browser with Rerun's web viewer; on 127.0.0.1 by default."
         ),
     ] = None,
-    use: UseOption = None,
-    depth_range: DepthRangeOption = None,
+    use: options.UseOption = None,
+    depth_range: options.DepthRangeOption = None,
     calibration: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="FILE.toml", help="Pose of a camera (root_frame, root_from_sensor): one for each SOURCE, in order."
         ),
     ] = None,
-    exclude: ExcludeOption = None,
-    frame: FrameOption = None,
-    topic: TopicOption = None,
-    option: LoaderNumberOption = None,
-    loader: LoaderOption = None,
-    keypoints: KeypointsOption = None,
-    layout: LayoutOption = None,
+    exclude: options.ExcludeOption = None,
+    frame: options.FrameOption = None,
+    topic: options.TopicOption = None,
+    option: options.LoaderNumberOption = None,
+    loader: options.LoaderOption = None,
+    keypoints: options.KeypointsOption = None,
+    layout: options.LayoutOption = None,
 ) -> None:
     """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
 
@@ -165,10 +146,10 @@ def live_command(
         folders, network = keypoint_words(keypoints or (), layout)
         if folders:
             raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
-        options = loader_words(topic, option, layout=layout if network is None else None)
+        words = loader_words(topic, option, layout=layout if network is None else None)
         if loader is not None:
-            options["loader"] = loader
-        how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": frame, "options": options}
+            words["loader"] = loader
+        how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": frame, "options": words}
         source = entered(sources, calibration or (), several=several, network=network, **how)
         recover_before([*wishes.targets, *([record] if record is not None else [])])
         done = run(source, wishes, duration=duration, report=report)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from voodoo.cli.common import print_message
-from voodoo.cli.people import body_of
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector
@@ -25,7 +24,7 @@ from voodoo.export.spool import Spool
 from voodoo.export.upright import Turn
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.first_frame import FirstFrame
-from voodoo.live.follow import ONE, Follower, Step
+from voodoo.live.follow import Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.registry import sink_of
@@ -35,9 +34,8 @@ from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.names import HumanModel
-from voodoo.people import People
-from voodoo.pipeline.people import check_inputs
-from voodoo.pipeline.start import Beginning, start_tracker, starts_of
+from voodoo.pipeline.front_end import ONE
+from voodoo.pipeline.start import Beginning, start_people, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.sensors.settings import Box, FrontEndSettings
@@ -171,23 +169,17 @@ def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     settings = replace(
         FrontEndSettings.of(first, use=wishes.kinds), depth_filter=wishes.depth_filter, exclude=wishes.boxes
     )
+    how: dict[str, Any] = {
+        "body": None if wishes.body is None else Body.load(wishes.body),
+        "height": wishes.height,
+        "model": wishes.model,
+        "config": wishes.config,
+        "use": wishes.kinds,
+        "detector": wishes.detector,
+    }
     if wishes.several:
-        body = body_of(wishes.body, height=wishes.height, model=wishes.model)
-        config, detector = wishes.config, wishes.detector
-        check_inputs(first, People(body, config=config, detector=detector), settings)
-        return Follower(
-            people=lambda: People(body, config=config, detector=detector, limit=wishes.limit), settings=settings
-        )
-    tracker = start_tracker(
-        first,
-        init=wishes.beginning,
-        body=None if wishes.body is None else Body.load(wishes.body),
-        height=wishes.height,
-        model=wishes.model,
-        config=wishes.config,
-        use=wishes.kinds,
-        detector=wishes.detector,
-    )
+        return Follower(people=lambda: start_people(first, limit=wishes.limit, **how), settings=settings)
+    tracker = start_tracker(first, init=wishes.beginning, **how)
     return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
 
 
@@ -225,7 +217,7 @@ class FileOutput(Output):
 
     def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str], several: bool) -> None:
         """Make the folder of the poses."""
-        self._spool = Spool(paths, root_frame=root_frame, several=several, together=_TOGETHER)
+        self._spool = Spool(paths, root_frame=root_frame, together=_TOGETHER)
         self._several = several
         self._turn: Turn | None = None
         self.written: list[Path] = []

@@ -14,15 +14,7 @@ from voodoo.errors import NoPoseError, VoodooError
 if TYPE_CHECKING:
     from voodoo.evaluation.people import PeopleScore
     from voodoo.evaluation.score import Score
-    from voodoo.export.spool import Spool
-    from voodoo.model.body import Body
-    from voodoo.names import HumanModel
-    from voodoo.people import People
-    from voodoo.pipeline.people import TrackedPeople
     from voodoo.pipeline.start import Automatic
-    from voodoo.visualization.ink import Picture
-    from voodoo.visualization.overlay import Overlay
-    from voodoo.visualization.rerun_viewer import Viewer
 
 ANY = "any"
 
@@ -62,34 +54,6 @@ def refuse_several(**options: object) -> None:
     for name, value in options.items():
         if value:
             raise VoodooError(f"{name.replace('_', '-')}: expected none with --people any or N, it is for one person")
-
-
-def body_of(body: Path | None, *, height: float | None, model: HumanModel | None) -> Body | None:
-    """The body that is copied for new persons: from a file, a human of a stature, or None for the default."""
-    from voodoo.model.body import Body
-
-    if body is not None:
-        return Body.load(body)
-    if height is None and model is None:
-        return None
-    return Body.human(1.75 if height is None else height, model=model or "measured")
-
-
-def pictured_people(people: People, spool: Spool) -> dict[str, Any]:
-    """How `voodoo.cli.running.run` keeps, draws and shows the frames of all persons."""
-    bodies: dict[int, Body] = {}
-
-    def take(step: TrackedPeople) -> None:
-        bodies.update({person.id: people.body(person.id) for person in step.estimate})
-        spool.add(step.estimate, bodies)
-
-    def draw(drawing: Overlay, step: TrackedPeople) -> Picture:
-        return drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index)
-
-    def show(viewer: Viewer, step: TrackedPeople) -> None:
-        viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
-
-    return {"take": take, "draw": draw, "show": show}
 
 
 def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Mapping[str, Any]) -> PeopleScore:

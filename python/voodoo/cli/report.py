@@ -29,20 +29,13 @@ def report_command(
     voodoo report pose.npz --film look.mp4 --out report.html
     """
     from voodoo.export.people import PeopleTrack
-    from voodoo.export.people_rows import is_people_file
-    from voodoo.export.result_file import check_suffix
-    from voodoo.export.track import Track
     from voodoo.visualization.report_page import report_page
     from voodoo.whole import write_whole
 
     with clear_errors():
         if out.suffix != ".html":
             raise VoodooError(f"{out}: expected a name that ends in .html, found {out.suffix!r}")
-        check_suffix(result)
-        if is_people_file(result):
-            people = PeopleTrack.load(result)
-            tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
-        else:
-            tracks = {"the person": Track.load(result)}
+        people = PeopleTrack.load(result)
+        tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
         write_whole(out, report_page(result.stem, tracks, film=film))
         typer.echo(f"wrote {out}")

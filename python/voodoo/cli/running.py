@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +22,10 @@ from voodoo.export.files import check_target, is_table
 from voodoo.export.spool import Spool
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
+from voodoo.model.body import Body
+from voodoo.people import People
 from voodoo.pipeline.floor import seen_floor
+from voodoo.pipeline.front_end import ONE
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import Beginning
 from voodoo.recordings.left_out import LeftOut
@@ -153,7 +156,6 @@ def spool_of(
     *,
     suffix: str = ".csv",
     upright: bool = False,
-    several: bool = False,
 ) -> tuple[Sequence[Path], Spool]:
     """The outputs of a command, by default one with the name of the recording, and where their poses are kept until the end.
 
@@ -168,7 +170,7 @@ def spool_of(
     if not out:
         check_paths(context, targets)
     recover_before(targets)
-    how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright, "several": several}
+    how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright}
     return targets, Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
 
 
@@ -279,17 +281,30 @@ def _apart(output: PictureWriter | Viewer, call: Callable[..., None], *arguments
             output.failure = error
 
 
-def pictured(tracker: Tracker) -> dict[str, Any]:
-    """How `run` draws and shows the frames of one person."""
+def pictured(tracker: Tracker | People, keep: Callable[[Any, Mapping[int, Body]], None]) -> dict[str, Any]:
+    """How `run` keeps, draws and shows the frames; `keep` takes an estimate, and the bodies of the persons by number."""
+    bodies: dict[int, Body] = {}
 
-    def draw(drawing: Overlay, step: TrackedFrame) -> Picture:
-        return drawing.draw(step.recorded, tracker.body, step.estimate, index=step.index, front_end=step.front_end)
+    def take(step: TrackedFrame[Any]) -> None:
+        if isinstance(tracker, People):
+            bodies.update({person.id: tracker.body(person.id) for person in step.estimate})
+        else:
+            bodies[ONE] = tracker.body
+        keep(step.estimate, bodies)
 
-    def show(viewer: Viewer, step: TrackedFrame) -> None:
-        how: dict[str, Any] = {"recorded": step.recorded, "front_end": step.front_end, "seconds": step.seconds}
-        viewer.log(step.estimate, tracker.body, **how)
+    def draw(drawing: Overlay, step: TrackedFrame[Any]) -> Picture:
+        if isinstance(tracker, People):
+            return drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index)
+        return drawing.draw(step.recorded, bodies[ONE], step.estimate, index=step.index, front_end=step.front_end)
 
-    return {"draw": draw, "show": show}
+    def show(viewer: Viewer, step: TrackedFrame[Any]) -> None:
+        how: dict[str, Any] = {"recorded": step.recorded, "seconds": step.seconds}
+        if isinstance(tracker, People):
+            viewer.log_people(step.estimate, bodies, **how)
+        else:
+            viewer.log(step.estimate, bodies[ONE], front_end=step.front_end, **how)
+
+    return {"take": take, "draw": draw, "show": show}
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:

@@ -7,28 +7,18 @@ from typing import Annotated
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import clear_errors, loader_words, print_json, print_text, refuse_both
-from voodoo.cli.options import (
-    FrameOption,
-    HeightOption,
-    JsonOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    RecordingArgument,
-    TopicOption,
-)
 
 
 def info_command(
-    recording: RecordingArgument,
-    topic: TopicOption = None,
-    frame: FrameOption = None,
-    loader: LoaderOption = None,
-    option: LoaderNumberOption = None,
-    layout: LayoutOption = None,
-    as_json: JsonOption = False,
+    recording: options.RecordingArgument,
+    topic: options.TopicOption = None,
+    frame: options.FrameOption = None,
+    loader: options.LoaderOption = None,
+    option: options.LoaderNumberOption = None,
+    layout: options.LayoutOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
     camera size, bits, calibration, field of view and range of depths."""
@@ -70,8 +60,8 @@ def config_command() -> None:
 
 def body_command(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A body file to check and print.")] = None,
-    height: HeightOption = None,
-    model: ModelOption = None,
+    height: options.HeightOption = None,
+    model: options.ModelOption = None,
 ) -> None:
     """Print a body as TOML: the default human of a stature, or a file after checking it."""
     from voodoo.model.body import Body

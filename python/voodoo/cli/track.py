@@ -109,8 +109,8 @@ def track_command(
     cameras, keypoints with depth, depth images, or the legs in a laser, whichever the recording has. Until a person is found,
     and when the person has left, the status is searching and the coordinates are empty.
 
-    The .csv has stamp_s, status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in the
-    recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
+    The .csv has stamp_s, person (1), status, residual_m, then NAME_x, NAME_y, NAME_z in meters for every joint and site, in
+    the recording's root frame (base_link if it has one), NAME_rad for every joint angle, and LIMB_status, the status of every
     limb. The .npz adds the pose of every limb. Ctrl-C writes the frames so far and ends with exit code 130; after a
     crash, voodoo recover does.
 
@@ -120,9 +120,9 @@ def track_command(
     --init FILE gives the pose in the first frame, by any subset of names that determines it, or with stamp_s in a later frame:
     {"height_m": 1.76, "joints": {"l_shoulder": [3.1, -0.3, 1.4], "r_shoulder": [3.2, 0.1, 1.4], ...}}
 
-    --people any or N tracks several persons, detected in depth images; no start is read. The .csv then begins with stamp_s,
-    person, status, residual_m and has a row for every person who is present; person is an id from 1, which is kept when a person
-    returns. The .npz, .glb and bags have all persons (frames body_p1, ...); others have one file per person: NAME_1.bvh, ...
+    --people any or N tracks several persons, detected in depth images; no start is read. The .csv then has a row for every
+    person who is present; person is an id from 1, which is kept when a person returns.
+    The .npz, .glb and bags have all persons (frames body_p1, ...); others have one file per person: NAME_1.bvh, ...
 
     Examples
 
@@ -143,7 +143,7 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.closing import closing_doubts, closing_lines
-    from voodoo.cli.people import body_of, limit_of, no_starts, pictured_people, refuse_several
+    from voodoo.cli.people import limit_of, no_starts, refuse_several
     from voodoo.cli.running import (
         bare_for,
         boxes_of,
@@ -161,14 +161,11 @@ def track_command(
         viewer_of,
     )
     from voodoo.export.files import upright_words
-    from voodoo.export.spool import ONE
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
-    from voodoo.people import People
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
-    from voodoo.pipeline.people import track_people
     from voodoo.pipeline.run import track
-    from voodoo.pipeline.start import AUTO, beginning_of, start_tracker, starts_of
+    from voodoo.pipeline.start import AUTO, beginning_of, start_people, start_tracker, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
@@ -210,7 +207,7 @@ def track_command(
         for words in source.assumed:
             print_message(words)
         if several:
-            refuse_several(draw_regions=draw_regions, background=background, marker_map=marker_map)
+            refuse_several(draw_regions=draw_regions, background=background)
         used = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
         places = ("depth", "points", "scan")
         refuse_unused(
@@ -223,30 +220,27 @@ def track_command(
             draw_regions=(draw_regions, ("color",)),
             background=(background, ("color",)),
         )
-        targets, keeping = spool_of(source, out, context, upright=upright, several=several)
+        targets, keeping = spool_of(source, out, context, upright=upright)
         with keeping as spool, viewer_of(view, save, source.name) as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(used, draw_regions=draw_regions)
+            start: dict[str, Any] = {
+                "body": None if body is None else Body.load(body),
+                "height": height,
+                "model": model,
+                "config": config_of(config),
+                "markers": markers,
+                "use": kinds,
+                "detector": detector_of(detector),
+            }
+            tracker: Any
             if several:
-                followed = body_of(body, height=height, model=model)
-                everybody = People(followed, config=config_of(config), detector=detector_of(detector), limit=limit)
-                steps = track_people(source, everybody, settings=settings, left_out=left_out)
-                how |= {"steps": steps, **pictured_people(everybody, spool)}
+                tracker = start_people(source, limit=limit, **start)
             else:
-                tracker = start_tracker(
-                    source,
-                    init=beginning,
-                    body=None if body is None else Body.load(body),
-                    height=height,
-                    model=model,
-                    config=config_of(config),
-                    markers=markers,
-                    use=kinds,
-                    detector=detector_of(detector),
-                )
-                starts = starts_of(beginning, source)
-                how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
-                how |= {"take": lambda step: spool.add(step.estimate, {ONE: tracker.body}), **pictured(tracker)}
+                tracker = start_tracker(source, init=beginning, **start)
+            starts = starts_of(beginning, source)
+            how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+            how |= pictured(tracker, spool.add)
             with deferred():
                 done = run(source, **how)
                 sample = spool.sample()

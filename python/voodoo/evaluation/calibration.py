@@ -6,18 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
 from voodoo.evaluation.figure import new_figure, save_figure
-from voodoo.evaluation.metrics import mean_or_nan
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-BoolArray: TypeAlias = npt.NDArray[np.bool_]
+from voodoo.evaluation.metrics import BoolArray, FloatArray, mean_or_nan
 
 DROPPED = 0.2
 """Fraction of the joints that are dropped for the sparsification: the most uncertain ones, or the worst."""

@@ -15,18 +15,15 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.evaluation.metrics import fraction_within, mean_or_nan
+from voodoo.evaluation.metrics import BoolArray, FloatArray, fraction_within, mean_or_nan
 from voodoo.measurements import DepthImage, PointCloud, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView, body_mask, limb_rings, transform
 from voodoo.sensors.depth import depth_points
 from voodoo.tracker import Tracker
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-BoolArray: TypeAlias = npt.NDArray[np.bool_]
 Selection: TypeAlias = Literal["segmented", "truth", "model"]
 
 CAPSULES: tuple[tuple[str, str, float], ...] = (

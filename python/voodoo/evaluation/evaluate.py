@@ -13,11 +13,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.children import children
@@ -26,6 +25,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
 from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
+from voodoo.evaluation.metrics import BoolArray, FloatArray
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
 from voodoo.names import SEARCHING, HumanModel
@@ -36,7 +36,6 @@ from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 _OF_TERMINALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name))
 """Signals of Ctrl-C and of a terminal that is closed."""
 
@@ -116,12 +115,12 @@ def differences(recording: Recording, result: Track, *, at_best_lag: bool = Fals
     return np.asarray(positions - metrics.shifted(reference, lag))
 
 
-def called_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
+def called_measured(estimate: Estimate) -> BoolArray:
     """For metrics.JOINTS (12,), whether the status of the limb that ends there is "measured"; False for joints of the trunk."""
     return np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
 
 
-def limb_ends(errors: FloatArray, *, far: bool) -> npt.NDArray[np.bool_]:
+def limb_ends(errors: FloatArray, *, far: bool) -> BoolArray:
     """Masks (F, 12) of the joints at ends of limbs that are farther than LIMIT_EXACT_M from the truth, and of the nearer ones."""
     ends = np.array([name in _CARRIER for name in metrics.JOINTS])
     return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
@@ -138,18 +137,19 @@ def evaluate_all(
     paths: Sequence[Path],
     *,
     config_file: Path | None = None,
-    loader: str | None = None,
-    options: Mapping[str, Any] | None = None,
-    model: HumanModel | None = None,
-    use: Sequence[str] | None = None,
-    init: Automatic | None = None,
     jobs: int = 1,
+    **how: Any,  # noqa: ANN401 - of evaluate
 ) -> Iterator[tuple[int, Score, FrameTable | None]]:
     """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
 
     A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
+
+    Args:
+        paths: of the recordings.
+        config_file: None means the defaults.
+        jobs: number of processes.
+        **how: the other options of `evaluate`.
     """
-    how = {"loader": loader, "options": dict(options or {}), "model": model, "use": use, "init": init}
     task = partial(_task, config_file, how)
     if jobs == 1 or len(paths) == 1:
         for index, path in enumerate(paths):
@@ -228,7 +228,7 @@ class _Step:
     status: str
     seconds: float
     joints: FloatArray
-    measured: npt.NDArray[np.bool_]
+    measured: BoolArray
     witness: FrameWitness
     sigma: FloatArray
 
@@ -288,8 +288,8 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         silhouette_iou=metrics.mean_or_nan(overlaps),
         jitter_m=metrics.jitter(positions),
         reference_jitter_m=metrics.jitter(reference),
-        standing_jitter_m=metrics.standing_jitter(positions, still, lag=lag if exact is False else 0),
-        reference_standing_jitter_m=metrics.standing_jitter(reference, still),
+        standing_jitter_m=metrics.jitter(positions, still, lag=lag if exact is False else 0),
+        reference_standing_jitter_m=metrics.jitter(reference, still),
         degraded_share=float(np.mean([word == "degraded" for word in status])),
         lost_share=float(np.mean([word == "lost" for word in status])),
         searching_share=float(searching.mean()),

@@ -13,9 +13,8 @@ import numpy.typing as npt
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
-JOINTS = tuple(
-    f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("l", "r")
-)
+_LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+JOINTS = tuple(f"{side}_{joint}" for joint in _LIMBS for side in ("l", "r"))
 """The twelve joints that errors are averaged over."""
 
 LOST_AFTER_S = 0.3
@@ -113,27 +112,12 @@ def joint_angles(positions: FloatArray) -> FloatArray:
     limb."""
     at = {name: positions[:, index] for index, name in enumerate(JOINTS)}
     down = (at["l_hip"] + at["r_hip"] - at["l_shoulder"] - at["r_shoulder"]) / 2.0
-    bones = {
-        (side, bone): at[f"{side}_{end}"] - at[f"{side}_{start}"]
-        for side in ("l", "r")
-        for bone, start, end in (
-            ("upperarm", "shoulder", "elbow"),
-            ("forearm", "elbow", "wrist"),
-            ("thigh", "hip", "knee"),
-            ("calf", "knee", "ankle"),
-        )
-    }
-    pairs = [
-        (first, bones[side, second])
-        for side in ("l", "r")
-        for first, second in (
-            (bones[side, "upperarm"], "forearm"),
-            (bones[side, "thigh"], "calf"),
-            (down, "upperarm"),
-            (down, "thigh"),
-        )
-    ]
-    return np.column_stack([_between(first, second) for first, second in pairs])
+    angles = []
+    for side in ("l", "r"):
+        shoulder, elbow, wrist, hip, knee, ankle = (at[f"{side}_{joint}"] for joint in _LIMBS)
+        angles += [_between(elbow - shoulder, wrist - elbow), _between(knee - hip, ankle - knee)]
+        angles += [_between(down, elbow - shoulder), _between(down, knee - hip)]
+    return np.column_stack(angles)
 
 
 def _between(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -221,15 +205,22 @@ def tracking_class(errors: FloatArray, stamps: FloatArray, *, limit: float) -> t
     return (0 if at_end else 1 if lost.any() else 2), lost
 
 
-def jitter(positions: FloatArray) -> float:
+def jitter(positions: FloatArray, still: BoolArray | None = None, *, lag: int = 0) -> float:
     """Mean norm [m] of the second difference of joint positions (F, J, 3) over time; NaN for fewer than three frames.
 
     It is zero for a body that stands still or moves uniformly. Since it includes real acceleration, compare it with that of
     the reference.
+
+    Args:
+        positions: of the estimate, or of the reference itself.
+        still: (F, J) where joints should stand still, see standing_still; None: everywhere, also where they move.
+        lag: frame i is compared with frame i - lag of `still`: positive if the estimate is late.
     """
     if len(positions) < 3:
         return float("nan")
-    return mean_or_nan(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2))
+    second = np.full(positions.shape[:2], np.nan)
+    second[1:-1] = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
+    return mean_or_nan(second if still is None else second[shifted(still, lag) == 1.0])
 
 
 def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
@@ -252,24 +243,6 @@ def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
         quiet &= away <= STILL_M
     still[reach : frames - reach] = quiet
     return still
-
-
-def standing_jitter(positions: FloatArray, still: BoolArray, *, lag: int = 0) -> float:
-    """Mean norm [m] of the second difference of joints (F, J, 3) over the frames in which they should stand still.
-
-    Args:
-        positions: of the estimate, or of the reference itself.
-        still: (F, J), see standing_still.
-        lag: frame i is compared with frame i - lag of `still`: positive if the estimate is late.
-
-    Returns:
-        NaN if no joint stands still.
-    """
-    if len(positions) < 3:
-        return float("nan")
-    second = np.full(positions.shape[:2], np.nan)
-    second[1:-1] = np.linalg.norm(np.diff(positions, n=2, axis=0), axis=2)
-    return mean_or_nan(second[shifted(still, lag) == 1.0])
 
 
 def fraction_within(distances: FloatArray, limit: float) -> float:

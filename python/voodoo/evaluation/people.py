@@ -20,7 +20,7 @@ import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.evaluation import metrics
 from voodoo.evaluation.metrics import FloatArray
-from voodoo.export.people_rows import PeopleRows
+from voodoo.export.table import Arrays
 from voodoo.recordings.people_truth import PeopleTruth
 
 MATCH_M = 0.5
@@ -134,14 +134,14 @@ NOBODY, NO_POSE, ASIDE = -1, -2, -3
 
 
 def score(
-    name: str, path: Path, truth: PeopleTruth, rows: PeopleRows, *, seconds: float | None = None, step_s: float = np.nan
+    name: str, path: Path, truth: PeopleTruth, rows: Arrays, *, seconds: float | None = None, step_s: float = np.nan
 ) -> PeopleScore:
     """Evaluate a result.
 
     Args:
         name, path: of the recording.
         truth: in the result's root frame.
-        rows: the result.
+        rows: the result: `stamps` (R,), `person` (R,), `joint_names` (J,) and `joints` (R, J, 3), NaN without a pose.
         seconds: duration of the recording; None: from the first to the last stamp of truth and result.
         step_s: mean time of a frame.
 
@@ -190,8 +190,8 @@ class _Frames:
     rows: list[npt.NDArray[np.int64]]
 
 
-def _frames(truth: PeopleTruth, rows: PeopleRows) -> _Frames:
-    own = np.unique(rows.stamps)
+def _frames(truth: PeopleTruth, rows: Arrays) -> _Frames:
+    own, row = np.unique(rows["stamps"], return_inverse=True)
     near = np.clip(np.searchsorted(truth.stamps, own - SAME_TIME_S), 0, len(truth.stamps) - 1)
     same = np.abs(truth.stamps[near] - own) <= SAME_TIME_S
     if len(own) and not same.any():
@@ -202,22 +202,24 @@ def _frames(truth: PeopleTruth, rows: PeopleRows) -> _Frames:
     # Stamps of the result without persons in the truth are frames, too.
     stamps = np.concatenate([truth.stamps, own[~same]])
     of_truth = np.concatenate([np.arange(len(truth.stamps)), np.full(int((~same).sum()), -1)])
-    frame_of = np.full(len(own), -1)
-    frame_of[same] = near[same]
-    frame_of[~same] = len(truth.stamps) + np.arange(int((~same).sum()))
+    frame_of = np.where(same, near, len(truth.stamps) - 1 + np.cumsum(~same))
     order = np.argsort(stamps, kind="stable")
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    row_frame = place[frame_of[np.searchsorted(own, rows.stamps)]] if len(own) else np.empty(0, dtype=np.int64)
+    row_frame = np.argsort(order)[frame_of[row]]
     return _Frames(stamps[order], of_truth[order], [np.flatnonzero(row_frame == index) for index in range(len(stamps))])
 
 
-def match(truth: PeopleTruth, rows: PeopleRows, frames: _Frames) -> Matches:
+def _places(rows: Arrays, name: str) -> FloatArray:
+    """Positions (R, 3) [m] of a site; NaN where it is missing."""
+    names, unknown = rows["joint_names"].tolist(), np.full((len(rows["stamps"]), 3), np.nan)
+    return np.asarray(rows["joints"][:, names.index(name)]) if name in names else unknown
+
+
+def match(truth: PeopleTruth, rows: Arrays, frames: _Frames) -> Matches:
     """Match persons and ids frame by frame, jointly for all persons and keeping the pairs of the previous frame."""
     mm = motmetrics()
-    roots, own = truth.of(ROOT), rows.of(ROOT)
+    roots, own = truth.of(ROOT), _places(rows, ROOT)
     posed = np.asarray(np.isfinite(own).all(axis=1))
-    ids = np.unique(rows.persons)
+    ids = np.unique(rows["person"][posed])
     of_person = np.full((len(frames.stamps), len(truth.persons)), NOBODY, dtype=np.int64)
     of_id = np.full((len(frames.stamps), len(ids)), NO_POSE, dtype=np.int64)
     judge = mm.MOTAccumulator()
@@ -230,7 +232,7 @@ def match(truth: PeopleTruth, rows: PeopleRows, frames: _Frames) -> Matches:
         away[~(away <= MATCH_M)] = np.nan
         expected = np.flatnonzero(in_view >= IN_VIEW)
         aside = _at_others(away, in_view >= IN_VIEW)
-        columns = np.searchsorted(ids, rows.persons[there])
+        columns = np.searchsorted(ids, rows["person"][there])
         of_id[index, columns] = np.where(aside, ASIDE, NOBODY)
         judge.update(expected, columns[~aside], away[expected][:, ~aside], frameid=index)
     events = judge.mot_events
@@ -291,16 +293,16 @@ def _false_bodies(found: Matches) -> tuple[int, int]:
     return appeared, left
 
 
-def _joint_errors(truth: PeopleTruth, rows: PeopleRows, frames: _Frames, found: Matches) -> FloatArray:
+def _joint_errors(truth: PeopleTruth, rows: Arrays, frames: _Frames, found: Matches) -> FloatArray:
     """Distances (N, 12) [m] of metrics.JOINTS in all matches of persons who are in view."""
     truth_positions = np.stack([truth.of(name) for name in metrics.JOINTS], axis=2)
-    own = np.stack([rows.of(name) for name in metrics.JOINTS], axis=1)
+    own = np.stack([_places(rows, name) for name in metrics.JOINTS], axis=1)
     pairs = []
     for index, person in np.argwhere(found.of_person >= 0):
         place = frames.truth[index]
         if truth.in_view[place, person] >= JOINTS_IN_VIEW:
             there = frames.rows[index]
-            row = there[rows.persons[there] == found.ids[found.of_person[index, person]]][0]
+            row = there[rows["person"][there] == found.ids[found.of_person[index, person]]][0]
             pairs.append(np.linalg.norm(own[row] - truth_positions[place, person], axis=1))
     return np.array(pairs) if pairs else np.empty((0, len(metrics.JOINTS)))
 

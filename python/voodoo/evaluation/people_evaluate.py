@@ -12,11 +12,11 @@ from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation.people import PeopleScore, motmetrics, score
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_rows import read_rows
+from voodoo.export.table import Arrays, opened_result
 from voodoo.model.body import Body
 from voodoo.names import HumanModel
 from voodoo.people import People
-from voodoo.pipeline.people import track_people
+from voodoo.pipeline.run import track
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, PeopleTruth
 from voodoo.recordings.recording import Recording
@@ -32,11 +32,11 @@ def has_people(path: Path) -> bool:
 def evaluate_result(
     path: Path, result: Path, *, loader: str | None = None, options: Mapping[str, Any] | None = None
 ) -> PeopleScore:
-    """Evaluate a result file of several persons, see voodoo.export.people_rows.
+    """Evaluate a result file, see voodoo.export.table.opened_result.
 
     Args:
         path: of the recording, with truth_people.csv beside it.
-        result: .csv in the recording's root frame.
+        result: .csv or .npz in the recording's root frame.
         loader, options: see open_recording.
 
     Raises:
@@ -45,41 +45,31 @@ def evaluate_result(
     recording = open_recording(path, loader=loader, **(options or {}))
     truth = truth_of(recording)
     rows = read_rows(result)
+    stamps = rows["stamps"]
     about = recording.info()
     late = about.start_stamp + about.duration
-    outside = (rows.stamps < about.start_stamp - 0.5) | (rows.stamps > late + 0.5)
+    outside = (stamps < about.start_stamp - 0.5) | (stamps > late + 0.5)
     if outside.any():
         raise VoodooError(
             f"{result}: expected stamps from {about.start_stamp:.6f} to {late:.6f} s as in {recording.name}, found "
-            f"{rows.stamps[outside][0]:.6f}"
+            f"{stamps[outside][0]:.6f}"
         )
     return score(recording.name, path, truth, rows, seconds=about.duration)
 
 
-def evaluate_people(
-    path: Path,
-    *,
-    config: Config | None = None,
-    loader: str | None = None,
-    options: Mapping[str, Any] | None = None,
-    model: HumanModel | None = None,
-    use: Sequence[str] | None = None,
-) -> PeopleScore:
-    """Track all persons in a recording, without a start, and evaluate the result.
-
-    Args:
-        path: of the recording, with truth_people.csv beside it.
-        config: None means the defaults.
-        loader, options: see open_recording.
-        model: model of the human; None: that of `voodoo.People`.
-        use: kinds of inputs; None: all.
+def read_rows(result: Path) -> Arrays:
+    """Read a result, see voodoo.export.table.opened_result.
 
     Raises:
-        VoodooError: it cannot be read, or a frame was refused.
+        VoodooError: it cannot be read, stamps fall, or a person has two rows at one stamp.
     """
-    recording = open_recording(path, loader=loader, **(options or {}))
-    people = People(None if model is None else Body.human(model=model), config=config)
-    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
+    with opened_result(result) as content:
+        rows = dict(content)
+        if (np.diff(rows["stamps"]) < 0.0).any():
+            raise VoodooError("stamp_s: expected finite numbers that do not fall, found others")
+        if len(set(zip(rows["stamps"].tolist(), rows["person"].tolist(), strict=True))) != len(rows["stamps"]):
+            raise VoodooError("expected one row for a person and stamp, found several")
+        return rows
 
 
 def judge(recording: Recording, people: People, *, settings: FrontEndSettings | None = None) -> PeopleScore:
@@ -90,8 +80,8 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
     """
     truth = truth_of(recording)
     motmetrics()  # a missing library must be reported before the work
-    steps = list(track_people(recording, people, settings=settings))
-    rows = PeopleTrack.of([step.estimate for step in steps]).rows()
+    steps = list(track(recording, people, settings=settings))
+    rows = PeopleTrack.of([step.estimate for step in steps]).arrays()
     seconds = float(np.mean([step.seconds for step in steps])) if steps else np.nan
     about = recording.info()
     return score(recording.name, recording.path, truth, rows, seconds=about.duration, step_s=seconds)
@@ -106,11 +96,21 @@ def evaluate_all_people(
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
 ) -> Iterator[PeopleScore]:
-    """Evaluate recordings one after the other; one that fails yields a score with `failure` set."""
+    """Track all persons in recordings, without a start, and evaluate the results; one that fails yields a score with a `failure`.
+
+    Args:
+        paths: of recordings with truth_people.csv beside them.
+        config_file: None means the defaults.
+        loader, options: see open_recording.
+        model: model of the human; None: that of `voodoo.People`.
+        use: kinds of inputs; None: all.
+    """
     for path in paths:
         try:
             config = None if config_file is None else Config.load(config_file)
-            yield evaluate_people(path, config=config, loader=loader, options=options, model=model, use=use)
+            recording = open_recording(path, loader=loader, **(options or {}))
+            people = People(None if model is None else Body.human(model=model), config=config)
+            yield judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
         except (VoodooError, OSError) as error:
             yield PeopleScore(path.name, path, failure=str(error))
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.evaluation.calibration import Deviations
 from voodoo.evaluation.depth_agreement import Selection
-from voodoo.evaluation.metrics import FloatArray
+from voodoo.evaluation.metrics import BoolArray, FloatArray
 
 LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
 """Distances from exact truth, and from another tracker's skeleton, beyond which a joint is lost [m]."""
@@ -117,7 +116,7 @@ class FrameTable:
     stamps: FloatArray
     status: tuple[str, ...]
     errors: FloatArray
-    lost: npt.NDArray[np.bool_]
+    lost: BoolArray
     depth_within_5cm: FloatArray
     silhouette_iou: FloatArray
     step_s: FloatArray

@@ -39,12 +39,7 @@ class Summary:
     @property
     def class_average(self) -> float:
         """Mean class; NaN if no sequence has one."""
-        count = sum(self.classes)
-        return (
-            sum(value * number for value, number in zip(CLASSES, self.classes, strict=True)) / count
-            if count
-            else math.nan
-        )
+        return metrics.mean_or_nan(np.repeat(np.array(CLASSES, dtype=np.float64), self.classes))
 
 
 MEANS = tuple(item.name for item in fields(Score) if item.type == "float")

@@ -1,4 +1,4 @@
-"""Writes a track in any format, selected by the suffix."""
+"""Writes a result in any format, selected by the suffix."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from voodoo.export.foxglove import SUFFIX as FOXGLOVE
 from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
 from voodoo.export.opensim import write_mot, write_sto
+from voodoo.export.people import PeopleTrack
 from voodoo.export.result_file import SUFFIXES
-from voodoo.export.ros2 import write_people_bag
+from voodoo.export.ros2 import person_id, write_people_bag
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
 from voodoo.export.upright import Turn, upright
@@ -131,47 +132,54 @@ def on_stdout(path: Path) -> Iterator[Path]:
             shutil.copyfileobj(text, sys.stdout)
 
 
-def save(track: Track, path: Path, *, body: Body, root_frame: str, turn: Turn | None = None) -> None:
-    """Write a track in the format of the suffix, or a ROS 2 bag folder.
+def save(
+    result: Track | PeopleTrack,
+    path: Path,
+    *,
+    body: Body | Mapping[int, Body],
+    root_frame: str,
+    turn: Turn | None = None,
+) -> list[Path]:
+    """Write a result in the format of the suffix, or a ROS 2 bag folder; returns the written files.
+
+    .csv, .npz, .glb and bags hold all persons. Other formats hold one: of a PeopleTrack NAME.bvh becomes NAME_1.bvh, NAME_2.bvh,
+    ..., from the first to the last frame of each; without persons there is no file.
 
     Args:
-        track: with limb poses.
+        result: with limb poses; a Track is person 1.
         path: see FORMATS.
-        body: in the sizes it was tracked with.
-        root_frame: frame of the track.
+        body: in the sizes it was tracked with; of several persons, number -> body.
+        root_frame: frame of the result.
         turn: how all but .csv and .npz are turned upright; None: a camera's optical frame, by its name, by its axes.
 
     Raises:
         VoodooError: another suffix, or data that the format requires are missing.
-        OSError: the file cannot be written.
+        OSError: a file cannot be written.
     """
     check_target(path)
+    numbered, bodies = isinstance(result, PeopleTrack), body if isinstance(body, Mapping) else {1: body}
+    people = result if isinstance(result, PeopleTrack) else PeopleTrack(result.stamps, {1: result})
     if is_table(path):
         with on_stdout(path) as file:
-            track.save(file)
-        return
+            people.save(file)
+        return [path]
+    names = {one: f"{path.stem}_{one}" if numbered else path.stem for one in people.tracks}
     if path.suffix in ONE_PERSON:
-        ONE_PERSON[path.suffix](path, upright(track, root_frame, turn)[0], body)
-        return
-    write_persons(path, {"p1": (path.stem, track, body)}, root_frame=root_frame, turn=turn)
-
-
-def write_persons(
-    path: Path, people: Mapping[str, tuple[str, Track, Body]], *, root_frame: str, turn: Turn | None
-) -> None:
-    """Write a format that holds any number of persons: .glb, .mcap, or a ROS 2 bag folder.
-
-    Args:
-        path: see FORMATS.
-        people: REP-155 id -> name in .glb, track with limb poses, and body in the sizes it was tracked with.
-        root_frame: see `save`.
-        turn: see `save`.
-    """
-    tracks = {person: (track, body) for person, (_, track, body) in people.items()}
+        files = {one: path.with_name(f"{name}{path.suffix}") for one, name in names.items()}
+        for one, file in files.items():
+            check_target(file)
+            ONE_PERSON[path.suffix](file, upright(people.unbroken(one), root_frame, turn)[0], bodies[one])
+        return list(files.values())
+    tracks = {one: (people.unbroken(one, to_the_end=True), bodies[one]) for one in names}
+    if path.suffix == ".glb":
+        write_glb(
+            path, {names[one]: (upright(track, root_frame, turn)[0], own) for one, (track, own) in tracks.items()}
+        )
+        return [path]
+    own = {person_id(one): track for one, track in tracks.items()}
     if is_foxglove(path):
-        write_foxglove(path, tracks, root_frame=root_frame, turn=turn)
-    elif path.suffix == ".glb":
-        write_glb(path, {name: (upright(track, root_frame, turn)[0], body) for name, track, body in people.values()})
+        write_foxglove(path, own, root_frame=root_frame, turn=turn)
     else:
         with appearing_whole(path) as place, bag_folder(place) as folder:
-            write_people_bag(folder, tracks, root_frame=root_frame, turn=turn)
+            write_people_bag(folder, own, root_frame=root_frame, turn=turn)
+    return [path]

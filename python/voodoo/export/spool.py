@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import chain, pairwise
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -23,14 +23,13 @@ from voodoo.errors import NoPoseError, VoodooError, a_path, reading, reason
 from voodoo.export.cut_off import complete
 from voodoo.export.files import FORMATS, STDOUT, check_target, is_table, on_stdout, save, written
 from voodoo.export.people import PeopleTrack
-from voodoo.export.people_files import save_people
-from voodoo.export.people_rows import write_rows
-from voodoo.export.track import BODIES, BODY_OF, Arrays, Track, arrays_of, track_of, tracks_of, write_arrays, write_csv
+from voodoo.export.table import BODIES, BODY_OF, Arrays, write_result
+from voodoo.export.track import Track, arrays_of, left_out_arrays, rows_of
 from voodoo.export.upright import SUFFIX as ROOT_SUFFIX
 from voodoo.export.upright import UNTURNED, Turn, by_axes, by_feet, turned
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
-from voodoo.people import PeopleEstimate
+from voodoo.people import PeopleEstimate, Person
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, naming, removed
@@ -53,7 +52,6 @@ class Spool:
         root_frame: returns the frame of the poses, when there are some.
         optical: whether that is a camera's optical frame; None: by its name.
         upright: turn every output upright.
-        several: whether several persons are tracked.
         together: number of frames that are kept in memory.
 
     Attributes:
@@ -72,20 +70,19 @@ class Spool:
         root_frame: Callable[[], str],
         optical: bool | None = None,
         upright: bool = False,
-        several: bool = False,
         together: int,
     ) -> None:
         """Check the paths, and make the folder."""
         for path in paths:
             check_target(path)
-        self._paths, self._root, self._several = list(paths), root_frame, several
+        self._paths, self._root = list(paths), root_frame
         self._optical, self._upright = optical, upright
         self._turn: Turn | None = None
         self._kept_for = [path for path in paths if path != STDOUT]
         self._hidden = Hidden(self._kept_for[0] if self._kept_for else Path(tempfile.gettempdir()) / "stdout.csv")
         self._together = together
-        self._waiting: list[Any] = []
-        self._made: dict[str, npt.NDArray[Any]] | None = None
+        self._numbered = False
+        self._waiting: list[PeopleEstimate | Track] = []
         self._bodies: dict[int, Body] = {}
         self._bodies_at = -_BODIES_S
         self._parts: list[Path] = []
@@ -94,21 +91,18 @@ class Spool:
         self.persons: set[int] = set()
 
     def add(self, estimate: Estimate | PeopleEstimate | Track, bodies: Mapping[int, Body]) -> None:
-        """Take the poses of a frame, and the bodies in it.
+        """Take the poses of a frame, and the bodies in it; an estimate or a track is of person ONE.
 
         Raises:
             OSError: they cannot be put on the disk; they are in memory then.
         """
+        self._numbered = isinstance(estimate, PeopleEstimate)
+        if not isinstance(estimate, PeopleEstimate | Track):
+            estimate = PeopleEstimate(estimate.stamp, (Person(ONE, estimate),))
         self._waiting.append(estimate)
-        self._made = None
         self._bodies.update(bodies)
         self.frames += 1
-        if isinstance(estimate, PeopleEstimate):
-            words: Sequence[str] = [str(one.estimate.status) for one in estimate]
-        else:
-            words = estimate.status if isinstance(estimate, Track) else (str(estimate.status),)
-        for word in words:
-            self.states[word] += 1
+        self.states.update(estimate.status if isinstance(estimate, Track) else (str(one.status) for one in estimate))
         self.persons.update(bodies)
         if len(self._waiting) >= self._together:
             self._put_away()
@@ -135,24 +129,20 @@ class Spool:
         self._bodies_at = time.monotonic() if BODIES in arrays else self._bodies_at
         self._parts.append(path)
         self._waiting.clear()
-        self._made = None
 
     def _keep(self, paths: Iterable[Path]) -> None:
         names = [path.name for path in paths]
         turn = None if self._turn is None else {"pose": self._turn.pose.tolist(), "words": self._turn.words}
-        how: Any = {"optical": self._optical, "upright": self._upright, "turn": turn, "several": self._several}
+        how: Any = {"optical": self._optical, "upright": self._upright, "turn": turn, "numbered": self._numbered}
         self._hidden.keep(paths=names, root_frame=self._root(), **how)
 
     def _last(self) -> dict[str, npt.NDArray[Any]]:
         """What is in memory."""
-        if self._made is None:
-            if self._several:
-                self._made = PeopleTrack.of(self._waiting, bodies=self._bodies).arrays()
-            elif isinstance(self._waiting[0], Track):
-                self._made = arrays_of(Track.joined(self._waiting))
-            else:
-                self._made = arrays_of(Track.of(self._waiting, body=self._bodies.get(ONE)))
-        return self._made
+        tracks = [one for one in self._waiting if isinstance(one, Track)]
+        if tracks:
+            return arrays_of(Track.joined(tracks))
+        estimates = [one for one in self._waiting if isinstance(one, PeopleEstimate)]
+        return PeopleTrack.of(estimates, bodies=self._bodies).arrays()
 
     def _contents(self) -> Callable[[], Iterator[Arrays]]:
         last = [self._last()] if self._waiting else []
@@ -164,7 +154,7 @@ class Spool:
         Raises:
             VoodooError: no frames.
         """
-        return _sample(self._contents()(), len(self._parts) + 1, several=self._several)
+        return _sample(self._contents()(), len(self._parts) + 1)
 
     def write(
         self, *, turn: Turn | None = None, left_out: Mapping[str, int] | None = None
@@ -188,10 +178,11 @@ class Spool:
         self._turn = turn
         turn = by_axes(self._root(), optical=self._optical) if turn is None else turn
         how: Any = {"bodies": self._bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
+        how |= {"numbered": self._numbered, "left_out": left_out or {}}
 
         def write(path: Path) -> list[Path]:
             try:
-                return _write(path, contents, several=self._several, left_out=left_out or {}, **how)
+                return _write(path, contents, **how)
             except OSError:
                 failing.extend([path] if path != STDOUT else [])
                 raise
@@ -252,7 +243,7 @@ def _write(
     path: Path,
     contents: Callable[[], Iterator[Arrays]],
     *,
-    several: bool,
+    numbered: bool,
     bodies: Mapping[int, Body],
     root_frame: str,
     turn: Turn,
@@ -262,63 +253,27 @@ def _write(
     """Write one output. A part is in memory at a time, in formats other than .csv and .npz all."""
     check_target(path)
     if upright and turn.words:
-        contents = partial(_turned, contents, turn, several=several)
+        contents = partial(_turned, contents, turn)
         root_frame, turn = f"{root_frame}{ROOT_SUFFIX}", UNTURNED
-    if is_table(path) and not (several and _jumps(contents())):
+    if is_table(path):
         with on_stdout(path) as file, appearing_whole(file) as place:
-            if path.suffix == ".npz":
-                write_arrays(place, contents, _fixed(contents(), several, left_out))
-            elif several:
-                write_rows(place, (_people(part).rows() for part in contents()))
-            else:
-                sure = any(part["covariance"].size for part in contents())
-                write_csv(place, map(track_of, contents()), sure=sure)
+            write_result(place, contents, left_out_arrays(left_out))
         return [path]
-    how: Any = {"root_frame": root_frame, "turn": turn}
-    if several:
-        return save_people(PeopleTrack.joined(list(map(_people, contents()))), path, bodies=bodies, **how)
-    save(Track.joined(list(map(track_of, contents()))), path, body=bodies[ONE], **how)
-    return [path]
+    result = PeopleTrack.joined(list(map(PeopleTrack.of_arrays, contents())))
+    return save(result if numbered else result.tracks[ONE], path, body=bodies, root_frame=root_frame, turn=turn)
 
 
-def _turned(contents: Callable[[], Iterator[Arrays]], turn: Turn, *, several: bool) -> Iterator[Arrays]:
+def _turned(contents: Callable[[], Iterator[Arrays]], turn: Turn) -> Iterator[Arrays]:
     """The parts in the upright frame."""
     for part in contents():
-        if several:
-            people = _people(part)
-            tracks = {one: turned(track, turn) for one, track in people.tracks.items()}
-            yield PeopleTrack(people.stamps, tracks).arrays()
-        else:
-            yield arrays_of(turned(track_of(part), turn))
+        yield arrays_of(turned(rows_of(part), turn), part["person"], part["frame_stamps"])
 
 
-def _sample(contents: Iterator[Arrays], count: int, *, several: bool) -> list[Track]:
+def _sample(contents: Iterator[Arrays], count: int) -> list[Track]:
     """Tracks of some of the parts, of `count`."""
     every = -(-count // _SAMPLED)
     parts = (part for number, part in enumerate(contents) if number % every == 0)  # converted while its file is open
-    if not several:
-        return [Track.joined([track_of(part) for part in parts])]
-    return list(PeopleTrack.joined([_people(part) for part in parts]).tracks.values())
-
-
-def _fixed(parts: Iterator[Arrays], several: bool, left_out: Mapping[str, int]) -> Arrays:
-    """Arrays of a result that no part knows."""
-    if several:
-        return {"persons": np.array(sorted({one for part in parts for one in part["persons"].tolist()}))}
-    return {
-        "left_out_reasons": np.array(list(left_out), dtype=np.str_),
-        "left_out_counts": np.array(list(left_out.values()), dtype=np.int64),
-    }
-
-
-def _people(part: Arrays) -> PeopleTrack:
-    return PeopleTrack(part["stamps"], tracks_of(part))
-
-
-def _jumps(parts: Iterator[Arrays]) -> bool:
-    """Whether time jumps back between two parts: rows of several persons are in the order of time."""
-    ends = [(part["stamps"][0], part["stamps"][-1]) for part in parts]
-    return any(before[1] > after[0] for before, after in pairwise(ends))
+    return list(PeopleTrack.joined(list(map(PeopleTrack.of_arrays, parts))).tracks.values())
 
 
 def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Path], list[Exception]]:
@@ -355,7 +310,7 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
     with reading(hidden / KEPT, "what a session left", error=VoodooError):
         note = json.loads(read_stored_text(hidden / KEPT, "what a session left", most=MOST_METADATA))
         free = {Path(str(name)).name: _free(hidden.parent / Path(str(name)).name, taken) for name in note["paths"]}
-    if "several" not in note:  # a recording, or a folder that was being replaced
+    if "root_frame" not in note:  # a recording, or a folder that was being replaced
         for name, path in free.items():
             left = hidden / name
             if path.suffix == ".mcap" and left.is_dir():
@@ -377,17 +332,16 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
             parts.append(path)
         except VoodooError as error:
             failed.append(error)  # the others can be used
-    root, several, upright = str(note["root_frame"]), bool(note["several"]), bool(note["upright"])
+    root, upright = str(note["root_frame"]), bool(note["upright"])
     if note["turn"] is not None:
         turn = Turn(np.array(note["turn"]["pose"]), str(note["turn"]["words"]))
     elif upright and parts:  # the floor is not known here
-        turn = by_feet(_sample(_stored(parts), len(parts), several=several), root, optical=note["optical"])
+        turn = by_feet(_sample(_stored(parts), len(parts)), root, optical=note["optical"])
     else:
         turn = by_axes(root, optical=note["optical"])
-    how: Any = {"several": several, "root_frame": root, "turn": turn, "upright": upright}
-    some, errors = written(
-        free.values(), lambda path: _write(path, lambda: _stored(parts), bodies=bodies, left_out={}, **how)
-    )
+    how: Any = {"numbered": bool(note.get("numbered")), "root_frame": root, "turn": turn, "upright": upright}
+    how |= {"bodies": bodies, "left_out": {}}
+    some, errors = written(free.values(), lambda path: _write(path, lambda: _stored(parts), **how))
     done += some
     failed += errors
     if not errors:

@@ -1,45 +1,28 @@
-"""The result of a whole recording, and its files: one row per frame in .csv, arrays in .npz."""
+"""The result of a whole recording for one person, and its files."""
 
 from __future__ import annotations
 
-import csv
-import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.errors import VoodooError, a_path, naming, reading
+from voodoo.errors import VoodooError
 from voodoo.export.collected import angle_sigmas_of, angles_of_estimates, covariances_of
-from voodoo.export.people_rows import PeopleRows, cells, header_of, is_people_file, read_cells, read_rows
-from voodoo.export.result_file import check_suffix
+from voodoo.export.table import BY_FRAME, Arrays, FloatArray, joint_sigma, opened_result, save_result
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
-from voodoo.unpacking import stored_arrays
-from voodoo.whole import appearing_whole
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
 
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
-BODIES, BODY_OF = "bodies", "body_of"
-"""Arrays of a part that are not those of a result: texts of bodies, and the persons whose they are."""
-_FIRST = ("stamp_s", "status", "residual_m")
-"""The first columns of .csv."""
-_STATUS = "_status"
-"""Suffix of the name of a limb's column in .csv."""
-_SIGMA = "_sigma_m"
-"""Suffix of the name of a joint's column in .csv."""
 _UNKNOWN = ("angle_sigma", "covariance", "root_covariance")
 """Arrays that may be unknown in frames with a pose."""
 _WORDS = ("status", "joint_names", "limb_names", "angle_names")
-BY_FRAME = ("stamps", "residual", "joints", "world_from_limb", "angles", *_UNKNOWN)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,16 +103,12 @@ class Track:
         """Reject poses that are NaN, and poses in searching frames."""
         if name in _UNKNOWN:
             return
-        searching = ~self.found.reshape(-1, *[1] * (array.ndim - 1))
-        finite = np.isfinite(array)
-        if name == "stamps":
-            right = finite
-        elif name == "residual":
+        right = np.isfinite(array)
+        if name == "residual":
             # A lost or extrapolated frame may have no measurements to compute a residual from.
-            right = finite | np.array([status in ("lost", "degraded") for status in self.status], dtype=bool)
-            right = np.where(searching, np.isnan(array), right)
-        else:
-            right = np.where(searching, np.isnan(array), finite)
+            right |= np.isin(self.status, ("lost", "degraded"))
+        if name != "stamps":
+            right = np.where(self.found.reshape(-1, *[1] * (array.ndim - 1)), right, np.isnan(array))
         if not right.all():
             where = tuple(int(index) for index in np.argwhere(~right)[0])
             what = (
@@ -145,7 +124,7 @@ class Track:
     @property
     def joint_sigma(self) -> FloatArray:
         """Root mean square (F, J) of the standard deviations of each joint's x, y and z [m]; (F, 0) without covariances."""
-        return np.asarray(np.sqrt(np.trace(self.covariance, axis1=2, axis2=3) / 3.0))
+        return joint_sigma(self.covariance)
 
     def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Track:
         """The track of some frames: a mask (F,), or their numbers."""
@@ -239,8 +218,7 @@ class Track:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        sure = self.covariance.size > 0
-        save_result(path, lambda part: write_csv(part, [self], sure=sure), lambda: arrays_of(self))
+        save_result(path, arrays_of(self))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
@@ -249,107 +227,46 @@ class Track:
         Raises:
             VoodooError: another suffix, damage, a file of another kind, or several persons.
         """
-        path = a_path(path, error=VoodooError)
-        check_suffix(path)
-        if is_people_file(path):
-            return _only_person(path)
-        with reading(path, "a result of voodoo track"), naming(path, VoodooError):
-            if path.suffix == ".csv":
-                rows, others = read_cells(path, _FIRST, more=True)
-                limbs = {name.removesuffix(_STATUS): words for name, words in others.items() if name.endswith(_STATUS)}
-                return replace(track_of_rows(rows, 1), limb_status=limbs)
-            with stored_arrays(path, "a result of voodoo track") as content:
-                return track_of(content)
+        with opened_result(path) as content:
+            tracks = tracks_of(content)
+            if len(tracks) != 1:
+                found = f"persons {', '.join(map(str, tracks))}; PeopleTrack.load reads them" if tracks else "nobody"
+                raise VoodooError(f"expected the result of one person, found {found}")
+            return next(iter(tracks.values()))
 
 
-def save_result(path: str | Path, write: Callable[[Path], None], arrays: Callable[[], Arrays]) -> None:
-    """Write a result as .csv, by `write`, or as .npz of its arrays; the file appears only when it is complete.
-
-    Raises:
-        VoodooError: another suffix.
-        OSError: the file cannot be written.
-    """
-    path = Path(path)
-    check_suffix(path)
-    with appearing_whole(path) as part:
-        if path.suffix == ".csv":
-            write(part)
-        else:
-            write_arrays(part, lambda: iter([arrays()]))
-
-
-def write_csv(path: Path, parts: Iterable[Track], *, sure: bool) -> None:
-    """Write consecutive parts of a track as rows; `sure`: one of them has covariances."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        for number, part in enumerate(parts):
-            if not number:
-                limbs = [f"{limb}{_STATUS}" for limb in part.limb_status]
-                sigmas_of = [f"{name}{_SIGMA}" for name in part.joint_names if sure]
-                writer.writerow(header_of(_FIRST, part.joint_names, part.angle_names) + limbs + sigmas_of)
-            words = zip(*part.limb_status.values(), strict=True) if limbs else [()] * len(part)
-            sigmas = np.full((len(part), len(sigmas_of)), np.nan)
-            if part.covariance.size:
-                sigmas = part.joint_sigma
-            for stamp, status, residual, joints, angles, support, sigma in zip(
-                part.stamps, part.status, part.residual, part.joints, part.angles, words, sigmas, strict=True
-            ):
-                # repr keeps stamps in epoch seconds exact; six digits of a meter are enough for the rest.
-                row = [repr(float(stamp)), status, *cells((residual, *joints.ravel(), *angles))]
-                writer.writerow([*row, *support, *cells(sigma)])
-
-
-def write_arrays(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
-    """Write the arrays of consecutive parts of a result as one .npz; a part is in memory at a time.
+def arrays_of(
+    rows: Track, persons: npt.NDArray[np.int64] | None = None, frame_stamps: FloatArray | None = None
+) -> dict[str, npt.NDArray[Any]]:
+    """All data of a result as arrays of numbers and words.
 
     Args:
-        path: the file.
-        parts: returns their arrays, from the first part on.
-        fixed: arrays that are not those of the first part that has them, or that no part has.
+        rows: of one person, or of several.
+        persons: (R,) person of each row; None: 1.
+        frame_stamps: (F,) [s] of all frames; None: a row is a frame.
     """
-    kinds: dict[str, tuple[int, tuple[int, ...], np.dtype[Any]]] = {}
-    rest: dict[str, npt.NDArray[Any]] = {}
-    for part in parts():
-        for name in part:
-            if name in (BODIES, BODY_OF):
-                continue
-            array = part[name]
-            if name.rpartition("/")[2] in (*BY_FRAME, "status", "limb_status"):
-                count, row, kind = kinds.get(name, (0, array.shape[1:], array.dtype))
-                # Without covariances there are no columns.
-                kinds[name] = count + len(array), max(row, array.shape[1:]), np.result_type(kind, array.dtype)
-            else:
-                rest.setdefault(name, array)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
-        for name, array in {**rest, **(fixed or {})}.items():
-            with file.open(f"{name}.npy", "w", force_zip64=True) as out:
-                np.lib.format.write_array(out, array, allow_pickle=False)
-        for name, (count, row, kind) in kinds.items():
-            about = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": (count, *row)}
-            with file.open(f"{name}.npy", "w", force_zip64=True) as out:
-                np.lib.format.write_array_header_1_0(out, about)
-                for part in parts():
-                    if name in part:
-                        array = part[name]
-                        filled = array if array.shape[1:] == row else np.full((len(array), *row), np.nan)
-                        out.write(filled.astype(kind).tobytes())
-
-
-def arrays_of(track: Track) -> dict[str, npt.NDArray[Any]]:
-    """All data of a track as arrays of numbers and words, for .npz."""
-    limbs = np.array(list(track.limb_status.values()), dtype=np.str_)
-    return {name: np.array(getattr(track, name), dtype=np.str_) for name in _WORDS} | {
-        **{name: getattr(track, name) for name in BY_FRAME},
+    limbs = np.array(list(rows.limb_status.values()), dtype=np.str_)
+    return {name: np.array(getattr(rows, name), dtype=np.str_) for name in _WORDS} | {
+        **{name: getattr(rows, name) for name in BY_FRAME},
+        "person": np.ones(len(rows), dtype=np.int64) if persons is None else persons,
+        "frame_stamps": rows.stamps if frame_stamps is None else frame_stamps,
         "format_version": np.array(FORMAT_VERSION),
-        "limb_status_names": np.array(list(track.limb_status), dtype=np.str_),
-        "limb_status": limbs.reshape(len(track.limb_status), len(track)).T,
-        "left_out_reasons": np.array(list(track.left_out), dtype=np.str_),
-        "left_out_counts": np.array(list(track.left_out.values()), dtype=np.int64),
+        "limb_status_names": np.array(list(rows.limb_status), dtype=np.str_),
+        "limb_status": limbs.reshape(len(rows.limb_status), len(rows)).T,
+        **left_out_arrays(rows.left_out),
     }
 
 
-def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
-    """The track of such arrays.
+def left_out_arrays(left_out: Mapping[str, int]) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of unusable measurements: reason -> number."""
+    return {
+        "left_out_reasons": np.array(list(left_out), dtype=np.str_),
+        "left_out_counts": np.array(list(left_out.values()), dtype=np.int64),
+    }
+
+
+def rows_of(content: Arrays) -> Track:
+    """All rows of such arrays, of one person or several.
 
     Raises:
         VoodooError: one is missing, or they do not belong together.
@@ -362,65 +279,23 @@ def track_of(content: Mapping[str, npt.NDArray[Any]]) -> Track:
         raise VoodooError(
             f"format_version: expected {FORMAT_VERSION} at most, found {version}: a later voodoo wrote it"
         )
-    words = {name: tuple(map(str, content[name])) for name in _WORDS if name in content}
-    arrays = {name: content[name] for name in BY_FRAME if name in content}
-    return Track(**words, **arrays, **_optional_fields(content))  # type: ignore[arg-type]
+    fields: dict[str, Any] = {name: tuple(map(str, content[name])) for name in _WORDS if name in content}
+    fields |= {name: content[name] for name in BY_FRAME if name in content}
+    if "limb_status" in content:  # the first version does not have it
+        limbs, words = map(str, content["limb_status_names"]), content["limb_status"].T.tolist()
+        fields["limb_status"] = {limb: tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)}
+    if "left_out_counts" in content:
+        reasons, counts = map(str, content["left_out_reasons"]), content["left_out_counts"].tolist()
+        fields["left_out"] = dict(zip(reasons, counts, strict=True))
+    return Track(**fields)
 
 
-def track_of_rows(rows: PeopleRows, person: int) -> Track:
-    """The rows of one person."""
-    own = np.flatnonzero(rows.persons == person)
-    return Track(
-        stamps=rows.stamps[own],
-        status=tuple(rows.status[index] for index in own),
-        residual=rows.residual[own],
-        joint_names=rows.joint_names,
-        joints=rows.joints[own],
-        limb_names=(),
-        world_from_limb=np.empty((len(own), 0, 4, 4)),
-        angle_names=rows.angle_names,
-        angles=rows.angles[own],
-    )
+def tracks_of(content: Arrays) -> dict[int, Track]:
+    """The tracks in such arrays, by person.
 
-
-def tracks_of(content: Mapping[str, npt.NDArray[Any]]) -> dict[int, Track]:
-    """The tracks of an .npz of several people, by person."""
-    tracks = {}
-    for one in content["persons"].tolist():
-        prefix = f"person_{one}/"
-        own = {name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)}
-        tracks[int(one)] = track_of(own)
-    return tracks
-
-
-def read_persons(path: Path) -> tuple[FloatArray, dict[int, Track]]:
-    """The stamps in a result of several people, and the tracks by person; see `PeopleTrack.load`."""
-    if path.suffix == ".csv":
-        rows = read_rows(path)
-        return np.unique(rows.stamps), {one: track_of_rows(rows, one) for one in np.unique(rows.persons).tolist()}
-    with stored_arrays(path, "a result of voodoo track --people") as content:
-        if "persons" not in content:
-            raise VoodooError(f"{path}: expected a result of several people, found one of another kind")
-        return content["stamps"], tracks_of(content)
-
-
-def _only_person(path: Path) -> Track:
-    """The track in a result of several people that holds one."""
-    _, tracks = read_persons(path)
-    if len(tracks) != 1:
-        found = ", ".join(str(one) for one in tracks) or "nobody"
-        raise VoodooError(f"{path}: expected the result of one person, found persons {found}")
-    return next(iter(tracks.values()))
-
-
-def _optional_fields(content: Mapping[str, npt.NDArray[Any]]) -> dict[str, Any]:
-    """Status of the limbs, and left-out measurements, if the file has them; the first version does not."""
-    if "limb_status" not in content or "left_out_counts" not in content:
-        return {}
-    words = content["limb_status"].T.tolist()
-    limbs, reasons = content["limb_status_names"].tolist(), content["left_out_reasons"].tolist()
-    counts = content["left_out_counts"].tolist()
-    return {
-        "limb_status": {str(limb): tuple(map(str, row)) for limb, row in zip(limbs, words, strict=True)},
-        "left_out": {str(reason): int(count) for reason, count in zip(reasons, counts, strict=True)},
-    }
+    Raises:
+        VoodooError: see `rows_of`.
+    """
+    rows = rows_of(content)
+    persons = content["person"] if "person" in content else np.ones(len(rows), dtype=np.int64)
+    return {int(one): rows.of_frames(persons == one) for one in np.unique(persons)}

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from voodoo.errors import VoodooError
-from voodoo.export.people_rows import cells
 from voodoo.export.skeleton import mean_interval
+from voodoo.export.table import cells
 from voodoo.export.track import Track
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
 from voodoo.whole import appearing_whole

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from voodoo.export.track import FloatArray, Track
+from voodoo.export.table import FloatArray
+from voodoo.export.track import Track
 from voodoo.model.standing import is_optical, standing_along
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.marker_trajectories import Z_UP_FROM

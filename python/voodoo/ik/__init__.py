@@ -1,6 +1,6 @@
 """Inverse kinematics with image constraints (J10) on exact joints: a posture from a few known points and silhouettes.
 
-docs/explanation/inverse-kinematics.md explains the method; the solver is in the compiled core.
+docs/how-to/inverse-kinematics.md explains the method; the solver is in the compiled core.
 """
 
 from voodoo.ik.chain import Chain

@@ -16,16 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TypeAlias
-
-import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Estimate
 from voodoo.ik.chain import Chain
+from voodoo.ik.values import FloatArray
 from voodoo.model.body import Body
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _ROOT = 6
 _CLOSED_M = 1e-6

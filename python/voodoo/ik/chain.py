@@ -40,17 +40,12 @@ class Chain:
         root = root if root is not None else ("fixed" if len(limbs) else "free")
         if not isinstance(root, str) or root not in ("free", "fixed"):
             raise MeasurementError(f'root: expected "free" or "fixed", found {short(root)}')
-        self._core = _core.Chain(body.core, list(limbs), root == "free")
-        self.angle_names: tuple[str, ...] = tuple(self._core.angle_names)
-        self.limb_names: tuple[str, ...] = tuple(self._core.limb_names)
-        self.site_names: tuple[str, ...] = tuple(self._core.site_names)
-        self.limits: FloatArray = np.array(self._core.limits, dtype=np.float64).reshape(-1, 2)
+        self.core: _core.Chain = _core.Chain(body.core, list(limbs), root == "free")
+        self.angle_names: tuple[str, ...] = tuple(self.core.angle_names)
+        self.limb_names: tuple[str, ...] = tuple(self.core.limb_names)
+        self.site_names: tuple[str, ...] = tuple(self.core.site_names)
+        self.limits: FloatArray = np.array(self.core.limits, dtype=np.float64).reshape(-1, 2)
         self.limits.setflags(write=False)
-
-    @property
-    def core(self) -> _core.Chain:
-        """The chain of the compiled core."""
-        return self._core
 
     def rest(self) -> FloatArray:
         """The angles (n,) at rest: zeros, moved into the limits."""
@@ -64,7 +59,7 @@ class Chain:
         Raises:
             MeasurementError: the angles are not n finite numbers, or the base is not rigid.
         """
-        poses, sites = self._core.forward(base_pose(world_from_base), vector(angles))
+        poses, sites = self.core.forward(base_pose(world_from_base), vector(angles))
         return named(self.limb_names, poses), named(self.site_names, sites)
 
     def jacobian(self, site: str, angles: npt.ArrayLike, *, world_from_base: npt.ArrayLike | None = None) -> FloatArray:
@@ -74,7 +69,7 @@ class Chain:
             BodyError: the site is not on the chain.
             MeasurementError: the angles are not n finite numbers, or the base is not rigid.
         """
-        return self._core.jacobian(base_pose(world_from_base), vector(angles), site)
+        return self.core.jacobian(base_pose(world_from_base), vector(angles), site)
 
     def project(
         self,
@@ -102,7 +97,7 @@ class Chain:
         if missing:
             raise MeasurementError(f"world_from_limb: expected every limb of the body, found no {', '.join(missing)}")
         poses = [numbers(f"world_from_limb[{name}]", world_from_limb[name]) for name in self.body.limb_names]
-        return np.array(self._core.project(base_pose(world_from_base), poses, closest), dtype=np.float64)
+        return np.array(self.core.project(base_pose(world_from_base), poses, closest), dtype=np.float64)
 
     def criterion(
         self,
@@ -128,7 +123,7 @@ class Chain:
         """
         Options(margin=margin, thin=thin)  # rejects the same values as `solve`
         views = core_views(images)
-        return self._core.criterion(
+        return self.core.criterion(
             base_pose(world_from_base),
             vector(angles),
             listed_bones(bones),

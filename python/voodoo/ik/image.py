@@ -76,12 +76,7 @@ class Silhouette:
         self.empty = not person.any()
         pose = rigid(world_from_camera, name="world_from_camera")
         observed = None if depth is None else _depths(depth, camera, person)
-        self._core = _core.View(self.distance, self.thickness, observed, self.border, _pinhole(camera), inverse(pose))
-
-    @property
-    def core(self) -> _core.View:
-        """The silhouette of the compiled core."""
-        return self._core
+        self.core = _core.View(self.distance, self.thickness, observed, self.border, _pinhole(camera), inverse(pose))
 
     def __repr__(self) -> str:
         """Size, and whether it contains a person."""

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.model.joint import as_numbers, short
+from voodoo.model.joint import numbers_of, short
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Vector: TypeAlias = Sequence[float] | FloatArray
@@ -85,10 +85,7 @@ def numbers(what: str, values: npt.ArrayLike) -> FloatArray:
     Raises:
         MeasurementError: not numbers; it names `what`.
     """
-    try:
-        return as_numbers(values)
-    except (TypeError, ValueError, OverflowError):
-        raise MeasurementError(f"{what}: expected numbers, found {short(values)}") from None
+    return numbers_of(what, values, MeasurementError)
 
 
 def three(what: str, values: Vector) -> tuple[float, float, float]:
@@ -97,8 +94,5 @@ def three(what: str, values: Vector) -> tuple[float, float, float]:
     Raises:
         MeasurementError: it names `what`.
     """
-    try:
-        x, y, z = as_numbers(values).reshape(-1).tolist()
-    except (TypeError, ValueError, OverflowError):
-        raise MeasurementError(f"{what}: expected three numbers, found {short(values)}") from None
+    x, y, z = numbers_of(what, values, MeasurementError, "three numbers", count=3).tolist()
     return x, y, z

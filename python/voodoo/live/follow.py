@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +17,7 @@ from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate, Person
 from voodoo.pipeline.floor import detections
-from voodoo.pipeline.front_end import FrontEnd
-from voodoo.pipeline.people import PeopleFrontEnd
+from voodoo.pipeline.front_end import ONE, FrontEnd
 from voodoo.pipeline.run import decodable
 from voodoo.pipeline.starts.base import FoundStart
 from voodoo.pipeline.starts.chosen import Starts
@@ -26,10 +26,10 @@ from voodoo.tracker import Tracker
 
 GONE_S = 5.0
 """After this time without a frame, persons are treated as new, with their own sizes."""
+_SIGMA_M = 0.1
+"""Standard deviation of a detected joint."""
 NEAR_M = 1.0
 """A person is chosen by a place that is at most this far from the nearest joint."""
-ONE = 1
-"""Number of the person if only one is tracked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Step:
     estimates: Mapping[int, Estimate]
     bodies: Mapping[int, Body]
     seconds: float
-    front_end: FrontEnd | None = None
+    front_end: FrontEnd[Estimate] | None = None
     turn: Turn | None = None
 
     @property
@@ -71,7 +71,7 @@ class Follower:
         tracker: tracker of one person; None: `people` is used.
         people: creates the tracker of several persons. After time jumped back, new persons get unused numbers.
         settings: see FrontEndSettings.
-        starts: sources of the first pose of a single person; None: every kind of measurement that can give one.
+        starts: sources of detections; None: every kind of measurement that can give one.
     """
 
     def __init__(
@@ -85,10 +85,10 @@ class Follower:
         """Start without frames."""
         if (tracker is None) == (people is None):
             raise VoodooError("follower: expected a tracker or people, found both or neither")
-        self._settings = settings or FrontEndSettings()
         self._make = people
-        self._one = None if tracker is None else FrontEnd(tracker, settings=self._settings, starts=starts)
-        self._all = None if people is None else PeopleFrontEnd(people(), settings=self._settings)
+        self._how: dict[str, Any] = {"settings": settings or FrontEndSettings(), "starts": starts}
+        first: Any = people() if people else tracker
+        self._front: FrontEnd[Any] = FrontEnd(first, **self._how)
         self._numbers = 0
         self._most = 0
         self._stamp: float | None = None
@@ -103,22 +103,16 @@ class Follower:
         start = time.perf_counter()
         if frame.breaks and self._stamp is not None:
             self.restart(back=frame.stamp <= self._stamp, gone=frame.arrived - self._arrived > GONE_S)
-        if self._one is not None:
-            estimate = self._one.step(frame)
-            body = self._one.tracker.body
-            found: tuple[dict[int, Estimate], dict[int, Body]] = {ONE: estimate}, {ONE: body}
+        estimate, tracker = self._front.step(frame), self._front.tracker
+        if isinstance(tracker, People):
+            estimates = {self._numbers + person.id: person.estimate for person in estimate}
+            bodies = {self._numbers + person.id: tracker.body(person.id) for person in estimate}
+            self._most = max(self._most, *estimates, 0)
         else:
-            found = self._step_people(frame)
+            estimates, bodies = {ONE: estimate}, {ONE: tracker.body}
         self._stamp, self._arrived = frame.stamp, frame.arrived
-        return Step(frame, *found, time.perf_counter() - start, self._one)
-
-    def _step_people(self, frame: LiveFrame) -> tuple[dict[int, Estimate], dict[int, Body]]:
-        assert self._all is not None
-        estimate = self._all.step(frame)
-        numbers = {person.id: self._numbers + person.id for person in estimate}
-        self._most = max(self._most, *numbers.values(), 0)
-        bodies = {numbers[person.id]: self._all.people.body(person.id) for person in estimate}
-        return {numbers[person.id]: person.estimate for person in estimate}, bodies
+        front_end = None if isinstance(tracker, People) else self._front
+        return Step(frame, estimates, bodies, time.perf_counter() - start, front_end)
 
     def choose(self, frame: LiveFrame, place: FloatArray) -> str:
         """Follow only the person at a place (3,) [m] in the root frame from now on; returns who that is.
@@ -128,8 +122,9 @@ class Follower:
         Raises:
             VoodooError: nobody is within NEAR_M of the place, or the body is no person's; the state is unchanged.
         """
-        if self._all is not None:
-            tracked = [person for person in self._all.people.estimate if person.estimate.joints]
+        tracker = self._front.tracker
+        if isinstance(tracker, People):
+            tracked = [person for person in tracker.estimate if person.estimate.joints]
             bodies = [person.estimate.joints for person in tracked]
         else:
             bodies = [found.joints for found in detections(Detector(), frame)]
@@ -137,14 +132,12 @@ class Follower:
         if not away or not min(away) < NEAR_M:
             raise VoodooError(f"expected somebody within {NEAR_M:g} m of {np.round(place, 2).tolist()}, found nobody")
         chosen = int(np.argmin(away))
-        if self._all is not None:
-            self._all.people.only(tracked[chosen].id)
+        if isinstance(tracker, People):
+            tracker.only(tracked[chosen].id)
             return f"person {self._numbers + tracked[chosen].id} only"
-        assert self._one is not None
-        self._one.tracker.reset(joints={name: tuple(at) for name, at in bodies[chosen].items()})
-        self._one = FrontEnd(self._one.tracker, settings=self._settings)
-        # Found, not given: one who leaves is searched for.
-        self._one.search.found = FoundStart(bodies[chosen], {}, "follow")
+        tracker.search()
+        self._front = FrontEnd(tracker, **self._how)
+        self._front.found = FoundStart(bodies[chosen], dict.fromkeys(bodies[chosen], _SIGMA_M), "follow")
         return f"the person {away[chosen]:.2f} m from there"
 
     def restart(self, *, back: bool, gone: bool) -> None:
@@ -157,19 +150,19 @@ class Follower:
             back: stamps restart before earlier ones.
             gone: no frame arrived for GONE_S.
         """
-        if self._one is not None:
-            tracker = self._one.tracker
+        tracker = self._front.tracker
+        if not isinstance(tracker, People):
             if not tracker.estimate.joints or (gone and tracker.can_search):
                 tracker.search()
             else:
                 poses = dict(tracker.estimate.world_from_limb)
                 tracker = Tracker(tracker.body, config=tracker.config, detector=tracker.detector)
                 tracker.reset_pose(poses)
-            self._one = FrontEnd(tracker, settings=self._settings)
-        elif self._make is not None and back:
+            self._front = FrontEnd(tracker, **self._how)
+        elif back and self._make:
             # `People` handles a gap by itself.
             self._numbers = self._most
-            self._all = PeopleFrontEnd(self._make(), settings=self._settings)
+            self._front = FrontEnd(self._make(), **self._how)
 
 
 def without_damaged(frame: LiveFrame) -> tuple[LiveFrame, list[VoodooError]]:

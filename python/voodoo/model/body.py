@@ -15,7 +15,7 @@ import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.model.body_toml import body_text, core_body
-from voodoo.model.joint import Joint, Place, as_numbers, number_of, short
+from voodoo.model.joint import Joint, Place, number_of, numbers_of, short
 from voodoo.model.toml_io import read_text
 from voodoo.names import HumanModel
 
@@ -39,17 +39,12 @@ class Body:
 
     def __init__(self, core: _core.Body) -> None:
         """Wrap a body of the core; use `human`, `load` or `from_toml` instead."""
-        self._core = core
+        self.core = core
         name, limbs, sites = core.parts()
         self.name: str = name
         self.limbs: tuple[Limb, ...] = tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in limbs)
         self.limb_joints: tuple[str | None, ...] = tuple(joint and joint[0] for _, _, _, joint, _ in limbs)
         self.site_names: tuple[str, ...] = tuple(site[0] for site in sites)
-
-    @property
-    def core(self) -> _core.Body:
-        """The body of the compiled core."""
-        return self._core
 
     @property
     def limb_names(self) -> tuple[str, ...]:
@@ -98,19 +93,19 @@ class Body:
         Raises:
             BodyError: not a number, or the result is not a valid body.
         """
-        return Body(self._core.scaled(number_of("factor", factor)))
+        return Body(self.core.scaled(number_of("factor", factor)))
 
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
-        return body_text(self._core)
+        return body_text(self.core)
 
     def __reduce__(self) -> tuple[type[Body], tuple[_core.Body]]:
         """Pickles and copies have the same bits."""
-        return type(self), (self._core,)
+        return type(self), (self.core,)
 
     def __eq__(self, other: object) -> bool:
         """Equal if all limbs, joints and sites are equal."""
-        return isinstance(other, Body) and bool(self._core == other._core)
+        return isinstance(other, Body) and bool(self.core == other.core)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -131,10 +126,7 @@ def checked_joints(
         raise BodyError(f"{what}: expected a mapping of names to positions, found {type(joints).__name__}")
     checked = {}
     for name, position in joints.items():
-        try:
-            x, y, z = (float(value) for value in as_numbers(position).reshape(-1))
-        except (TypeError, ValueError, OverflowError):
-            raise BodyError(f"{what}[{name}]: expected three numbers in meters, found {short(position)}") from None
+        x, y, z = numbers_of(f"{what}[{name}]", position, BodyError, "three numbers in meters", count=3).tolist()
         if not all(map(math.isfinite, (x, y, z))):
             raise BodyError(f"{what}[{name}]: expected finite meters, found {short(position)}")
         checked[name] = (x, y, z)
@@ -157,11 +149,5 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
         raise BodyError(
             f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(map(str, world_from_limb))}"
         )
-    poses = []
-    for name in names:
-        try:
-            poses.append(as_numbers(world_from_limb[name]))
-        except (TypeError, ValueError, OverflowError):
-            found = short(world_from_limb[name])
-            raise MeasurementError(f"world_from_limb[{name}]: expected a rigid 4x4 transform, found {found}") from None
-    return poses
+    expected = "a rigid 4x4 transform"
+    return [numbers_of(f"world_from_limb[{name}]", world_from_limb[name], MeasurementError, expected) for name in names]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo.errors import CameraError
-from voodoo.model.joint import as_numbers, short
+from voodoo.model.joint import as_numbers, numbers_of, short
 
 CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "inverse_plumb_bob"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
@@ -155,10 +155,7 @@ class Camera:
         Raises:
             CameraError: the shape is not (N, 3).
         """
-        try:
-            points = as_numbers(points_cam)
-        except (TypeError, ValueError, OverflowError):
-            raise CameraError(f"points: expected shape (N, 3), found {short(points_cam)}") from None
+        points = numbers_of("points", points_cam, CameraError, "shape (N, 3)")
         if points.ndim != 2 or points.shape[1] != 3:
             raise CameraError(f"points: expected shape (N, 3), found {points.shape}")
         return self.core.project(np.ascontiguousarray(points, dtype=np.float64))

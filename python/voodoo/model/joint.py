@@ -189,6 +189,26 @@ def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return found.astype(np.float64, copy=False)
 
 
+def numbers_of(
+    what: str,
+    values: npt.ArrayLike,
+    error: type[VoodooError],
+    expected: str = "numbers",
+    *,
+    count: int | None = None,
+) -> npt.NDArray[np.float64]:
+    """An array of real numbers given by the caller; with a `count`, so many of them in a row.
+
+    Raises:
+        VoodooError: of the class `error`, for other values; names `what`.
+    """
+    try:
+        found = as_numbers(values)
+        return found if count is None else found.reshape((count,))
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{what}: expected {expected}, found {short(values)}") from None
+
+
 def numbers_or_nan(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """An array of real numbers; of other values a single NaN, in one dimension."""
     try:

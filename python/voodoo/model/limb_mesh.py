@@ -30,12 +30,11 @@ def limb_mesh(
     here = np.arange(_AROUND)
     following = (here + 1) % _AROUND
     n = _AROUND
-    triangles = np.vstack(
-        [
-            np.column_stack([here, following, n + here]),
-            np.column_stack([following, n + following, n + here]),
-            np.column_stack([np.full(n, 4 * n), 2 * n + following, 2 * n + here]),
-            np.column_stack([np.full(n, 4 * n + 1), 3 * n + here, 3 * n + following]),
-        ]
+    corners = (
+        (here, following, n + here),
+        (following, n + following, n + here),
+        (4 * n, 2 * n + following, 2 * n + here),
+        (4 * n + 1, 3 * n + here, 3 * n + following),
     )
+    triangles = np.vstack([np.column_stack(np.broadcast_arrays(*each)) for each in corners])
     return vertices.astype(np.float32), triangles.astype(np.uint32), normals.astype(np.float32)

@@ -1,4 +1,4 @@
-"""Reads TOML with errors of the caller's class, and writes it with tomlkit, which keeps comments."""
+"""Reads TOML with errors of the caller's class, and writes it with comments."""
 
 from __future__ import annotations
 
@@ -48,39 +48,9 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
 
 def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:
     """Entries as TOML, each below the lines of its comment."""
-    import tomlkit
+    from tomlkit import item
 
-    document = tomlkit.document()
-    document.add(tomlkit.comment(title))
-    document.add(tomlkit.nl())
+    blocks = [[f"# {title}"]]
     for name, value in values.items():
-        for line in notes.get(name, ()):
-            document.add(tomlkit.comment(line))
-        document.add(name, value)
-        document.add(tomlkit.nl())
-    return tomlkit.dumps(document).rstrip("\n") + "\n"
-
-
-def edited(
-    text: str, values: Mapping[str, Any], *, defaults: Mapping[str, Any], source: str, error: type[VoodooError]
-) -> str:
-    """Change values at the top level of a TOML text; comments, order and layout are kept.
-
-    Args:
-        text: the TOML.
-        values: by key; missing keys are appended unless they have their default values.
-        defaults: default values.
-        source: origin of the text, for the message.
-        error: class of the error.
-
-    Raises:
-        VoodooError: of the class `error`, see `parse_toml`.
-    """
-    import tomlkit
-
-    before = parse_toml(text, source=source, error=error)
-    document = tomlkit.parse(text)
-    for key, value in values.items():
-        if before[key] != value if key in before else value != defaults[key]:
-            document[key] = value
-    return tomlkit.dumps(document)
+        blocks.append([*(f"# {line}" for line in notes.get(name, ())), f"{name} = {item(value).as_string()}"])
+    return "\n\n".join(map("\n".join, blocks)) + "\n"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import struct
 from functools import lru_cache
 
 import numpy as np
@@ -23,7 +21,7 @@ def rigid(value: npt.ArrayLike, *, name: str = "world_from_sensor") -> npt.NDArr
         MeasurementError: another shape, not finite, or not a rotation and translation; names `name`.
     """
     pose = numbers_or_nan(value)
-    if pose.shape != (4, 4) or not _turns_and_shifts(pose.tobytes()):
+    if pose.shape != (4, 4) or not _is_rigid(pose.tobytes()):
         raise MeasurementError(f"{name}: expected a rigid 4x4 transform, found {value!r}")
     return pose
 
@@ -40,21 +38,16 @@ def inverse(a_from_b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return pose_of(a_from_b[:3, :3].T, -a_from_b[:3, :3].T @ a_from_b[:3, 3])
 
 
+def is_rigid(pose: npt.NDArray[np.float64], *, off: float = _OFF) -> bool:
+    """Whether a matrix is a rigid transform (4, 4), with a tolerance `off` of the products of the rotation's rows."""
+    if pose.shape != (4, 4) or not np.isfinite(pose).all() or (pose[3] != (0.0, 0.0, 0.0, 1.0)).any():
+        return False
+    turn = pose[:3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.abs(turn @ turn.T - np.eye(3)).max() <= off and np.linalg.det(turn) > 0.0)
+
+
 # Cached, because most sensors are static, and several steps of a frame check the same transform.
 @lru_cache(maxsize=64)
-def _turns_and_shifts(entries: bytes) -> bool:
-    # Sixteen numbers are faster without arrays; numbers that are not finite fail a comparison.
-    numbers = struct.unpack("16d", entries)
-    x, y, z, last = (numbers[start : start + 4] for start in (0, 4, 8, 12))
-    across = (y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0])
-    return (
-        all(abs(_dot(axis, axis) - 1.0) <= _OFF for axis in (x, y, z))
-        and all(abs(_dot(one, two)) <= _OFF for one, two in ((x, y), (y, z), (z, x)))
-        and _dot(x, across) > 0.0
-        and last == (0.0, 0.0, 0.0, 1.0)
-        and all(math.isfinite(row[3]) for row in (x, y, z))
-    )
-
-
-def _dot(a: tuple[float, ...], b: tuple[float, ...]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _is_rigid(entries: bytes) -> bool:
+    return is_rigid(np.frombuffer(entries).reshape(4, 4))

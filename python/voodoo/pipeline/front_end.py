@@ -1,19 +1,30 @@
 """Converts recorded measurements to the tracker's `Frame`: prediction, gates, agreement of rays, weights from standard
-deviations. All commands use this front end. Sensor-specific code is in the adapters, see `voodoo.sensors.adapters`."""
+deviations, detections where nobody is tracked. All commands use this front end, for one person and for several.
+
+Sensor-specific code is in the adapters, see `voodoo.sensors.adapters`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Any
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, Generic, TypeVar, cast, overload
 
+import numpy as np
+
+import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.measurements import RecordedFrame
-from voodoo.names import INPUTS
+from voodoo.model.body import Body
+from voodoo.names import INPUTS, SEARCHING
+from voodoo.people import Followed, People, PeopleEstimate
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.search import Search, nobody
-from voodoo.pipeline.starts.chosen import Starts
-from voodoo.sensors.adapters import Context, Memory, adapters_of, all_adapters
+from voodoo.pipeline.starts.base import FoundStart, StartFrame
+from voodoo.pipeline.starts.chosen import Starts, automatic_starts
+from voodoo.sensors.adapters import NOBODY, Adapter, Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sensor import KeypointReport
 from voodoo.sensors.rays import SiteRay
@@ -21,41 +32,80 @@ from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker
 from voodoo.tracker import Tracker
 
-__all__ = ["INPUTS", "LEVEL_FRAMES", "FrontEnd", "FrontEndSettings", "paired"]
+__all__ = ["INPUTS", "LEVEL_FRAMES", "ONE", "FrontEnd", "FrontEndSettings", "nobody", "paired"]
+
+E = TypeVar("E", Estimate, PeopleEstimate)
+
+ONE = 1
+"""Number of the person if a `Tracker` follows one."""
 
 
-class FrontEnd:
-    """Feeds one tracker from recorded measurements of any kind.
+@dataclass
+class _Person:
+    """State of one person that is kept between frames."""
+
+    gate: SiteGate
+    memory: Memory
+    trusted_start: bool
+
+    def __copy__(self) -> _Person:
+        return replace(self, gate=copy(self.gate), memory=copy(self.memory))
+
+
+class FrontEnd(Generic[E]):
+    """Feeds a tracker of one person, or of several, from recorded measurements of any kind.
 
     Args:
-        tracker: with a first pose (`reset`), or without one; then the first pose is searched for in the measurements.
+        tracker: a `Tracker`, with a pose or without one, or `People`.
         settings: see FrontEndSettings.
-        starts: sources of the first pose; None: every kind of measurement that can give one.
+        starts: sources of detections beside the tracker's own detector; None: every kind of measurement that can give one.
 
     Attributes:
-        search: whether a person is tracked, and how the first pose was found.
-        memory: state that the adapters keep between frames.
+        found: the detection by which a `Tracker` got its pose; None for one that was set, or found by the tracker's own detector.
+            Set it before a frame to let a `Tracker` without a pose follow that person.
+        memory: state that the adapters keep between frames; of several persons each has a memory of their own.
         rays: rays of the last frame, with their trust.
     """
 
+    @overload
     def __init__(
-        self, tracker: Tracker, *, settings: FrontEndSettings | None = None, starts: Starts | None = None
+        self: FrontEnd[Estimate],
+        tracker: Tracker,
+        *,
+        settings: FrontEndSettings | None = None,
+        starts: Starts | None = None,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: FrontEnd[PeopleEstimate],
+        tracker: People,
+        *,
+        settings: FrontEndSettings | None = None,
+        starts: Starts | None = None,
+    ) -> None: ...
+    def __init__(
+        self, tracker: Tracker | People, *, settings: FrontEndSettings | None = None, starts: Starts | None = None
     ) -> None:
         """Start from the current state of the tracker."""
         self.tracker = tracker
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
         self.rays: list[SiteRay] = []
-        self.search = Search(tracker, starts)
+        self.found: FoundStart | None = None
+        self._starts = starts or automatic_starts()
         self._frozen = FrozenSensors()
-        self._begin()
+        self._alive: Sequence[Any] = ()
+        self._persons: dict[int, _Person] = {}
+        self._lost = False
+        if not isinstance(tracker, People) and tracker.estimate.joints:
+            self._persons[ONE] = self._new(trusted_start=True)
+        # Adapters of the scene query the tracked person; among several there is no single one.
+        self._nobody = Tracker(Body.human()) if isinstance(tracker, People) else tracker
 
-    def _begin(self) -> None:
-        """Clear all state for a new person."""
-        chosen = self.settings
-        # The pose was set by the user, or by a source other than the tracker.
-        self._trusted_start = self.search.posed
-        self._gate = SiteGate(chosen.gate_radius, chosen.gate_growth, chosen.gate_widest)
+    @property
+    def posed(self) -> bool:
+        """Whether anybody is tracked."""
+        return bool(self._persons)
 
     @property
     def frozen(self) -> tuple[str, ...]:
@@ -72,11 +122,12 @@ class FrontEnd:
         """The skin cue of each color camera."""
         return self.memory.all("skin")
 
-    def step(self, recorded: RecordedFrame) -> Estimate:
+    def step(self, recorded: RecordedFrame) -> E:
         """Make the frame, step the tracker, and learn from the estimate.
 
         Returns:
-            The estimate. Its status is "searching" and it has no joints if no person was found yet, or the person has left.
+            The estimate. That of a `Tracker` has the status "searching" and no joints if no person was found yet, or the
+            person has left.
 
         Raises:
             MeasurementError: a measurement is invalid.
@@ -87,71 +138,163 @@ class FrontEnd:
         """
         before = self._state()
         try:
-            frame = self.frame(recorded)
-            steps = self.search.posed or self.search.by_tracker
-            estimate = self.tracker.step(frame) if steps else nobody(recorded.stamp)
+            frame, own, detected = self._frames(recorded)
+            if isinstance(self.tracker, People):
+                estimate: Estimate | PeopleEstimate = self.tracker.step(frame, own=own)
+            elif self._persons or detected or (self._starts.by_tracker and self.tracker.can_search):
+                estimate = self.tracker.step(frame)
+            else:
+                estimate = nobody(recorded.stamp)
         except BaseException:
-            if self.search.posed and not before["search"].posed:
+            if not isinstance(self.tracker, People) and self._persons and not before["_persons"]:
                 self.tracker.search()
             vars(self).update(before)
             raise
-        was_posed = self.search.posed
-        if steps:
-            estimate = self.search.learn(estimate)
-        if self.search.posed:
-            self._learn(recorded, estimate)
-        elif was_posed:
-            self._forget()
-        else:
-            self.rays = []
-        return estimate
-
-    def _learn(self, recorded: RecordedFrame, estimate: Estimate) -> None:
-        for item in recorded.measurements:
-            for adapter in adapters_of(item):
-                adapter.learn(item, estimate, self.memory, trusted_start=self._trusted_start)
-        self._trusted_start = False
-
-    def _forget(self) -> None:
-        """Clear what was learned about a person who left: the next one moves and looks different."""
-        self.rays = []
-        for adapter in all_adapters():
-            adapter.forget(self.memory)
-        self._begin()
-
-    def _state(self) -> dict[str, Any]:
-        """Snapshot of all state that `frame` changes."""
-        return {
-            "rays": self.rays,
-            "memory": copy(self.memory),
-            "_frozen": copy(self._frozen),
-            "_gate": copy(self._gate),
-            "search": copy(self.search),
-            "_trusted_start": self._trusted_start,
-        }
+        self._learn(estimate, trusted_start=detected)
+        return cast(E, estimate)
 
     def frame(self, recorded: RecordedFrame) -> Frame:
-        """Make the tracker's frame without stepping. A tracker without a pose is reset to a first pose if a source finds one."""
-        use = self.settings.use
-        alive = self._frozen.without(recorded.measurements, use=use)
-        if self.search.is_due(recorded.stamp):
-            used = [item for item in alive if any(adapter.kind in use for adapter in adapters_of(item))]
-            if self.search.search(recorded.stamp, used, self.settings):
-                self._begin()
-        context = Context(
-            stamp=recorded.stamp,
+        """Make the tracker's frame without stepping; that of several persons lacks what belongs to one of them."""
+        return self._frames(recorded)[0]
+
+    def _frames(self, recorded: RecordedFrame) -> tuple[Frame, dict[int, Frame], bool]:
+        """The frame, those of single persons, and whether there are detections in it."""
+        stamp, use, alone = recorded.stamp, self.settings.use, not isinstance(self.tracker, People)
+        clothes = not alone and cast(People, self.tracker).needs_color
+        unused = not (alone or clothes or ("skin" in use and self.settings.skin.each))
+        alive = self._frozen.without(recorded.measurements, use=use, idle=lambda item: unused and _is_colored(item))
+        self._alive = alive
+        used = [item for item in alive if any(adapter.kind in use for adapter in adapters_of(item))]
+        self._take_given(stamp, used)
+        persons = self._contexts(stamp, alive)
+        frame = Frame(stamp=stamp)
+        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, alive, self._nobody, {})
+        scene.add_scene(frame)
+        own = {number: frame if alone else Frame(stamp=stamp) for number in persons}
+        spare: list[Any] = []
+        filled: set[int] = set()
+        item: Any
+        for item in used:
+            for adapter in adapters_of(item):
+                if adapter.kind not in use:
+                    continue
+                if adapter.while_searching:
+                    adapter.add(frame, item, scene)
+                    spare.append(item)
+                    continue
+                shares = dict.fromkeys(persons, item) if alone else self._shares(adapter, item, persons)
+                for number, part in shares.items():
+                    if number == NOBODY:
+                        spare.append(part)
+                    else:
+                        adapter.add(own[number], part, persons[number])
+                        filled.add(number)
+            if clothes and _is_colored(item):
+                # Colors of clothes distinguish persons.
+                frame.add_color(
+                    item.image, camera=item.camera, world_from_sensor=item.root_from_sensor, source=item.sensor
+                )
+        self.rays = [ray for number, context in persons.items() for ray in context.add_rays(own[number])]
+        if alone:
+            spare = [] if persons and not self._lost else used
+        detected = self._detect(frame, spare)
+        return frame, {number: own[number] for number in sorted(filled)}, detected
+
+    def _shares(self, adapter: Adapter[Any], item: Any, persons: Mapping[int, Context]) -> Mapping[int, Any]:  # noqa: ANN401
+        return adapter.shares(item, persons) if persons else {NOBODY: item}
+
+    def _contexts(self, stamp: float, alive: Sequence[Any]) -> dict[int, Context]:
+        """What the adapters may read about every person who is tracked."""
+        bodies: dict[int, Tracker | Followed] = {}
+        if isinstance(self.tracker, People):
+            bodies = {number: Followed(self.tracker, number) for number in self.tracker.numbers}
+        elif self._persons:
+            bodies = {ONE: self.tracker}
+        everybody = {number: self._context(stamp, alive, body, body.predict(stamp)) for number, body in bodies.items()}
+        for number, context in everybody.items():
+            person = self._persons.setdefault(number, self._new(trusted_start=False))
+            others = [body for other, body in bodies.items() if other != number and isinstance(body, Followed)]
+            everybody[number] = replace(context, gate=person.gate, memory=person.memory, others=others)
+        return everybody
+
+    def _context(
+        self, stamp: float, alive: Sequence[Any], tracker: Tracker | Followed, predicted: Mapping[str, Any]
+    ) -> Context:
+        return Context(
+            stamp=stamp,
             measurements=alive,
-            predicted=self.tracker.predict(recorded.stamp) if self.search.posed else {},
+            predicted=predicted,
             settings=self.settings,
-            tracker=self.tracker,
-            gate=self._gate,
+            tracker=tracker,
+            gate=self._gate(),
             memory=self.memory,
         )
-        frame = Frame(stamp=recorded.stamp)
-        context.add_scene(frame)
-        for item in alive:
-            for adapter in adapters_of(item):
-                if adapter.kind in use and (self.search.posed or adapter.while_searching):
-                    adapter.add(frame, item, context)
-        self.rays = context.add_rays(frame)
-        return frame
+
+    def _gate(self) -> SiteGate:
+        return SiteGate(self.settings.gate_radius, self.settings.gate_growth, self.settings.gate_widest)
+
+    def _new(self, *, trusted_start: bool) -> _Person:
+        memory = Memory() if isinstance(self.tracker, People) else self.memory
+        return _Person(self._gate(), memory, trusted_start)
+
+    def _take_given(self, stamp: float, used: Sequence[Any]) -> None:
+        """Set the pose of a `Tracker` that was given for this frame."""
+        if isinstance(self.tracker, People) or self._persons:
+            return
+        for finder in self._starts.finders:
+            if finder.given and (found := finder.find(StartFrame(stamp, used, self.tracker.body, self.settings))):
+                self.tracker.reset(joints={name: tuple(at) for name, at in found[0].joints.items()}, fit_sizes=True)
+                self._persons[ONE] = self._new(trusted_start=True)
+
+    def _detect(self, frame: Frame, spare: Sequence[Any]) -> bool:
+        """Add the persons who are found in measurements that belong to nobody; returns whether there are any."""
+        alone = not isinstance(self.tracker, People)
+        body = self.tracker.prototype if isinstance(self.tracker, People) else self.tracker.body
+        found: Sequence[FoundStart] = [] if self.found is None or self._persons else [self.found]
+        for finder in self._starts.finders:
+            if not found and not finder.given and spare:
+                found = finder.find(StartFrame(frame.stamp, spare, body, self.settings))
+        # A single person is there; of several detections the best one is followed.
+        for one in found[:1] if alone else found:
+            weight = self.settings.model.weight(float(np.median(list(one.sigma.values()))))
+            frame.add_detection(one.joints, log_odds=inf if alone else one.log_odds, weight=weight, source=one.by)
+        self.found = found[0] if alone and found else self.found
+        return bool(found)
+
+    def _learn(self, estimate: Estimate | PeopleEstimate, *, trusted_start: bool) -> None:
+        """Update what is kept of the persons who are there, and forget the others."""
+        if isinstance(estimate, PeopleEstimate):
+            there = {person.id: person.estimate for person in estimate}
+        else:
+            there = {ONE: estimate} if estimate.joints else {}
+            self._lost = str(estimate.status) == "lost"
+            if self._persons and not there:
+                # The next person moves and looks different.
+                for adapter in all_adapters():
+                    adapter.forget(self.memory)
+        self.found = self.found if there else None
+        self.rays = self.rays if there else []
+        self._persons = {number: person for number, person in self._persons.items() if number in there}
+        for number, found in there.items():
+            person = self._persons.setdefault(number, self._new(trusted_start=trusted_start))
+            for item in self._alive:
+                for adapter in adapters_of(item):
+                    adapter.learn(item, found, person.memory, trusted_start=person.trusted_start)
+            person.trusted_start = False
+
+    def _state(self) -> dict[str, Any]:
+        """Snapshot of all state that a frame changes."""
+        kept = {name: copy(vars(self)[name]) for name in ("memory", "_frozen")}
+        persons = {number: copy(person) for number, person in self._persons.items()}
+        if not isinstance(self.tracker, People):
+            persons = {number: replace(person, memory=kept["memory"]) for number, person in persons.items()}
+        return {**kept, "_persons": persons, "rays": self.rays, "found": self.found, "_lost": self._lost}
+
+
+def _is_colored(item: Any) -> bool:  # noqa: ANN401
+    return any(adapter.colored for adapter in adapters_of(item))
+
+
+def nobody(stamp: float) -> Estimate:
+    """The estimate of a frame in which nobody is tracked: status "searching", no joints, no limbs."""
+    return _core._estimate((stamp, SEARCHING, float("nan"), 0), ([], [], [], []), ([], [], [], [], [], [], []))

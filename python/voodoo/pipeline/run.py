@@ -1,27 +1,26 @@
-"""Tracking loop for one person in a recording, which the command line, the demo and the evaluation share."""
+"""Tracking loop over a recording, which the command line, the demo and the evaluation share."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, Generic, overload
 
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.measurements import ColorImage, Measurement, RecordedFrame
-from voodoo.pipeline.front_end import FrontEnd
+from voodoo.people import People, PeopleEstimate
+from voodoo.pipeline.front_end import E, FrontEnd
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.start import Init, start_tracker
+from voodoo.pipeline.start import Init, check_findable, start_tracker
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 
-__all__ = ["Init", "TrackedFrame", "decodable", "start_tracker", "stepped", "track"]
-
-T = TypeVar("T")
+__all__ = ["Init", "TrackedFrame", "decodable", "start_tracker", "track"]
 
 
 def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, ...], list[VoodooError]]:
@@ -38,24 +37,25 @@ def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, .
 
 
 @dataclass(frozen=True)
-class TrackedFrame:
+class TrackedFrame(Generic[E]):
     """One frame with its estimate.
 
     Args:
         index: number in the recording, from 0.
         recorded: the measurements.
-        estimate: the estimated pose.
+        estimate: the estimated pose, or those of all persons.
         seconds: wall-clock time from measurements in memory to the estimate [s]; pictures are decoded within it.
         front_end: the front end that made the tracker's frame; its rays and skin candidates are those of this frame.
     """
 
     index: int
     recorded: RecordedFrame
-    estimate: Estimate
+    estimate: E
     seconds: float
-    front_end: FrontEnd
+    front_end: FrontEnd[E]
 
 
+@overload
 def track(
     recording: Recording,
     tracker: Tracker,
@@ -63,43 +63,46 @@ def track(
     settings: FrontEndSettings | None = None,
     starts: Starts | None = None,
     left_out: LeftOut | None = None,
-) -> Iterator[TrackedFrame]:
+) -> Iterator[TrackedFrame[Estimate]]: ...
+@overload
+def track(
+    recording: Recording,
+    tracker: People,
+    *,
+    settings: FrontEndSettings | None = None,
+    starts: Starts | None = None,
+    left_out: LeftOut | None = None,
+) -> Iterator[TrackedFrame[PeopleEstimate]]: ...
+def track(
+    recording: Recording,
+    tracker: Any,
+    *,
+    settings: FrontEndSettings | None = None,
+    starts: Starts | None = None,
+    left_out: LeftOut | None = None,
+) -> Iterator[TrackedFrame[Any]]:
     """Step the tracker through a recording, by the front end that every command uses.
 
     Between two yields `tracker` holds the model of the frame yielded last.
 
     Args:
         recording: read while iterating.
-        tracker: see start_tracker; one without a pose searches.
+        tracker: see start_tracker, one without a pose searches; or `People`, whose persons are found as they come.
         settings: which inputs are used and how; None means all available ones, see FrontEndSettings.of.
-        starts: sources of the first pose; None: all that the recording offers.
+        starts: sources of detections; None: all that the recording offers.
         left_out: counts undecodable images and frames that the tracker rejects, which are then left out; None: they are errors.
 
     Raises:
         VoodooError: the recording is damaged, or the tracker rejects a frame; names the frame.
     """
-    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
-    for index, recorded, estimate, seconds in stepped(recording, front_end.step, left_out):
-        yield TrackedFrame(index, recorded, estimate, seconds, front_end)
-
-
-def stepped(
-    recording: Recording, step: Callable[[RecordedFrame], T], left_out: LeftOut | None
-) -> Iterator[tuple[int, RecordedFrame, T, float]]:
-    """Number, measurements, result and seconds of every frame that could be stepped.
-
-    Args:
-        recording: read while iterating.
-        step: the step function of a front end.
-        left_out: see track.
-
-    Raises:
-        VoodooError: see track.
-    """
+    settings = settings or FrontEndSettings.of(recording)
+    if isinstance(tracker, People):
+        check_findable(recording, tracker, settings.use)
+    front_end: FrontEnd[Any] = FrontEnd(tracker, settings=settings, starts=starts)
     for index, recorded in enumerate(paired(recording)):
         began = time.perf_counter()
         try:
-            estimate = step(recorded)
+            estimate = front_end.step(recorded)
         except VoodooError as error:
             if left_out is None:
                 raise VoodooError(f"{recording.name}, frame {index} (stamp {recorded.stamp:.6f} s): {error}") from error
@@ -108,8 +111,8 @@ def stepped(
                 left_out.add_error(problem)
             recorded = RecordedFrame(recorded.stamp, kept)
             try:
-                estimate = step(recorded)
+                estimate = front_end.step(recorded)
             except VoodooError as refusal:
                 left_out.add("that the tracker refuses", f"{recording.name}, frame {index}: {refusal}")
                 continue
-        yield index, recorded, estimate, time.perf_counter() - began
+        yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began, front_end)

@@ -20,6 +20,7 @@ from voodoo.model.body import Body
 from voodoo.model.joint import short, valid
 from voodoo.model.legs import legs_body
 from voodoo.names import HumanModel
+from voodoo.people import People
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.starts.chosen import Starts
@@ -154,16 +155,56 @@ def start_tracker(
         VoodooError: the first pose does not determine the pose of this body, both body and height are given, a marker stands
             for a site that the body does not have, or there is neither a pose nor an input in which this body could be found.
     """
+    init = init or Init.of(recording) or AUTO
+    if height is None and body is None and isinstance(init, Init):
+        height = init.height_m
+    legs = init == AUTO and _only_laser(recording, use)
+    tracker = Tracker(
+        _body(body, height=height, model=model, markers=markers, legs=legs), config=config, detector=detector
+    )
+    if init == AUTO:
+        check_findable(recording, tracker, use)
+    if isinstance(init, Init) and init.stamp_s is None:
+        tracker.reset(joints=dict(init.in_root_frame(recording).joints), fit_sizes=True)
+    return tracker
+
+
+def start_people(
+    recording: Recording,
+    *,
+    body: Body | None = None,
+    height: float | None = None,
+    model: HumanModel | None = None,
+    config: Config | None = None,
+    markers: MarkerMap | None = None,
+    use: Sequence[str] | None = None,
+    detector: AnyDetector = "shipped",
+    limit: int | None = None,
+) -> People:
+    """A tracker of the persons in a recording, who are found as they come.
+
+    Args:
+        body, height, model, config, markers, use, detector: see `start_tracker`.
+        limit: largest number of persons, see `People`.
+
+    Raises:
+        VoodooError: see `start_tracker`.
+    """
+    body = _body(body, height=height, model=model, markers=markers, legs=False)
+    people = People(body, config=config, detector=detector, limit=limit)
+    check_findable(recording, people, use)
+    return people
+
+
+def _body(
+    body: Body | None, *, height: float | None, model: HumanModel | None, markers: MarkerMap | None, legs: bool
+) -> Body:
+    """The body to track; by default a human, or two legs."""
     if body is not None and height is not None:
         raise VoodooError("body and height: expected at most one of them, found both")
-    init = init or Init.of(recording) or AUTO
     if body is None:
-        stature = height if height is not None else init.height_m if isinstance(init, Init) else None
-        known = {} if stature is None else {"height": stature}
-        if init == AUTO and model is None and _only_laser(recording, use):
-            body = legs_body(**known)
-        else:
-            body = Body.human(**known, model=model or "measured")
+        known = {} if height is None else {"height": height}
+        body = legs_body(**known) if legs and model is None else Body.human(**known, model=model or "measured")
     if markers is not None and markers.limbs:
         body = body_with_markers(body, markers.worn())
     for marker, site in () if markers is None else markers.sites.items():
@@ -171,12 +212,7 @@ def start_tracker(
             raise VoodooError(
                 f"marker {marker}: expected one of the sites {', '.join(body.site_names)}, found {short(site)}"
             )
-    tracker = Tracker(body, config=config if config is not None else Config(), detector=detector)
-    if init == AUTO:
-        _check_findable(recording, tracker, use)
-    if isinstance(init, Init) and init.stamp_s is None:
-        tracker.reset(joints=dict(init.in_root_frame(recording).joints), fit_sizes=True)
-    return tracker
+    return body
 
 
 def starts_of(init: Beginning | None, recording: Recording) -> Starts | None:
@@ -222,7 +258,7 @@ def first_pose(
                 raise
             left_out.add_error(error)
             continue
-        if front_end.search.posed:
+        if front_end.posed:
             return estimate
     return None
 
@@ -266,18 +302,31 @@ def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
     return _kinds(recording, use) - {"skin", "color"} == {"scan"}
 
 
-def _check_findable(recording: Recording, tracker: Tracker, use: Sequence[str] | None) -> None:
-    """Raise an error if no input of the recording can be used to find this body."""
+def check_findable(recording: Recording, tracker: Tracker | People, use: Sequence[str] | None) -> None:
+    """Raise an error if no input of the recording can be used to find this body.
+
+    Raises:
+        VoodooError: names the inputs; persons who were added to `People` need not be found.
+    """
+    several = isinstance(tracker, People)
+    if isinstance(tracker, People):
+        if tracker.numbers:
+            return
+        tracker = Tracker(tracker.prototype, detector=tracker.detector)
     kinds, body = _kinds(recording, use), tracker.body
     blind = {"points", "skin", "color"}
     if not tracker.can_search:
         blind.add("depth")
-    if not serves(body):
+    if several or not serves(body):
         blind.add("scan")
     if kinds and kinds <= blind:
+        alone = f"by {', '.join(sorted(map(str, kinds)))} alone the body {body.name!r} is not found"
+        if several:
+            raise VoodooError(
+                f"{recording.name}: {alone}; several people are found in depth images, keypoints and markers"
+            )
         raise VoodooError(
-            f"{recording.name}: expected a first pose, found none, and by {', '.join(sorted(map(str, kinds)))} alone the body "
-            f"{body.name!r} is not found; give a pose with --init FILE, a JSON file like "
+            f"{recording.name}: expected a first pose, found none, and {alone}; give a pose with --init FILE, a JSON file like "
             '{"height_m": 1.76, "joints": {"l_shoulder": [x, y, z], "r_hip": [x, y, z], ...}} '
             f"in meters in the frame {recording.root_frame!r}"
         )

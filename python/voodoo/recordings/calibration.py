@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,10 +13,12 @@ from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
+from voodoo.model.transforms import is_rigid
 from voodoo.recordings.camera_yaml import camera_tables
 from voodoo.recordings.pictures import picture_size
 from voodoo.stored import read_stored
 
+T = TypeVar("T")
 _CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL_KEYS = ("distortion", "model", "mirrored", "sensor_frame", "root_from_sensor")
 _ROUNDING, _TYPED = 1e-9, 2e-3
@@ -88,15 +90,12 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
         raise RecordingError(f"{path}: depth_factor: expected units per meter > 0, found {short(factor)}")
     color = None
     if "color" in content:
-        table = content["color"]
-        if not isinstance(table, dict):
-            raise RecordingError(f"{path}: color: expected a table, found {short(table)}")
+        table = _entry(content, "color", dict, {}, "a table", str(path))
         _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
         color = _camera(table, "color", f"{path}, [color]")
     unmoved = np.array_equal(depth.root_from_sensor, np.eye(4))
-    root_frame = content.get("root_frame", depth.sensor_frame if unmoved else "root")
-    if not isinstance(root_frame, str):
-        raise RecordingError(f"{path}: root_frame: expected a name, found {short(root_frame)}")
+    otherwise = depth.sensor_frame if unmoved else "root"
+    root_frame = _entry(content, "root_frame", str, otherwise, "a name", str(path))
     return FolderCalibration(root_frame, float(factor), depth, color)
 
 
@@ -123,22 +122,28 @@ def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
         )
 
 
+def _entry(table: dict[str, Any], key: str, kind: type[T], otherwise: T, expected: str, where: str) -> T:
+    """An entry of a kind.
+
+    Raises:
+        RecordingError: it is of another one.
+    """
+    value = table.get(key, otherwise)
+    if not isinstance(value, kind):
+        raise RecordingError(f"{where}: {key}: expected {expected}, found {short(value)}")
+    return value
+
+
 def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
-    distortion = table.get("distortion", [])
-    if not isinstance(distortion, list):
-        raise RecordingError(f"{where}: distortion: expected a list of numbers, found {short(distortion)}")
+    distortion = _entry(table, "distortion", list, [], "a list of numbers", where)
     with naming(where, CameraError, error=RecordingError):
         camera = Camera(
             **{key: table[key] for key in _CAMERA_KEYS},
             distortion=tuple(distortion),
             model=table.get("model", "plumb_bob"),
         )
-    frame = table.get("sensor_frame", f"camera_{kind}_optical_frame")
-    if not isinstance(frame, str):
-        raise RecordingError(f"{where}: sensor_frame: expected a name, found {short(frame)}")
-    mirrored = table.get("mirrored", False)
-    if not isinstance(mirrored, bool):
-        raise RecordingError(f"{where}: mirrored: expected true or false, found {short(mirrored)}")
+    frame = _entry(table, "sensor_frame", str, f"camera_{kind}_optical_frame", "a name", where)
+    mirrored = _entry(table, "mirrored", bool, False, "true or false", where)
     return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where), mirrored)
 
 
@@ -146,14 +151,7 @@ def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here
     if rows is None:
         return np.eye(4)
     pose = numbers_or_nan(rows)
-    rigid = (
-        pose.shape == (4, 4)
-        and np.isfinite(pose).all()
-        and np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=_TYPED)
-        and np.linalg.det(pose[:3, :3]) > 0.0
-        and np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0))
-    )
-    if not rigid:
+    if not is_rigid(pose, off=_TYPED):
         raise RecordingError(
             f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {short(rows)}"
         )

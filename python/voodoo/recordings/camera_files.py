@@ -14,7 +14,7 @@ from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
-from voodoo.model.transforms import pose_of
+from voodoo.model.transforms import is_rigid, pose_of
 from voodoo.recordings.camera_yaml import camera_tables
 
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
@@ -88,7 +88,7 @@ def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float)
     turn = _numbers(where, table, "rotation", None)
     if turn.shape != (3, 3):
         turn = np.asarray(cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))[0], dtype=np.float64)
-    elif not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) or np.linalg.det(turn) < 0.0:
+    elif not is_rigid(pose_of(turn), off=1e-3):
         raise RecordingError(f"{where}, rotation: expected a rotation, found {short(table['rotation'])}")
     pose = pose_of(turn.T, -turn.T @ _numbers(where, table, "translation", (3,)) * meters_per_unit)
     name = table.get("name", key)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -32,25 +31,32 @@ _PADDING_PX = 16
 """Video codecs crop or pad images at the right and bottom to a multiple of 16 pixels, or leave that to the player."""
 
 
-class Pictures(ABC):
+class Pictures:
     """The images of one calibrated camera.
 
     Args:
         sensor: name of the video or folder.
         placed: the camera, as calibrated.
         size: (width, height) of the images [px].
+        stamps: of the images [s].
+        reader: makes a function that returns the image with a number; sequential access is fastest. It raises a RecordingError
+            for a damaged one.
 
     Attributes:
-        stamps: of the images [s].
         camera: calibration for the size of the images.
 
     Raises:
         RecordingError: the size of the images differs from the calibration.
     """
 
-    stamps: Sequence[float]
-
-    def __init__(self, sensor: str, placed: PlacedCamera, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        sensor: str,
+        placed: PlacedCamera,
+        size: tuple[int, int],
+        stamps: Sequence[float],
+        reader: Callable[[], Callable[[int], ByteImage]],
+    ) -> None:
         """Check the size."""
         calibrated = (placed.camera.width, placed.camera.height)
         if max(abs(a - b) for a, b in zip(size, calibrated, strict=True)) >= _PADDING_PX:
@@ -59,24 +65,20 @@ class Pictures(ABC):
                 f"{size[0]}x{size[1]}",
                 reason="of another size than calibrated",
             )
-        self.sensor, self.placed = sensor, placed
+        self.sensor, self.placed, self.stamps, self._reader = sensor, placed, stamps, reader
         self.camera: Camera = replace(placed.camera, width=size[0], height=size[1])
 
     def __iter__(self) -> Iterator[ColorImage]:
-        """The images, each decoded on access; sequential access is fastest."""
+        """The images, each decoded on access."""
         picture = self._reader()
         for index, stamp in enumerate(self.stamps):
             yield ColorImage(
                 self.sensor, stamp, partial(picture, index), self.camera, np.array(self.placed.world_from_sensor)
             )
 
-    @abstractmethod
-    def _reader(self) -> Callable[[int], ByteImage]:
-        """Function that returns the image with a number; raises a RecordingError if it is damaged."""
 
-
-class Video(Pictures):
-    """A video file.
+def of_video(path: Path, sensor: str, placed: PlacedCamera, rate: float | None) -> Pictures:
+    """The images of a video.
 
     Args:
         path: the file.
@@ -87,28 +89,20 @@ class Video(Pictures):
     Raises:
         RecordingError: not a video, or of another size than calibrated.
     """
-
-    def __init__(self, path: Path, sensor: str, placed: PlacedCamera, rate: float | None) -> None:
-        """Read size, rate and number of images."""
-        self._path = path
-        film = _opened(path)
-        count = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
-        size = (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
-        stored_rate = float(film.get(cv2.CAP_PROP_FPS))
-        film.release()
-        rate = stored_rate if rate is None else rate
-        # An image takes at least one byte: a damaged header may announce billions of images.
-        if not (0 < count <= path.stat().st_size and np.isfinite(rate) and 0.0 < rate < 1e5):
-            raise RecordingError(f"{path}: expected pictures at a rate above zero, found {count} at {rate} a second")
-        super().__init__(sensor, placed, size)
-        self.stamps = (np.arange(count) / rate).tolist()
-
-    def _reader(self) -> Callable[[int], ByteImage]:
-        return _VideoReader(self._path, len(self.stamps), (self.camera.width, self.camera.height)).picture
+    film = _opened(path)
+    count = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
+    size = (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
+    rate = float(film.get(cv2.CAP_PROP_FPS)) if rate is None else rate
+    film.release()
+    # An image takes at least one byte: a damaged header may announce billions of images.
+    if not (0 < count <= path.stat().st_size and np.isfinite(rate) and 0.0 < rate < 1e5):
+        raise RecordingError(f"{path}: expected pictures at a rate above zero, found {count} at {rate} a second")
+    stamps = (np.arange(count) / rate).tolist()
+    return Pictures(sensor, placed, size, stamps, lambda: _VideoReader(path, count, size).picture)
 
 
-class PictureFolder(Pictures):
-    """A folder of PNG or JPEG files, named by stamps or numbered.
+def of_folder(files: Sequence[Path], sensor: str, placed: PlacedCamera, clock: FrameClock) -> Pictures:
+    """The images in PNG or JPEG files, named by stamps or numbered.
 
     Args:
         files: the images.
@@ -119,20 +113,17 @@ class PictureFolder(Pictures):
     Raises:
         RecordingError: the first image cannot be read or has another size than calibrated, or two have the same stamp.
     """
+    size = picture_size(read_stored(min(files), "a readable picture"), min(files))
+    stamps, ordered = zip(
+        *sorted(zip(clock.of([Path(_number(file)) for file in files]), files, strict=True)), strict=True
+    )
+    if len(set(stamps)) < len(stamps):
+        raise RecordingError(f"{sensor}: expected a number or stamp for each picture, found one twice")
 
-    def __init__(self, files: Sequence[Path], sensor: str, placed: PlacedCamera, clock: FrameClock) -> None:
-        """Find the stamps; see the class."""
-        first = min(files)
-        super().__init__(sensor, placed, picture_size(read_stored(first, "a readable picture"), first))
-        pairs = sorted(zip(clock.of([Path(_number(file)) for file in files]), files, strict=True))
-        self.stamps = [stamp for stamp, _ in pairs]
-        self._files = [file for _, file in pairs]
-        if len(set(self.stamps)) < len(pairs):
-            raise RecordingError(f"{sensor}: expected a number or stamp for each picture, found one twice")
+    def picture(index: int) -> ByteImage:
+        return decode_color(read_stored(ordered[index], "a picture"), ordered[index], size)
 
-    def _reader(self) -> Callable[[int], ByteImage]:
-        size = (self.camera.width, self.camera.height)
-        return lambda index: decode_color(read_stored(self._files[index], "a picture"), self._files[index], size)
+    return Pictures(sensor, placed, size, stamps, lambda: picture)
 
 
 def pictures_in(folder: Path) -> list[Path]:

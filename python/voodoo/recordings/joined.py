@@ -179,7 +179,7 @@ class WithKeypoints(Around):
         people = [
             rows
             for files in self._files.values()
-            for found in some_of(len(files), partial(_read, files, layout, unread), good=bool)
+            for found in some_of(files, partial(read_people, layout=layout, left_out=unread), good=bool)
             for rows in found
         ]
         self._layout, notes = taken_layout(people, layout)
@@ -221,7 +221,7 @@ class WithKeypoints(Around):
         return KeypointImage(
             sensor=f"{item.sensor}/keypoints",
             stamp=item.stamp,
-            people=_read(self._files[item.sensor], self._layout, self._left_out, number),
+            people=read_people(self._files[item.sensor][number], layout=self._layout, left_out=self._left_out),
             layout=self._layout,
             camera=item.camera,
             root_from_sensor=item.root_from_sensor,
@@ -230,10 +230,3 @@ class WithKeypoints(Around):
     def info(self) -> RecordingInfo:
         """The summary of the recording, with the keypoints."""
         return self._info(self._files, f"{self._layout} keypoints", self._said)
-
-
-def _read(
-    files: Sequence[Path | None], layout: str | None, left_out: LeftOut | None, index: int
-) -> tuple[FloatArray, ...]:
-    file = files[index]
-    return () if file is None else read_people(file, layout=layout, left_out=left_out)

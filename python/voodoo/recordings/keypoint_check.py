@@ -15,6 +15,7 @@ from voodoo.measurements import FloatArray, KeypointImage
 from voodoo.model.camera import Camera
 from voodoo.recordings.keypoint_layouts import LAYOUTS, layout_by_shape
 
+S = TypeVar("S")
 T = TypeVar("T")
 Instant: TypeAlias = Sequence[KeypointImage]
 """The keypoints of all cameras at one time."""
@@ -64,12 +65,13 @@ class Agreement:
     spread: float
 
 
-def some_of(count: int, read: Callable[[int], T], *, good: Callable[[T], object]) -> list[T]:
-    """A few good items, spread over `count`; all are read only if few are good."""
+def some_of(places: Sequence[S], read: Callable[[S], T], *, good: Callable[[T], object]) -> list[T]:
+    """A few good items, spread over their places; all are read only if few are good."""
+    count = len(places)
     step = max(count // _INSTANTS, 1)
     found = []
     for index in dict.fromkeys((*range(step // 2, count, step), *range(count))):
-        item = read(index)
+        item = read(places[index])
         if good(item):
             found.append(item)
         if len(found) == _INSTANTS:
@@ -196,8 +198,7 @@ def _meeting(
 def _reading(instants: Sequence[Instant], *, sizes: Sequence[float]) -> tuple[Agreement, str] | None:
     """Another reading of the keypoints with which the rays meet best, in words; None: with none they do."""
     tried = [(agreement(instants, change), words) for words, change in readings(instants[0][0].camera, sizes)]
-    for order in _orders(instants[0]):
-        tried.append((agreement(_exchanged(instants, order)), _order_words(instants[0], order)))
+    tried += [(agreement(_exchanged(instants, it)), _order_words(instants[0], it)) for it in _orders(instants[0])]
     tried = [(each, words) for each, words in tried if _human(each) and each.distance < RIGHT_M]
     least = min((each.distance for each, _ in tried), default=np.inf)
     return next((one for one in tried if one[0].distance < least + _ALIKE_M), None)

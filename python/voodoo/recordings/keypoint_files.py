@@ -19,14 +19,15 @@ _MOST = 2**24
 """Largest size of a file [bytes]: a thousand people have a tenth of it."""
 
 
-def read_people(file: Path, *, layout: str | None, left_out: LeftOut | None) -> tuple[FloatArray, ...]:
-    """People in a keypoint file; an unreadable file is counted in `left_out` and has none, or is an error without it.
+def read_people(file: Path | None, *, layout: str | None, left_out: LeftOut | None) -> tuple[FloatArray, ...]:
+    """People in a keypoint file, none in a missing one (None); an unreadable file is counted in `left_out` and has none, or is an
+    error without it.
 
     Raises:
         RecordingError: see read_openpose_json.
     """
     with leaving_out(left_out):
-        return tuple(read_openpose_json(file, layout=layout))
+        return () if file is None else tuple(read_openpose_json(file, layout=layout))
     return ()
 
 

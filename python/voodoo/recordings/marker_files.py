@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import Field, FiniteFloat
 
 from voodoo.errors import RecordingError, shortened
 from voodoo.measurements import FloatArray, MarkerSet, RecordedFrame
 from voodoo.model.body import Body
-from voodoo.model.joint import valid
+from voodoo.model.joint import Strict, valid
 from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
@@ -24,7 +24,7 @@ _HIGH_M = 1.5
 """Markers of feet that are never lower are not those of who walks on the floor of the laboratory."""
 
 
-class OnLimb(BaseModel):
+class OnLimb(Strict):
     """The place of a marker on the body.
 
     Args:
@@ -32,13 +32,11 @@ class OnLimb(BaseModel):
         position: (x, y, z) [m] in the limb's frame.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     limb: str
     position: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
-class MarkerMap(BaseModel):
+class MarkerMap(Strict):
     """Assigns the markers of a file to sites and limbs.
 
     Args:
@@ -49,8 +47,6 @@ class MarkerMap(BaseModel):
             X_SCREEN only, the axis across it along which the body stands), else OpenSim's.
         sigma_m: standard deviation of a marker's position [m].
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     sites: dict[str, str] = Field(default_factory=dict)
     limbs: dict[str, OnLimb] = Field(default_factory=dict)

@@ -7,17 +7,15 @@ import io
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading, shortened
+from voodoo.measurements import FloatArray
 from voodoo.stored import read_stored, read_stored_text
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 Z_UP_FROM_Y_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation from OpenSim's axes (X forward, Y up, Z to the right) to REP-103's order of axes (Z up): (x, y, z) = (Z,
@@ -78,7 +76,7 @@ class MarkerTrajectories:
         return tuple(site for _, site in kept), self.positions[:, [index for index, _ in kept]]
 
 
-def read_markers(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
+def read_markers(path: str | Path) -> MarkerTrajectories:
     """Read a .trc or .c3d file, selected by the suffix; see `read_trc` and `read_c3d`.
 
     Raises:
@@ -86,19 +84,18 @@ def read_markers(path: str | Path, *, world_from_file: npt.ArrayLike | None = No
     """
     suffix = Path(path).suffix.lower()
     if suffix == ".trc":
-        return read_trc(path, world_from_file=world_from_file)
+        return read_trc(path)
     if suffix == ".c3d":
-        return read_c3d(path, world_from_file=world_from_file)
+        return read_c3d(path)
     raise RecordingError(f"{path}: expected a .trc or .c3d file, found {suffix or 'no suffix'!r}")
 
 
-def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
+def read_trc(path: str | Path) -> MarkerTrajectories:
     """Read a .trc file (OpenSim, Motion Analysis).
 
     Args:
         path: the file: two header lines with values, two lines of column names, then frames, in columns that are separated by
             tabs, commas or spaces. Between tabs, numbers may have decimal commas.
-        world_from_file: (3, 3) rotation applied to every position, e.g. Z_UP_FROM_Y_UP; None keeps the file's axes.
 
     Raises:
         RecordingError: another format; names the line.
@@ -148,7 +145,7 @@ def read_trc(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any():
         raise RecordingError(f"{path}: expected rising times in the second column, found others")
     positions = table[:, 2:].reshape(len(rows), markers, 3) * unit
-    return replace(_trajectories(path, stamps, names, positions, rate, world_from_file), remarks=remarks)
+    return MarkerTrajectories(stamps, _without_subject(names), _seen(positions), rate, remarks=remarks)
 
 
 def _meters(unit: str) -> float:
@@ -170,12 +167,11 @@ def _one_unit(written: str) -> str:
     return words.pop() if len(words) == 1 else written.strip() or "mm"
 
 
-def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) -> MarkerTrajectories:
+def read_c3d(path: str | Path) -> MarkerTrajectories:
     """Read the points of a .c3d file with the library c3d, which is pure Python: damaged files have crashed compiled readers.
 
     Args:
         path: the file.
-        world_from_file: (3, 3) rotation applied to every position; None keeps the file's axes.
 
     Raises:
         RecordingError: damage, no points, or an unknown unit.
@@ -204,12 +200,11 @@ def read_c3d(path: str | Path, *, world_from_file: npt.ArrayLike | None = None) 
     positions = table[:, :, :3] * _METERS[unit]
     positions[table[:, :, 3] < 0.0] = np.nan  # the format's mark of a point that was not observed
     stamps = (first + np.arange(len(table))) / rate
-    found = _trajectories(path, stamps, names, positions, rate, world_from_file)
+    remarks: tuple[str, ...] = ()
     if right and up and right[1] == up[1]:
-        return replace(
-            found, remarks=(f"{path.name}: X_SCREEN {right} and Y_SCREEN {up} are the same axis, and not used",)
-        )
-    return replace(found, up=up, right=right)
+        remarks = (f"{path.name}: X_SCREEN {right} and Y_SCREEN {up} are the same axis, and not used",)
+        right = up = None
+    return MarkerTrajectories(stamps, _without_subject(names), _seen(positions), rate, up, right, remarks)
 
 
 def _axis(screen: Any) -> str | None:  # noqa: ANN401 - of a library without types
@@ -219,22 +214,10 @@ def _axis(screen: Any) -> str | None:  # noqa: ANN401 - of a library without typ
     return word if word in Z_UP_FROM else None
 
 
-def _trajectories(
-    path: Path,
-    stamps: FloatArray,
-    names: tuple[str, ...],
-    positions: FloatArray,
-    rate: float,
-    world_from_file: npt.ArrayLike | None,
-) -> MarkerTrajectories:
-    # Exporters write zeros for markers that were not seen; none lies exactly in the origin.
+def _seen(positions: FloatArray) -> FloatArray:
+    """NaN for markers that were not seen, for which exporters write zeros: none lies exactly in the origin."""
     positions[~np.isfinite(positions).all(axis=2) | (positions == 0.0).all(axis=2)] = np.nan
-    if world_from_file is not None:
-        turn = np.asarray(world_from_file, dtype=np.float64)
-        if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6):
-            raise RecordingError(f"{path}: world_from_file: expected a (3, 3) rotation, found {turn.tolist()}")
-        positions = positions @ turn.T
-    return MarkerTrajectories(stamps, _without_subject(names), positions, rate)
+    return positions
 
 
 def _without_subject(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -24,6 +24,8 @@ from voodoo.unpacking import Unpacking
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
 _ATTACHMENT, _METADATA = 0x09, 0x0C
+_MOST = {_ATTACHMENT: 2**63} | dict.fromkeys((_CHUNK, _MESSAGE, _MESSAGE_INDEX, _METADATA), MOST_BYTES)
+"""Largest size of a record that is more than metadata [bytes]."""
 _MOST_OF_ALL = {_SCHEMA: 16 * MOST_METADATA, _CHANNEL: MOST_METADATA}
 """Largest size of all schemas, and of all channels [bytes]."""
 _ANCHOR = re.compile(r"(?m)(?:^|[\s\[{,])[&*][^\s,\]}]")
@@ -89,7 +91,7 @@ class McapFile(McapReader):
         plausible = iter(range(min(_MOST_LOST, self._file.stat().st_size // _INDEX_BYTES)))
         sources = [
             self._of_chunk(chunk, wanted, first, plausible, as_written=is_back)
-            for chunk in sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
+            for chunk in self._in_file()
             if first <= chunk.message_end_time
             and (not chunk.message_index_offsets or any(chunk.channel_count.get(one, 0) for one in wanted))
         ]
@@ -98,19 +100,21 @@ class McapFile(McapReader):
             if item is not None:
                 yield item
 
+    def _in_file(self) -> list[ChunkInfo]:
+        """The chunks in the order of the file."""
+        return sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
+
     def _longest_step_back(self) -> float:
         """From the end of a chunk to the beginning of the next one in the file [ns]; infinite for a single chunk."""
-        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
-        pairs = itertools.pairwise(chunks)
+        pairs = itertools.pairwise(self._in_file())
         return max((before.message_end_time - chunk.message_start_time for before, chunk in pairs), default=math.inf)
 
     def _is_back(self, wanted: Collection[int]) -> bool:
         """Whether the clock of the recorder was set back; chunks are unpacked only where times of two are apart."""
         if self._longest_step_back() < BACK_S * 1e9:
             return False
-        chunks = sorted(self.chunks, key=lambda chunk: chunk.chunk_start_offset)
         try:
-            read = (entry for chunk in chunks for entry in _messages(self._content(chunk)))
+            read = (entry for chunk in self._in_file() for entry in _messages(self._content(chunk)))
             return falls((one, time) for one, time, _, _ in read if one in wanted)
         except Exception:
             return False  # the damage is told where the messages are read
@@ -272,17 +276,10 @@ def check_mcap(path: Path) -> frozenset[int]:
 
 
 def _check_record(path: Path, code: int, length: int, position: int, found: _Found) -> None:
-    most = {
-        _CHUNK: MOST_BYTES,
-        _MESSAGE: MOST_BYTES,
-        _MESSAGE_INDEX: MOST_BYTES,
-        _METADATA: MOST_BYTES,
-        _ATTACHMENT: 2**63,
-    }
-    if length > most.get(code, MOST_METADATA):
+    most = _MOST.get(code, MOST_METADATA)
+    if length > most:
         raise RecordingError(
-            f"{path}: expected a record of {most.get(code, MOST_METADATA)} bytes at most, found {length} bytes at byte "
-            f"{position}"
+            f"{path}: expected a record of {most} bytes at most, found {length} bytes at byte {position}"
         )
     if code == _CHUNK:
         found.chunks.add(position)

@@ -75,7 +75,7 @@ def picture_size(data: bytes, source: object) -> tuple[int, int]:
     raise RecordingError(f"{source}: expected a JPEG with a size, found {len(data)} bytes without")
 
 
-def check_size(found: tuple[int, int], source: object, size: tuple[int, int]) -> None:
+def check_size(found: tuple[int, ...], source: object, size: tuple[int, int]) -> None:
     """Check the size in the header of an image: a small file with 30,000 x 30,000 pixels would need gigabytes of memory.
 
     Raises:
@@ -83,7 +83,7 @@ def check_size(found: tuple[int, int], source: object, size: tuple[int, int]) ->
     """
     if found != size:
         raise RecordingError(
-            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {found[0]}x{found[1]}",
+            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {'x'.join(map(str, found)) or 'nothing'}",
             reason="of another size than calibrated",
         )
 

@@ -119,7 +119,7 @@ class Pose2SimRecording(Recording):
             KeypointImage(
                 sensor=placed.name,
                 stamp=index / self.rate,
-                people=() if file is None else read_people(file, layout=layout, left_out=left_out),
+                people=read_people(file, layout=layout, left_out=left_out),
                 layout=layout or "",
                 camera=placed.camera,
                 root_from_sensor=placed.world_from_sensor,
@@ -131,7 +131,7 @@ class Pose2SimRecording(Recording):
         """Tell the layout, and check the keypoints of some instants against the calibration."""
         unread = None if self._left_out is None else LeftOut()
         instants = some_of(
-            len(self),
+            range(len(self)),
             lambda index: self._images(index, asked, unread),
             good=lambda images: any(image.people for image in images),
         )
@@ -280,6 +280,6 @@ def read_triangulation(path: Path, rate: float) -> Reference | None:
     files = sorted(path.glob("*.trc"), key=lambda file: (len(file.name), file.name))
     if not files:
         return None
-    names, positions = read_trc(files[0], world_from_file=Z_UP_FROM_Y_UP).of(SITES)
+    names, positions = read_trc(files[0]).of(SITES)
     # Rows are images; the file's own time starts at 1 / rate for image 0.
-    return Reference(np.arange(len(positions)) / rate, names, positions, exact=False)
+    return Reference(np.arange(len(positions)) / rate, names, positions @ Z_UP_FROM_Y_UP.T, exact=False)

@@ -20,13 +20,10 @@ from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PeopleTruth
 
 
-class _Joints(TypedDict):
-    joints: dict[str, tuple[float, float, float]]
-
-
-class Start(_Joints, total=False):
+class Start(TypedDict, total=False):
     """Pose of the body in the first frame: `joints` [m] in the root frame and, if known, its stature `height_m`."""
 
+    joints: dict[str, tuple[float, float, float]]
     height_m: float
 
 

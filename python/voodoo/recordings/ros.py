@@ -115,12 +115,7 @@ class RosRecording(Recording):
         )
         self._bag = Bag(path, left_out=left_out, unpacked=None if given is None else int(given * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
-        choices: dict[TopicKind, TopicChoice] = {
-            "depth": depth_topic,
-            "points": points_topic,
-            "scan": scan_topic,
-            "color": color_topic,
-        }
+        choices = dict(zip(TOPIC_KINDS, (depth_topic, points_topic, scan_topic, color_topic), strict=True))
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
         with self._bag.kept_open():
             sources = finder.find(use)
@@ -237,15 +232,18 @@ class RosRecording(Recording):
 
     def _read_beside(self, place: Path, *, bare: bool) -> None:
         """Read reference and start from the files beside the bag; if damage is left out, files that do not fit are only noted."""
+        own = partial(self.root_from, self._own_root)
         for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
             file = find_beside(place, name)
             try:
                 if file is not None and name == "truth.csv":
-                    self.reference = read_truth(file, self._root_from_own)
+                    self.reference = read_truth(file, own)
                 elif file is not None and name == PEOPLE_TRUTH_FILE:
-                    self.people = read_people_truth(file, self._root_from_own)
+                    self.people = read_people_truth(file, own)
                 elif file is not None:
-                    self.start = read_start(file, self._root_from_start)
+                    self.start = read_start(
+                        file, lambda frame: self.root_from(frame or self._own_root, self._driver.first_stamp)
+                    )
             except RecordingError as error:
                 if self._left_out is None:
                     raise
@@ -324,13 +322,6 @@ class RosRecording(Recording):
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""
         return self._tree.lookup(self.root_frame, frame, stamp)
-
-    def _root_from_own(self, stamp: float) -> FloatArray:
-        """root_from_frame; None: the frame of the truth."""
-        return self._tree.lookup(self.root_frame, self._own_root, stamp)
-
-    def _root_from_start(self, frame: str | None) -> FloatArray:
-        return self._tree.lookup(self.root_frame, frame or self._own_root, self._driver.first_stamp)
 
     def _check_calibration(self, topic: str, message: Message) -> None:
         for source in self._sources.values():

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 import weakref
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -174,14 +175,12 @@ class Bag:
                 f"{self.file / 'metadata.yaml'}: expected all of {', '.join(beside)}, found {', '.join(sorted(listed))} "
                 "(`ros2 bag reindex` repairs it, or open the storage file itself)"
             )
-        stored: dict[tuple[str, str], int] = {}
+        stored: Counter[tuple[str, str]] = Counter()
         for storage in reader.storages:
-            for topic in _topics(storage.connections):
-                key = (topic.name, topic.type)
-                stored[key] = stored.get(key, 0) + topic.messages
-        announced = {(topic.name, topic.type): topic.messages for topic in self.topics}
+            stored.update({(topic.name, topic.type): topic.messages for topic in _topics(storage.connections)})
+        announced = Counter({(topic.name, topic.type): topic.messages for topic in self.topics})
         for name, kind in sorted(stored.keys() | announced.keys()):
-            expected, found = announced.get((name, kind), 0), stored.get((name, kind), 0)
+            expected, found = announced[name, kind], stored[name, kind]
             if expected != found:
                 raise RecordingError(
                     f"{self.file / 'metadata.yaml'}: expected {found} messages on {name} ({kind}) as in the storage "

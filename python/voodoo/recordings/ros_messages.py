@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, Literal, TypeAlias
+from collections.abc import Mapping
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png
 from voodoo.recordings.rvl import decode_rvl
 
+T = TypeVar("T")
 Message: TypeAlias = Any
 """A message of rosbags; its class is generated from the definition in the bag."""
 
@@ -103,17 +105,21 @@ def camera_of(info: Message, topic: str, source: str) -> Camera:
         )
 
 
+def _encoded(message: Message, kind: str, encodings: Mapping[str, T], source: str) -> T:
+    """What an image's encoding stands for."""
+    if message.encoding not in encodings:
+        expected = f"a {kind} encoding ({', '.join(encodings)})"
+        raise RecordingError(f"{source}: expected {expected}, found {message.encoding!r}")
+    return encodings[message.encoding]
+
+
 def depth_image(message: Message, camera: Camera, source: str) -> npt.NDArray[Any]:
     """(H, W) uint16 or float32 of a raw sensor_msgs/Image.
 
     Raises:
         RecordingError: another encoding, fewer bytes than announced, or another size than the camera's.
     """
-    dtype = DEPTH_ENCODINGS.get(message.encoding)
-    if dtype is None:
-        raise RecordingError(
-            f"{source}: expected a depth encoding ({', '.join(DEPTH_ENCODINGS)}), found {message.encoding!r}"
-        )
+    dtype = _encoded(message, "depth", DEPTH_ENCODINGS, source)
     rows = _rows(message, dtype.itemsize, source)
     check_size((message.width, message.height), source, (camera.width, camera.height))
     order: Literal["<", ">"] = ">" if message.is_bigendian else "<"
@@ -155,11 +161,7 @@ def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.
     Raises:
         RecordingError: another encoding, fewer bytes than announced, or another size than the camera's.
     """
-    channels = COLOR_CHANNELS.get(message.encoding)
-    if channels is None:
-        raise RecordingError(
-            f"{source}: expected a color encoding ({', '.join(COLOR_CHANNELS)}), found {message.encoding!r}"
-        )
+    channels = _encoded(message, "color", COLOR_CHANNELS, source)
     check_size((message.width, message.height), source, (camera.width, camera.height))
     image = _rows(message, channels, source).reshape(message.height, message.width, channels)
     if channels == 1:

@@ -84,21 +84,19 @@ class TopicFinder:
             RecordingError: nothing usable, an ambiguous choice, a missing calibration or a wrong encoding.
         """
         sources: list[TopicSource] = []
-        for kind in TOPIC_KINDS:
-            if kind not in use:
-                continue
-            if self._choices[kind] is None and kind == "color" and not sources:
+        for kind in (each for each in TOPIC_KINDS if each in use):
+            chosen = self._choices[kind] is not None
+            if kind == "color" and not chosen and not sources:
                 sources += self._cameras()
-            elif self._choices[kind] is None and kind == "color":
-                try:
-                    sources += [self._source(name, kind) for name in self._automatic(kind)]
-                except RecordingError as error:
-                    self.unused.append(("color", str(error)))
-            elif self._choices[kind] is None:
-                found = [self._source(name, kind) for name in self._automatic(kind)]
-                sources += [source for source in found if not self._same_as_depth(source, sources)]
+                continue
+            try:
+                found = [self._source(name, kind) for name in (self._chosen(kind) if chosen else self._automatic(kind))]
+            except RecordingError as error:
+                if kind != "color" or chosen:
+                    raise
+                self.unused.append(("color", str(error)))
             else:
-                sources += [self._source(name, kind) for name in self._chosen(kind)]
+                sources += [source for source in found if chosen or not self._same_as_depth(source, sources)]
         if not sources:
             listing = ", ".join(f"{topic.name} ({topic.type})" for topic in self.bag.topics) or "no topics"
             why = "".join(f"; {topic}: {reason}" for topic, reason in self.unused)

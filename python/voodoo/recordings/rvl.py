@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError
+from voodoo.recordings.pictures import check_size
 
 _MOST_GROUPS = 6
 """Largest number of groups: a difference of 16-bit pixels has 17 bits; a run has up to 25 bits, of which images use 24."""
@@ -29,15 +30,11 @@ def decode_rvl(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArra
         RecordingError: damage, or another size.
     """
     found = tuple(int(number) for number in np.frombuffer(data[:_HEAD], "<u4")) if len(data) >= _HEAD else ()
-    if found != size:
-        raise RecordingError(
-            f"{source}: expected {size[0]}x{size[1]} px as calibrated, found {'x'.join(map(str, found)) or 'nothing'}",
-            reason="of another size than calibrated",
-        )
+    check_size(found, source, size)
     numbers = _numbers(data[_HEAD:])
     image = np.zeros(size[0] * size[1], dtype=np.int64)
-    at, pixel, taken = 0, 0, []
-    places = []
+    at, pixel = 0, 0
+    taken, places = [], []
     while pixel < image.size:
         if at + 2 > len(numbers):
             raise RecordingError(f"{source}: expected RVL data for {image.size} pixels, found {pixel}")
@@ -46,16 +43,13 @@ def decode_rvl(data: bytes, source: object, size: tuple[int, int]) -> npt.NDArra
         if pixel + count > image.size or at + count > len(numbers) or zeros + count == 0:
             raise RecordingError(f"{source}: expected RVL data for {image.size} pixels, found damage at pixel {pixel}")
         taken.append(numbers[at : at + count])
-        places.append((pixel, count))
+        places.append(np.arange(pixel, pixel + count))
         at, pixel = at + count, pixel + count
-    folded = np.concatenate(taken) if taken else np.empty(0, dtype=np.int64)
+    folded = np.concatenate(taken)
     values = np.cumsum((folded >> 1) ^ -(folded & 1))
     if values.size and not (0 <= values.min() and values.max() <= 0xFFFF):
         raise RecordingError(f"{source}: expected depths of 16 bits, found {values.min()} to {values.max()}")
-    start = 0
-    for pixel, count in places:
-        image[pixel : pixel + count] = values[start : start + count]
-        start += count
+    image[np.concatenate(places)] = values
     return image.astype(np.uint16).reshape(size[1], size[0])
 
 

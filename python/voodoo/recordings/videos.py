@@ -13,7 +13,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml
 from voodoo.recordings.empty_scene import FOLDER, EmptyScene
-from voodoo.recordings.films import VIDEOS, PictureFolder, Pictures, Video, pictures_in
+from voodoo.recordings.films import VIDEOS, Pictures, of_folder, of_video, pictures_in
 from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.order import in_order, matched
@@ -87,9 +87,9 @@ class VideosRecording(Recording):
         for camera, source in _chosen(path, _matched(path, placed, sources), color_topic):
             sensor = source.relative_to(path).as_posix()
             if source.is_dir():
-                self._cameras.append(PictureFolder(pictures_in(source), sensor, camera, clock))
+                self._cameras.append(of_folder(pictures_in(source), sensor, camera, clock))
             else:
-                self._cameras.append(Video(source, sensor, camera, rate))
+                self._cameras.append(of_video(source, sensor, camera, rate))
         self.assumed = tuple(dict.fromkeys(clock.notes))
         self._notes: tuple[str, ...] = ()
         names = {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}

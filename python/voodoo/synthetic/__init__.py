@@ -1,1 +1,1 @@
-"""Synthetic images and recordings of the body with exact ground truth."""
+"""Rendered depth images of a body."""

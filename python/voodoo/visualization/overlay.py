@@ -71,7 +71,7 @@ class Overlay:
         estimate: Estimate,
         *,
         index: int,
-        front_end: FrontEnd | None = None,
+        front_end: FrontEnd[Estimate] | None = None,
     ) -> Picture:
         """Draw one frame over the image of each camera, side by side or two by two; without images, as a view from above.
 
@@ -156,7 +156,7 @@ def _pictured(recorded: RecordedFrame) -> Sequence[Pictured]:
 
 
 def _drawn(
-    canvas: OverlayCanvas, recorded: RecordedFrame, body: Body, estimate: Estimate, front_end: FrontEnd | None
+    canvas: OverlayCanvas, recorded: RecordedFrame, body: Body, estimate: Estimate, front_end: FrontEnd[Estimate] | None
 ) -> Picture:
     draw_body(canvas.picture, body, estimate, canvas.view)
     memory = Memory() if front_end is None else front_end.memory

@@ -18,7 +18,8 @@ import numpy as np
 
 from voodoo.errors import VoodooError, installed
 from voodoo.export.skeleton import mean_interval
-from voodoo.export.track import FloatArray, Track
+from voodoo.export.table import FloatArray
+from voodoo.export.track import Track
 
 _LINES = (
     ("humanoid_root", "vc7", "skullbase", "head_center", "skull_tip"),

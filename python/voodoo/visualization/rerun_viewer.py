@@ -24,8 +24,7 @@ from voodoo.model.body import Body
 from voodoo.model.limb_mesh import limb_mesh
 from voodoo.model.rotations import quaternions
 from voodoo.people import PeopleEstimate
-from voodoo.pipeline.front_end import FrontEnd
-from voodoo.pipeline.search import nobody
+from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.sensors.adapters import Memory, adapters_of
 from voodoo.visualization.body_geometry import bands, limb_colors
 from voodoo.visualization.ink import person_color
@@ -153,7 +152,7 @@ class Viewer:
         body: Body,
         *,
         recorded: RecordedFrame | None = None,
-        front_end: FrontEnd | None = None,
+        front_end: FrontEnd[Estimate] | None = None,
         seconds: float | None = None,
     ) -> None:
         """Show one step.
@@ -286,7 +285,7 @@ class Viewer:
             ),
         )
 
-    def _log_rays(self, front_end: FrontEnd, estimate: Estimate) -> None:
+    def _log_rays(self, front_end: FrontEnd[Estimate], estimate: Estimate) -> None:
         strips, colors, labels = [], [], []
         for ray in front_end.rays:
             reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)

@@ -223,6 +223,35 @@ pub struct RayRelation {
     pub source: u16,
 }
 
+/// A person whom something other than the tracker's own detector found in this instant: keypoints triangulated from several
+/// cameras, a network's joints, markers.
+///
+/// Its positions measure the tracked person whom they are nearest to. Where they show nobody who is tracked, that person is tracked
+/// from this frame on: a lost or absent one who may have moved there, or a new one, as soon as the log odds of successive detections
+/// sum to some 4. Positions that do not determine the pose of the body start nobody.
+///
+/// ```
+/// use voodoo_core::math::{Pose, Vec3};
+/// use voodoo_core::{Body, Config, DetectedPerson, Frame, HumanModel, PositionRelation, Tracker};
+///
+/// let body = Body::human(1.75, HumanModel::Measured)?;
+/// let standing = body.rest_pose(Pose::from_translation(Vec3::X * 2.0));
+/// let measured = |site| PositionRelation { site, position: body.site_position(&standing, site), weight: 8.0, bias: 0.0, source: 0 };
+/// let positions: Vec<PositionRelation> = (0..body.sites().len()).map(measured).collect();
+/// let person = DetectedPerson { positions: &positions, person: f64::INFINITY };
+/// let mut tracker = Tracker::new(body, Config::default())?;
+/// let estimate = tracker.step(&Frame::empty(0.0).with_detections(&[person]))?;
+/// assert!(estimate.world_from_limb[0].translation.distance(standing[0].translation) < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetectedPerson<'a> {
+    /// Measured positions of sites; three that are not collinear determine the pose.
+    pub positions: &'a [PositionRelation],
+    /// Log odds `ln(p / (1 - p))` that it is a person; infinite if that is certain.
+    pub person: f64,
+}
+
 /// The ground plane: points `p` with `normal . p < offset` lie below it.
 ///
 /// ```
@@ -285,6 +314,8 @@ pub struct Frame<'a> {
     pub positions: &'a [PositionRelation],
     /// Sites observed along rays.
     pub rays: &'a [RayRelation],
+    /// Persons who were found in this instant.
+    pub detections: &'a [DetectedPerson<'a>],
     /// The ground plane, if it is known.
     pub ground: Option<Ground>,
     /// Boxes of the world whose points belong to no person: the robot's own arm, a coat stand.
@@ -294,7 +325,8 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
-        Self { stamp, clouds: &[], images: &[], colors: &[], positions: &[], rays: &[], ground: None, excluded: &[] }
+        let (positions, rays, detections) = Default::default();
+        Self { stamp, clouds: &[], images: &[], colors: &[], positions, rays, detections, ground: None, excluded: &[] }
     }
 
     /// The frame with these 3-D points.
@@ -325,6 +357,12 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn with_rays(self, rays: &'a [RayRelation]) -> Self {
         Self { rays, ..self }
+    }
+
+    /// The frame with these detected persons.
+    #[must_use]
+    pub fn with_detections(self, detections: &'a [DetectedPerson<'a>]) -> Self {
+        Self { detections, ..self }
     }
 
     /// The frame with this ground plane, or without one.
@@ -377,11 +415,15 @@ impl<'a> Frame<'a> {
             picture.check(index, self.stamp, &self.colors[..index])?;
         }
         for (index, relation) in self.positions.iter().enumerate() {
-            let what = |part: &str| format!("positions[{index}].{part}");
-            check_site(|| what("site"), relation.site, body)?;
-            check_weight(|| what("weight"), relation.weight)?;
-            check_bias(|| what("bias"), relation.bias)?;
-            check_vector(|| what("position"), relation.position)?;
+            check_position(|| format!("positions[{index}]"), relation, body)?;
+        }
+        for (index, detection) in self.detections.iter().enumerate() {
+            for (number, relation) in detection.positions.iter().enumerate() {
+                check_position(|| format!("detections[{index}].positions[{number}]"), relation, body)?;
+            }
+            if detection.person.is_nan() {
+                return Err(TrackError::measurement(format!("detections[{index}].person"), "log odds", "NaN"));
+            }
         }
         for (index, relation) in self.rays.iter().enumerate() {
             let what = |part: &str| format!("rays[{index}].{part}");
@@ -433,6 +475,13 @@ fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
     }
     check_weight(|| format!("depth[{index}].weight"), image.weight)?;
     check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
+}
+
+fn check_position(what: impl Fn() -> String, relation: &PositionRelation, body: &Body) -> Result<(), TrackError> {
+    check_site(|| what() + ".site", relation.site, body)?;
+    check_weight(|| what() + ".weight", relation.weight)?;
+    check_bias(|| what() + ".bias", relation.bias)?;
+    check_vector(|| what() + ".position", relation.position)
 }
 
 fn check_site(what: impl FnOnce() -> String, site: usize, body: &Body) -> Result<(), TrackError> {

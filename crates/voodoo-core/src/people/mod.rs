@@ -19,9 +19,9 @@ use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body,
 };
 use crate::error::TrackError;
-use crate::math::Vec3;
+use crate::math::{Pose, Vec3};
 use crate::observation::background::Background;
-use crate::observation::frame::Frame;
+use crate::observation::frame::{DepthImage, DetectedPerson, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
@@ -35,6 +35,10 @@ use tentative_tracks::{SAME_PERSON, TentativeTrack, TentativeTracks};
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
 const DETECT_EVERY: f64 = 0.06;
+/// Fraction of a detected person's segment that may show another person if the person does not explain it.
+const LEFT_OVER: f64 = 0.3;
+/// Largest number of persons after whom the rest of a segment is looked at again.
+const MOST_TOGETHER: usize = 4;
 /// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.3;
 /// A track that lasted for less than this is not remembered, seconds.
@@ -182,7 +186,8 @@ impl People {
         self.detector.clear_error();
         self.scene.register(frame);
         self.assign_pixels(frame);
-        self.follow(frame, own);
+        let shown = self.match_detections(frame);
+        self.follow(frame, own, &shown);
         for person in &self.persons {
             if let Some((image, pixels)) = person.tracker.moved_to().filter(|_| person.present) {
                 self.scene.release(frame, image, pixels);
@@ -193,7 +198,7 @@ impl People {
             self.scene.learn(frame, self.assignment.owners());
         }
         self.prune_tracks();
-        self.detect_new(frame);
+        self.find_new(frame, &shown);
         self.delete_expired(frame.stamp);
     }
 
@@ -210,16 +215,37 @@ impl People {
         self.assignment.assign(frame, self.scene.known(), predicted);
     }
 
-    /// Steps every tracker with its own pixels and points.
-    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
+    /// Returns the index of the tracked person whom each of the frame's detections shows, if it shows one.
+    fn match_detections(&self, frame: &Frame) -> Vec<Option<usize>> {
+        if frame.detections.is_empty() {
+            return Vec::new();
+        }
+        let tracked: Vec<usize> = (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked()).collect();
+        let distance = |detection: &DetectedPerson, person: &Person| {
+            let body = person.tracker.body();
+            let each = detection.positions.iter();
+            let sum: f64 = each.map(|of| body.site_position(&person.expected, of.site).distance(of.position)).sum();
+            sum / detection.positions.len().max(1) as f64
+        };
+        let costs = |detection| tracked.iter().map(|number| distance(detection, &self.persons[*number])).collect();
+        let costs: Vec<Vec<f64>> = frame.detections.iter().map(costs).collect();
+        assign::assign(&costs, SAME_PERSON).into_iter().map(|column| column.map(|column| tracked[column])).collect()
+    }
+
+    /// Steps every tracker with its own pixels and points, and with the detections that show the person.
+    fn follow(&mut self, frame: &Frame, own: &[(usize, Frame)], shown: &[Option<usize>]) {
         let (assignment, scene) = (&self.assignment, self.scene.known());
         // With several persons, color pictures only serve to identify them.
         let shared = &Frame { colors: &[], ..*frame };
         let work = |(number, person): (usize, &mut Person)| {
             if person.present {
                 let ownership = assignment.ownership(number, scene);
-                let of = own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
-                person.tracker.step(of, ownership);
+                let mut of = *own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
+                let detection = shown.iter().position(|shown| *shown == Some(number));
+                let positions =
+                    detection.map(|detection| [of.positions, frame.detections[detection].positions].concat());
+                of.positions = positions.as_deref().unwrap_or(of.positions);
+                person.tracker.step(&of, ownership);
                 person.update(frame, ownership);
             }
         };
@@ -248,7 +274,24 @@ impl People {
         }
     }
 
-    /// Searches for new persons in pixels that no person explains.
+    /// Searches for new persons: in the frame's detections that show nobody who is tracked, and in pixels that no person explains.
+    fn find_new(&mut self, frame: &Frame, shown: &[Option<usize>]) {
+        self.tentative.prune(frame.stamp);
+        for (detection, _) in frame.detections.iter().zip(shown).filter(|(_, shown)| shown.is_none()) {
+            let fitted = self.prototype.fit(&sites_of(detection.positions), true);
+            let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
+            if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
+                self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), false);
+            }
+        }
+        self.detect_new(frame);
+        let confirmed = self.tentative.take_confirmed(frame.stamp);
+        if !confirmed.is_empty() {
+            self.associate(frame, &confirmed);
+        }
+    }
+
+    /// Detects persons in pixels that no person explains, if it is time to.
     fn detect_new(&mut self, frame: &Frame) {
         let everybody_there = self.options.only.as_ref().is_some_and(|only| {
             only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
@@ -267,12 +310,7 @@ impl People {
             return;
         }
         self.last_detection = Some(frame.stamp);
-        self.tentative.prune(frame.stamp);
         self.detect(frame, if tracked { DetectionQuery::New } else { DetectionQuery::Any });
-        let confirmed = self.tentative.take_confirmed(frame.stamp);
-        if !confirmed.is_empty() {
-            self.associate(frame, &confirmed);
-        }
     }
 
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
@@ -283,25 +321,66 @@ impl People {
     }
 
     fn detect(&mut self, frame: &Frame, query: DetectionQuery) {
-        for (number, image) in frame.images.iter().enumerate() {
-            let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
-            let around = Surroundings {
-                ground: frame.ground,
-                excluded: frame.excluded,
-                owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
-                // A person may have stood there since the camera started, so only an old background is excluded.
-                background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
-                ..Surroundings::default()
-            };
-            for found in self.detector.detect(&self.prototype, image, &around, query) {
-                if !self.is_requested(frame, found.root) {
-                    self.detector.reject(found.index);
-                    continue;
+        for number in 0..frame.images.len() {
+            let mut found = self.detect_in_image(frame, number, query);
+            // Persons who touch are one segment: what a detected person leaves of it may show another one.
+            let mut newcomers = Vec::new();
+            for next in 0..MOST_TOGETHER {
+                let Some(one) = found.get(next) else { break };
+                let detected = Detected { detection: &one.detection, map: self.detector.map() };
+                newcomers.extend(fit_body(&Model::new(self.prototype.clone()), detected));
+                self.assign_segment(frame, number, &one.detection.pixels, &newcomers);
+                if let Some(place) = self.rest_of_segment(&frame.images[number], number, &one.detection.pixels) {
+                    found.extend(self.detect_in_image(frame, number, DetectionQuery::Near(place)));
                 }
+            }
+            for found in found {
                 let still = self.everybody && self.scene.is_still(frame, number, &found.detection.pixels);
-                self.tentative.update(frame.stamp, found, number, still);
+                self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), still);
             }
         }
+    }
+
+    /// Returns the persons who are detected in an image, and are to be tracked.
+    fn detect_in_image(&mut self, frame: &Frame, number: usize, query: DetectionQuery) -> Vec<PlacedDetection> {
+        let image = &frame.images[number];
+        let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
+        let around = Surroundings {
+            ground: frame.ground,
+            excluded: frame.excluded,
+            owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
+            // A person may have stood there since the camera started, so only an old background is excluded.
+            background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
+            ..Surroundings::default()
+        };
+        let mut found = self.detector.detect(&self.prototype, image, &around, query);
+        found.retain(|found| {
+            let requested = self.is_requested(frame, found.root);
+            if !requested {
+                self.detector.reject(found.index);
+            }
+            requested
+        });
+        found
+    }
+
+    /// Assigns pixels of a segment to newcomers, who are numbered after all persons.
+    fn assign_segment(&mut self, frame: &Frame, image: usize, pixels: &[usize], newcomers: &[(Body, Vec<Pose>)]) {
+        let bodies = (self.persons.len() as u16..).zip(newcomers).map(|(number, (body, poses))| PredictedBody {
+            number,
+            body,
+            poses,
+        });
+        self.assignment.assign_segment(&frame.images[image], image, pixels, bodies);
+    }
+
+    /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
+    fn rest_of_segment(&self, image: &DepthImage, number: usize, pixels: &[usize]) -> Option<Vec3> {
+        let owners = &self.assignment.owners()[number];
+        let free = || pixels.iter().filter(|pixel| owners[**pixel] == NO_OWNER);
+        let place = |pixel: usize| image.back_project(pixel, image.pixels.get(pixel) * image.meters_per_unit as f32);
+        let (count, sum) = (free().count() as f64, free().map(|pixel| place(*pixel)).sum::<Vec3>());
+        (count > LEFT_OVER * pixels.len() as f64).then(|| image.world_from_sensor * (sum / count))
     }
 
     /// Whether a person detected at a position is to be tracked.
@@ -333,13 +412,29 @@ impl People {
             absent.iter().map(cost).collect()
         };
         let costs: Vec<Vec<f64>> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).map(cost).collect();
-        for (track, given) in confirmed.iter().zip(assign::assign(&costs, NEW)) {
+        let given = assign::assign(&costs, NEW);
+        let known = |column: Option<usize>| column.map(|column| absent[column]);
+        // Who comes with others gets their own pixels.
+        let (first, mut newcomers, mut numbers) = (self.persons.len(), Vec::new(), Vec::new());
+        for (track, column) in confirmed.iter().zip(&given) {
+            let tracked = known(*column).filter(|number| self.persons[*number].is_tracked());
+            let fitted = if tracked.is_none() { self.fit_track(track) } else { None };
+            numbers.push(fitted.is_some().then_some(first + newcomers.len()));
+            newcomers.extend(fitted);
+        }
+        let others: Vec<(Body, Vec<Pose>)> =
+            self.tentative.updated_at(frame.stamp).filter_map(|track| self.fit_track(track)).collect();
+        newcomers.extend(others);
+        for track in confirmed.iter().filter(|track| !track.detection.pixels.is_empty()) {
+            self.assign_segment(frame, track.image, &track.detection.pixels, &newcomers);
+        }
+        for ((track, given), own) in confirmed.iter().zip(given).zip(numbers) {
             let known = given.map(|column| absent[column]);
             let others = self.tracked_except(known);
             let Some(leaves) = self.options.room(frame, track.place, &others) else { continue };
             let came = match known {
-                Some(number) => self.reactivate(frame, track, number),
-                None => self.spawn(frame, track),
+                Some(number) => self.reactivate(frame, track, number, own.unwrap_or(number)),
+                None => self.spawn(frame, track, own.unwrap_or(first)),
             };
             if let Some(leaves) = leaves.filter(|_| came) {
                 self.persons[leaves].present = false;
@@ -365,25 +460,37 @@ impl People {
         Detected { detection: &track.detection, map: self.detector.map() }
     }
 
+    /// Returns the body of a tentative track, in its sizes, and its poses.
+    fn fit_track(&self, track: &TentativeTrack) -> Option<(Body, Vec<Pose>)> {
+        let model = Model::new(self.prototype.clone());
+        match track.positions.as_slice() {
+            [] => fit_body(&model, self.detected(track)),
+            positions => model.fit(&sites_of(positions), true).ok(),
+        }
+    }
+
     /// Returns the colors of a tentative track's clothes.
     fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
         let mut clothes = Clothes::default();
-        if let Some((body, poses)) = fit_body(&Model::new(self.prototype.clone()), self.detected(track)) {
-            let free = |image: usize, pixel: usize| self.assignment.owners()[image].get(pixel) == Some(&NO_OWNER);
+        if let Some((body, poses)) = self.fit_track(track) {
+            let tracked = |owner: u16| usize::from(owner) < self.persons.len();
+            let free = |image: usize, pixel: usize| {
+                self.assignment.owners()[image].get(pixel).is_some_and(|owner| !tracked(*owner))
+            };
             clothes.observe(frame, &body, &poses, free);
         }
         clothes
     }
 
     /// Spawns a new person at a tentative track. Returns whether the person is there.
-    fn spawn(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
+    fn spawn(&mut self, frame: &Frame, track: &TentativeTrack, own: usize) -> bool {
         let full = self.persons.len() >= usize::from(NO_OWNER);
         if full || !self.options.includes(self.next_id) {
             return false;
         }
         let Ok(person) = self.nobody_yet(frame.stamp) else { return false };
         self.persons.push(person);
-        let came = self.reactivate(frame, track, self.persons.len() - 1);
+        let came = self.reactivate(frame, track, self.persons.len() - 1, own);
         if came {
             self.next_id += 1;
         } else {
@@ -392,19 +499,22 @@ impl People {
         came
     }
 
-    /// Starts a person's tracker at a tentative track. Returns whether the person is there.
-    fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize) -> bool {
+    /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
+    fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
         self.scene.release(frame, track.image, &track.detection.pixels);
         let person = &mut self.persons[number];
         if !self.options.includes(person.id) {
             return false;
         }
         let known = person.created < frame.stamp;
-        let ownership = self.assignment.ownership(number, self.scene.known());
+        let ownership = self.assignment.ownership(own, self.scene.known());
         let detected = Detected { detection: &track.detection, map: self.detector.map() };
         let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
         let depth_frame = &Frame { colors: &[], ..*frame };
-        let came = if person.present {
+        let came = if !track.positions.is_empty() {
+            let frame = depth_frame.with_positions(&track.positions);
+            person.tracker.start_at_positions(&frame, ownership, !known)
+        } else if person.present {
             person.tracker.recover(depth_frame, ownership, placed)
         } else {
             person.tracker.start_at_detection(depth_frame, ownership, placed, known)
@@ -431,6 +541,11 @@ impl People {
             person.present || person.followed || remembered
         });
     }
+}
+
+/// Sites and their measured positions.
+fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
+    positions.iter().map(|relation| (relation.site, relation.position)).collect()
 }
 
 /// Cost of a new person in the assignment, nats.

@@ -118,7 +118,7 @@ impl Person {
         if self.stays {
             return;
         }
-        let patience = match self.presence(frame, ownership) {
+        let patience = match self.presence(frame) {
             Presence::Hidden => HIDDEN,
             Presence::Outside => OUTSIDE,
             Presence::Gone => LEAVES,
@@ -127,10 +127,10 @@ impl Person {
     }
 
     /// Returns whether most sites of the lost person are hidden, outside of the images, or neither.
-    fn presence(&self, frame: &Frame, ownership: OwnershipMask) -> Presence {
+    fn presence(&self, frame: &Frame) -> Presence {
         if frame.images.is_empty() {
-            // A frame without depth images from known cameras is no evidence that a person left.
-            return if ownership.scene.is_empty() { Presence::Gone } else { Presence::Hidden };
+            // A frame without depth images is no evidence that a person left.
+            return Presence::Hidden;
         }
         let sites = &self.tracker.estimate().sites;
         let (mut hidden, mut outside) = (0, 0);

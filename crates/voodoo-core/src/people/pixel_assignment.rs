@@ -99,6 +99,35 @@ impl PixelAssignment {
         }
     }
 
+    /// Assigns pixels of an image, be they of the known scene or not, to the body with the nearest surface, within reach.
+    pub(super) fn assign_segment<'a>(
+        &mut self,
+        image: &DepthImage,
+        number: usize,
+        pixels: &[usize],
+        bodies: impl Iterator<Item = PredictedBody<'a>> + Clone,
+    ) {
+        let Some(origin) = bodies.clone().find_map(|body| body.poses.first()).map(|root| root.translation) else {
+            return;
+        };
+        self.assigned.extend(bodies.clone().map(|body| body.number));
+        self.queries.clear();
+        self.pixels.clear();
+        for pixel in pixels {
+            let z = image.pixels.get(*pixel) * image.meters_per_unit as f32;
+            let point = image.world_from_sensor * image.back_project(*pixel, z);
+            self.queries.push((point - origin).to_array().map(|value| value as f32));
+            self.pixels.push((*pixel as u32, 1));
+        }
+        let mut owners = std::mem::take(&mut self.owners[number]);
+        self.distances.clear();
+        self.distances.resize(owners.len(), REACH);
+        for PredictedBody { number, body, poses } in bodies {
+            self.assign_nearest(number, body, poses, origin, &mut owners);
+        }
+        self.owners[number] = owners;
+    }
+
     /// Returns `count` owners, none assigned yet, in the buffer of the previous frame.
     fn unassigned(&mut self, number: usize, count: usize, of: impl Fn(&mut Self) -> &mut Vec<Vec<u16>>) -> Vec<u16> {
         self.distances.clear();

@@ -2,6 +2,7 @@
 
 use crate::detect::{Detection, PlacedDetection};
 use crate::math::Vec3;
+use crate::observation::frame::{DetectedPerson, PositionRelation};
 use crate::relocalize::ENOUGH_ODDS;
 
 /// Amount subtracted from the log odds of every detection, because the errors of successive detections of a static object are
@@ -22,8 +23,24 @@ pub(super) struct TentativeTrack {
     pub(super) detection: Detection,
     /// Number of the image with the detection.
     pub(super) image: usize,
+    /// Measured positions of sites, for a detection that came with the frame; empty for one in an image.
+    pub(super) positions: Vec<PositionRelation>,
     sum: f64,
     stamp: f64,
+}
+
+impl TentativeTrack {
+    /// Returns the track of a person who was detected for the first time, in the image with this number.
+    pub(super) fn in_image(stamp: f64, placed: PlacedDetection, image: usize) -> Self {
+        let PlacedDetection { root: place, detection, .. } = placed;
+        Self { place, sum: detection.person, detection, image, positions: Vec::new(), stamp }
+    }
+
+    /// Returns the track of a person at this position who came with the frame.
+    pub(super) fn given(stamp: f64, place: Vec3, person: &DetectedPerson) -> Self {
+        let (detection, positions) = (Detection::default(), person.positions.to_vec());
+        Self { place, sum: person.person, detection, image: 0, positions, stamp }
+    }
 }
 
 /// All tentative tracks.
@@ -39,14 +56,12 @@ impl TentativeTracks {
     }
 
     /// Updates with a detection. `still`: the detected object has been part of the scene all the time.
-    pub(super) fn update(&mut self, stamp: f64, placed: PlacedDetection, image: usize, still: bool) {
-        let PlacedDetection { root: place, detection, .. } = placed;
-        let gain = detection.person - if still { STILL_COSTS } else { DETECTION_COST };
-        let near = |track: &&mut TentativeTrack| track.place.distance(place) < SAME_PERSON;
-        let before = self.tracks.iter_mut().find(near).map(|track| track.sum);
-        self.tracks.retain(|track| track.place.distance(place) >= SAME_PERSON);
-        let sum = (before.unwrap_or(0.0) + gain).max(0.0);
-        self.tracks.push(TentativeTrack { place, detection, image, sum, stamp });
+    pub(super) fn update(&mut self, mut found: TentativeTrack, still: bool) {
+        found.sum -= if still { STILL_COSTS } else { DETECTION_COST };
+        let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
+        let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track.sum)));
+        found.sum = (before.unwrap_or(0.0) + found.sum).max(0.0);
+        self.tracks.push(found);
     }
 
     /// Returns the tracks that were detected in the frame with this stamp.

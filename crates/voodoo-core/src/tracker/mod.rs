@@ -217,6 +217,17 @@ impl BodyTracker {
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
+    /// Starts the track at the frame's measured positions, whose sizes the body gets with `fit_sizes`. Returns whether the person
+    /// is there.
+    pub(crate) fn start_at_positions(&mut self, frame: &Frame, ownership: OwnershipMask, fit_sizes: bool) -> bool {
+        let positions: Vec<(usize, Vec3)> = frame.positions.iter().map(|of| (of.site, of.position)).collect();
+        let started = self.reset(&positions, fit_sizes).is_ok();
+        if started {
+            self.step(frame, ownership);
+        }
+        started && !matches!(self.estimate.status, Status::Lost | Status::Searching)
+    }
+
     /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame no worse. A new track
     /// restarts there. Returns whether the person is there.
     pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
@@ -313,7 +324,7 @@ impl BodyTracker {
 
     /// Checks the frame and the state of the tracker before anything changes.
     pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
-        if !self.is_started() && !self.can_search() {
+        if !self.is_started() && !self.can_search() && frame.detections.is_empty() {
             return Err(TrackError::NotInitialized);
         }
         frame.check(&self.model.body, self.motion.stamp)?;

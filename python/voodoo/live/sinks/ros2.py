@@ -36,7 +36,7 @@ from voodoo.live.session import Output
 from voodoo.live.sinks.people import Shown, shown
 from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
-from voodoo.pipeline.search import nobody
+from voodoo.pipeline.front_end import nobody
 
 ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"

@@ -1,10 +1,11 @@
-"""Interface of a source of first poses: it evaluates frames until it has joints."""
+"""Interface of a source of detections: it finds persons in measurements that belong to nobody who is tracked."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -44,7 +45,7 @@ class StartFrame:
 
     Args:
         stamp: of the frame [s].
-        measurements: those of the kinds in use, without frozen sensors.
+        measurements: those of the kinds in use that belong to nobody, without frozen sensors.
         body: the body to track.
         settings: settings of the front end.
     """
@@ -63,15 +64,17 @@ class FoundStart:
         joints: site name -> (3,) [m], root frame; they determine the pose of the body.
         sigma: site name -> standard deviation of its position [m].
         by: name of the finder.
+        log_odds: ln(p / (1 - p)) that it is a person, where several persons are tracked.
     """
 
     joints: Mapping[str, FloatArray]
     sigma: Mapping[str, float]
     by: str
+    log_odds: float = inf
 
 
 class StartFinder(ABC):
-    """Evaluates frames, one after the other, until it has a first pose.
+    """Evaluates frames, one after the other, for persons.
 
     Attributes:
         name: name in messages.
@@ -82,8 +85,8 @@ class StartFinder(ABC):
     given: ClassVar[bool] = False
 
     @abstractmethod
-    def find(self, frame: StartFrame) -> FoundStart | None:
-        """The first pose, if this frame and the previous ones are sufficient for one."""
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
+        """The persons for whom this frame and the previous ones are sufficient, the one observed best first."""
 
 
 def fixes_pose(joints: Mapping[str, npt.ArrayLike], body: Body) -> bool:

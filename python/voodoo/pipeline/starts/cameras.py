@@ -1,10 +1,11 @@
-"""A first pose from the keypoints of two or more calibrated cameras, triangulated."""
+"""Persons found in the keypoints of two or more calibrated cameras, triangulated."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import inf
 
 import numpy as np
 
@@ -36,8 +37,11 @@ class _CameraPerson:
 
 
 class CamerasStart(StartFinder):
-    """Finds the first frame in which two cameras agree on a whole trunk and some limbs; of several persons it selects the one
-    observed best."""
+    """Finds persons on whose whole trunk and some limbs cameras agree, the one observed best first.
+
+    Where several persons are tracked, only those count who are seen by most of the cameras: other people stand in the
+    background of one or two images, and wrong matches may agree by chance. A single person is one whom two cameras see.
+    """
 
     name = "keypoints of several cameras"
 
@@ -45,30 +49,22 @@ class CamerasStart(StartFinder):
         """Start without observations."""
         self._latest: dict[str, KeypointImage] = {}
 
-    def find(self, frame: StartFrame) -> FoundStart | None:
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         for item in frame.measurements:
             if isinstance(item, KeypointImage):
                 self._latest[item.sensor] = item
         images = [item for item in self._latest.values() if abs(frame.stamp - item.stamp) <= _TOGETHER_S]
-        best = _best(_views(images, frame), frame)
-        return None if best is None else _found(best)
-
-
-def everybody(frame: StartFrame, *, cameras: int) -> list[FoundStart]:
-    """All persons whose keypoints are in at least so many cameras in one frame, the one observed best first.
-
-    Persons in fewer cameras are left out: other people stand in the background of one or two images, and wrong matches may
-    agree by chance.
-    """
-    views = _views([item for item in frame.measurements if isinstance(item, KeypointImage)], frame)
-    found = []
-    while (best := _best(views, frame)) is not None:
-        if len(best.persons) >= cameras:
-            found.append(_found(best))
-        taken = {id(person) for person in best.persons}
-        views = [[person for person in view if id(person) not in taken] for view in views]
-    return found
+        views = _views(images, frame)
+        found = []
+        while (best := _best(views, frame)) is not None:
+            joints = _joints(best.places)
+            sigma = {name: best.places[name].sigma for name in joints}
+            most = 2 * len(best.persons) > len(self._latest)
+            found.append(FoundStart(joints, sigma, self.name, log_odds=inf if most else 0.0))
+            taken = {id(person) for person in best.persons}
+            views = [[person for person in view if id(person) not in taken] for view in views]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +94,6 @@ def _best(views: Sequence[Sequence[_CameraPerson]], frame: StartFrame) -> _Group
             if group is not None and (best is None or group.score > best.score) and _stands(group.places, frame):
                 best = group
     return best
-
-
-def _found(group: _Group) -> FoundStart:
-    joints = _joints(group.places)
-    return FoundStart(joints, {name: group.places[name].sigma for name in joints}, CamerasStart.name)
 
 
 def _joints(places: dict[str, TriangulatedSite]) -> dict[str, FloatArray]:

@@ -32,11 +32,11 @@ class GivenStart(StartFinder):
         self._joints = {name: np.asarray(position, dtype=np.float64) for name, position in joints.items()}
         self._stamp = stamp
 
-    def find(self, frame: StartFrame) -> FoundStart | None:
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         if frame.stamp < self._stamp - _ROUNDED_S:
-            return None
-        return FoundStart(self._joints, dict.fromkeys(self._joints, _GIVEN_SIGMA_M), self.name)
+            return []
+        return [FoundStart(self._joints, dict.fromkeys(self._joints, _GIVEN_SIGMA_M), self.name)]
 
 
 class EarlierStart(StartFinder):
@@ -55,15 +55,15 @@ class EarlierStart(StartFinder):
         self._near = min(_SAME_TIME_S, 0.5 * float(np.median(steps))) if len(steps) else _SAME_TIME_S
         self._result = result.of_frames(np.array([word in _USABLE for word in result.status], dtype=bool))
 
-    def find(self, frame: StartFrame) -> FoundStart | None:
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         result = self._result
         if not len(result):
-            return None
+            return []
         row = int(np.argmin(np.abs(result.stamps - frame.stamp)))
         if abs(result.stamps[row] - frame.stamp) > self._near:
-            return None
+            return []
         pairs = zip(result.joint_names, result.joints[row], strict=True)
         joints = {name: position for name, position in pairs if name in frame.body.site_names}
         sigma = dict.fromkeys(joints, _GIVEN_SIGMA_M)
-        return FoundStart(joints, sigma, self.name) if fixes_pose(joints, frame.body) else None
+        return [FoundStart(joints, sigma, self.name)] if fixes_pose(joints, frame.body) else []

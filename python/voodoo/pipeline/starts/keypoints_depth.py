@@ -35,26 +35,22 @@ _Person: TypeAlias = dict[str, tuple[FloatArray, float]]
 
 
 class KeypointsDepthStart(StartFinder):
-    """Finds the first frame with a person whose trunk and some limbs a depth camera also measures; of several persons it
-    selects the nearest."""
+    """Finds persons whose trunk and some limbs a depth camera also measures, the nearest first."""
 
     name = "keypoints with depth"
 
-    def find(self, frame: StartFrame) -> FoundStart | None:
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         depths = [item for item in frame.measurements if isinstance(item, DepthImage)]
         images = [item for item in frame.measurements if isinstance(item, KeypointImage)]
-        best: tuple[float, _Person] | None = None
+        found = []
         for item in images:
             for person in _people(item, depths, frame):
-                places = np.array([place for place, _ in person.values()])
-                away = float(np.median(in_sensor(item.root_from_sensor, places)[:, 2]))
-                if best is None or away < best[0]:
-                    best = away, person
-        if best is None:
-            return None
-        joints = {name: place for name, (place, _) in best[1].items()}
-        return FoundStart(joints, {name: sigma for name, (_, sigma) in best[1].items()}, self.name)
+                joints = {name: place for name, (place, _) in person.items()}
+                away = float(np.median(in_sensor(item.root_from_sensor, np.array(list(joints.values())))[:, 2]))
+                sigma = {name: sigma for name, (_, sigma) in person.items()}
+                found.append((away, FoundStart(joints, sigma, self.name)))
+        return [one for _, one in sorted(found, key=lambda pair: pair[0])]
 
 
 def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame) -> Iterator[_Person]:

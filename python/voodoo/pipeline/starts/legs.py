@@ -57,17 +57,17 @@ class LegsStart(StartFinder):
         self._free: dict[str, FreeSpace] = {}
         self._last: tuple[float, list[FloatArray]] | None = None
 
-    def find(self, frame: StartFrame) -> FoundStart | None:
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         if not serves(frame.body):
-            return None
+            return []
         for item in frame.measurements:
             if isinstance(item, LaserScan) and item.root_from_sensor[2, 2] >= _LEVEL:
                 free = self._free.setdefault(item.sensor, FreeSpace())
                 found = self._pair(item, _leg_middles(item, free, frame.settings.exclude))
                 if found is not None:
-                    return _found(*found, item, frame)
-        return None
+                    return [_found(*found, item, frame)]
+        return []
 
     def _pair(self, scan: LaserScan, middles: list[FloatArray]) -> tuple[FloatArray, FloatArray] | None:
         """Two legs (2, 2) [m] that were also in the previous scan, and their motion since (2,); the nearest to the laser."""

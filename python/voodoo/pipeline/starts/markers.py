@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from voodoo.measurements import MarkerSet
@@ -10,11 +12,11 @@ from voodoo.sensors.pixels import FloatArray
 
 
 class MarkersStart(StartFinder):
-    """Finds the first frame whose markers determine the pose."""
+    """Finds a person in a frame whose markers determine the pose."""
 
     name = "markers"
 
-    def find(self, frame: StartFrame) -> FoundStart | None:
+    def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
         joints: dict[str, FloatArray] = {}
         sigma: dict[str, float] = {}
@@ -24,4 +26,4 @@ class MarkersStart(StartFinder):
                     if site in frame.body.site_names and np.isfinite(position).all():
                         joints[site] = np.asarray(position, dtype=np.float64)
                         sigma[site] = frame.settings.marker_sigma if item.sigma is None else item.sigma
-        return FoundStart(joints, sigma, self.name) if fixes_pose(joints, frame.body) else None
+        return [FoundStart(joints, sigma, self.name)] if fixes_pose(joints, frame.body) else []

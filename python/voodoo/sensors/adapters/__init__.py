@@ -4,7 +4,7 @@ One adapter a file; `register` makes a new one known, see examples/uwb_tag.py. A
 adapter for each.
 """
 
-from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
 from voodoo.sensors.adapters.color import ColorAdapter
 from voodoo.sensors.adapters.depth import DepthAdapter
 from voodoo.sensors.adapters.drawing import Canvas, Log
@@ -26,6 +26,7 @@ for _adapter in (
     register(_adapter)
 
 __all__ = [
+    "NOBODY",
     "Adapter",
     "Canvas",
     "Context",

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -29,6 +29,10 @@ T = TypeVar("T")
 
 
 _TYPICAL_RANGE_M = 3.0
+NOBODY = 0
+"""Key of the part of a measurement that belongs to none of the tracked persons, see `Adapter.shares`."""
+_WRONG_M = 0.5
+"""Greatest mean distance of a measurement from the predicted sites of the person whom it belongs to."""
 
 
 class Memory:
@@ -106,6 +110,10 @@ class Context:
         add_rays(frame, rays, model=self.settings.model)
         return rays
 
+    def apart(self) -> Context:
+        """A copy; what an adapter changes in it has no effect on this one."""
+        return replace(self, gate=copy(self.gate), memory=copy(self.memory), rays=[])
+
     @cached_property
     def estimate(self) -> Estimate:
         """The tracker's last estimate, cached because the tracker creates a new object at every access."""
@@ -149,6 +157,7 @@ class Adapter(ABC, Generic[M]):
         recorded_as: what recordings call such a sensor (`SensorInfo.kind`); "": as `kind`.
         panel: sort key of its images in an overlay; None: it has no image.
         panel_of_its_own: False: no panel if another camera's image shows the same view.
+        colored: whether it is of color images, whose clothes tell several persons apart.
         while_searching: whether `add` is called while no person is tracked; then there is no prediction.
     """
 
@@ -157,6 +166,7 @@ class Adapter(ABC, Generic[M]):
     recorded_as: ClassVar[str] = ""
     panel: ClassVar[int | None] = None
     panel_of_its_own: ClassVar[bool] = True
+    colored: ClassVar[bool] = False
     while_searching: ClassVar[bool] = False
 
     def content(self, item: M) -> npt.NDArray[Any] | None:
@@ -170,6 +180,27 @@ class Adapter(ABC, Generic[M]):
         Raises:
             MeasurementError: it cannot be used.
         """
+
+    def shares(self, item: M, persons: Mapping[int, Context]) -> Mapping[int, M]:
+        """The part of a measurement that belongs to each of several persons.
+
+        By default all of it belongs to the person whose predicted sites its positions and rays are nearest to.
+
+        Args:
+            item: the measurement.
+            persons: number -> context of every person who is tracked; at least one.
+
+        Returns:
+            Number of a person, or NOBODY -> the part.
+        """
+        away = {}
+        for number, context in persons.items():
+            trial, frame = context.apart(), Frame(stamp=context.stamp)
+            self.add(frame, item, trial)
+            trial.add_rays(frame)
+            away[number] = frame._distance(context.predicted)
+        nearest = min(away, key=lambda number: away[number])
+        return {nearest if away[nearest] < _WRONG_M else NOBODY: item}
 
     def learn(self, item: M, estimate: Estimate, memory: Memory, *, trusted_start: bool) -> None:
         """Learn from the estimate of a frame; `trusted_start`: the user set the initial pose."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,6 +51,7 @@ class ColorAdapter(Adapter[ColorImage]):
 
     kind = "color"
     measurement = ColorImage
+    colored = True
 
     def content(self, item: ColorImage) -> npt.NDArray[Any]:
         """The image."""
@@ -68,6 +70,10 @@ class ColorAdapter(Adapter[ColorImage]):
                 context.tracker.set_background(item.sensor, [known.picture(picture) for picture in empty])
             context.memory.put(self.kind, item.sensor, known)
         known.add(frame, item)
+
+    def shares(self, item: ColorImage, persons: Mapping[int, Context]) -> Mapping[int, ColorImage]:
+        """Color regions are those of a single person."""
+        return {}
 
     def draw(self, item: ColorImage, canvas: Canvas, memory: Memory) -> None:
         """The border of what is the body by its colors, and the edges along its contour, where the settings ask for it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy as np
 from voodoo._core import Frame
 from voodoo.measurements import DepthImage, KeypointImage
 from voodoo.recordings.keypoint_layouts import layout_of
-from voodoo.sensors.adapters.base import Adapter, Context, Memory
+from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
 from voodoo.sensors.adapters.drawing import Canvas, Log
+from voodoo.sensors.keypoints.people import assign_keypoints
 from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
 from voodoo.sensors.keypoints.sites import nearest_person
 
@@ -66,6 +68,11 @@ class KeypointsAdapter(Adapter[KeypointImage]):
         context.rays.extend(rays)
         for site, (position, sigma) in points.items():
             frame.add_position(site, position, weight=chosen.model.weight(sigma), source=item.sensor)
+
+    def shares(self, item: KeypointImage, persons: Mapping[int, Context]) -> Mapping[int, KeypointImage]:
+        """The detected people are assigned to the persons jointly."""
+        assigned = assign_keypoints(item, {number: context.predicted for number, context in persons.items()})
+        return {**assigned.of, NOBODY: assigned.rest}
 
     def forget(self, memory: Memory) -> None:
         """Nobody's keypoints are used."""

@@ -22,6 +22,7 @@ class SkinAdapter(Adapter[ColorImage]):
 
     kind = "skin"
     measurement = ColorImage
+    colored = True
     recorded_as = "color"
     panel = 1
 
@@ -49,6 +50,10 @@ class SkinAdapter(Adapter[ColorImage]):
             moved=context.predicted,
         )
         context.rays.extend(rays)
+
+    def shares(self, item: ColorImage, persons: Mapping[int, Context]) -> Mapping[int, ColorImage]:
+        """Everybody's skin is searched for in the whole image, where the settings ask for it."""
+        return {number: item for number, context in persons.items() if context.settings.skin.each}
 
     def learn(self, item: ColorImage, estimate: Estimate, memory: Memory, *, trusted_start: bool) -> None:
         """Colors of the face."""

@@ -11,13 +11,13 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from synthetic.boxes import Box, room_depth
+from synthetic.gait import Stop, pose_at
 from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
-from voodoo.synthetic.boxes import Box, room_depth
-from voodoo.synthetic.gait import Stop, pose_at
 from voodoo.synthetic.render import render_depth
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]

@@ -9,11 +9,11 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from synthetic.boxes import Box
+from synthetic.gait import path
+from synthetic.grown import grown
+from synthetic.people import Color, MadeUpRecording, Noise, Scene, Walker
 from voodoo.model.body import Body
-from voodoo.synthetic.boxes import Box
-from voodoo.synthetic.gait import path
-from voodoo.synthetic.grown import grown
-from voodoo.synthetic.people import Color, MadeUpRecording, Noise, Scene, Walker
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Points: TypeAlias = Sequence[tuple[float, float, float]]

@@ -11,14 +11,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from synthetic.gait import path, pose_at
+from synthetic.people import WIDER, Noise, Walker, labels_of, paint, wider
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording, RecordingInfo, Reference
-from voodoo.synthetic.gait import path, pose_at
-from voodoo.synthetic.people import WIDER, Noise, Walker, labels_of, paint, wider
 from voodoo.synthetic.render import RenderedDepth, render_depth
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]

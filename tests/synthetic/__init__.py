@@ -1,0 +1,1 @@
+"""Rendered persons and recordings with exact truth, for tests, benchmarks and experiments."""

@@ -1,0 +1,105 @@
+"""Detections that come with a frame: who is measured, who comes back, who is new."""
+
+import numpy as np
+import pytest
+
+import voodoo
+from scene import standing_joints
+from voodoo.errors import BodyError, MeasurementError
+from voodoo.pipeline.start import stature
+
+BODY = voodoo.Body.human(1.75)
+
+
+def person(x=2.5, y=0.0):
+    return {name: place + (x, y, 0.0) for name, place in standing_joints(BODY).items()}
+
+
+def frame(stamp, *persons, **how):
+    made = voodoo.Frame(stamp)
+    for joints in persons:
+        made.add_detection(joints, **{"weight": 8.0, **how})
+    return made
+
+
+def root(estimate):
+    return estimate.joints["humanoid_root"]
+
+
+def test_a_detection_starts_a_tracker_and_then_measures_the_person():
+    tracker = voodoo.Tracker(BODY, detector=None)
+    with pytest.raises(MeasurementError, match="pose"):
+        tracker.step(frame(0.0))
+    for index in range(20):
+        there = person(2.5, 0.02 * index)
+        estimate = tracker.step(frame(index / 30.0, there))
+        assert estimate.status == "tracking"
+        assert np.linalg.norm(root(estimate) - there["humanoid_root"]) < 0.03, index
+    assert estimate.sources["detections"][0] == len(there)
+
+
+def test_everybody_gets_a_number_and_keeps_it():
+    people, before = voodoo.People(detector=None), None
+    for index in range(30):
+        # They pass each other, 1.2 m apart, and the order of the detections changes.
+        here, there = person(2.0, 1.5 - 0.1 * index), person(3.2, 0.1 * index - 1.5)
+        found = people.step(frame(index / 30.0, *((here, there) if index % 2 else (there, here))))
+        assert [one.id for one in found] == [1, 2], index
+        places = np.array([root(one.estimate) for one in found])
+        assert before is None or np.linalg.norm(places - before, axis=1).max() < 0.2
+        before = places
+    again = people.step(frame(1.0, here))
+    assert [one.id for one in again] == [1, 2] and [one.status for one in again].count("lost") == 1
+
+
+def test_who_was_away_gets_the_same_number_and_their_sizes():
+    people, child = voodoo.People(detector=None), {name: 0.7 * place for name, place in person().items()}
+    for index in range(60):
+        people.step(frame(index / 30.0, child))
+    size = stature(people.body(1))
+    for index in range(60, 150):
+        found = people.step(voodoo.Frame(index / 30.0))
+    assert len(found) == 0
+    (back,) = people.step(frame(5.0, {name: place + (0.2, 0.0, 0.0) for name, place in child.items()}))
+    assert back.id == 1 and back.status == "tracking"
+    assert stature(people.body(1)) == pytest.approx(size, rel=0.01) and size < 1.4
+
+
+def test_a_doubtful_detection_needs_others():
+    people = voodoo.People(detector=None)
+    count = [len(people.step(frame(index / 30.0, person(), log_odds=2.5))) for index in range(4)]
+    assert count == [0, 0, 1, 1]
+    others = voodoo.People(detector=None)
+    assert not any(len(others.step(frame(index / 30.0, person(), log_odds=0.5))) for index in range(9))
+
+
+def test_limit_and_region_hold_for_detections():
+    box = ((0.0, -1.0, -2.0), (5.0, 1.0, 4.0))
+    inside = voodoo.People(detector=None, region=box)
+    assert [root(one.estimate)[1] for one in inside.step(frame(0.0, person(), person(2.5, 2.0)))] == [
+        pytest.approx(0.0)
+    ]
+    assert len(voodoo.People(detector=None, limit=1).step(frame(0.0, person(), person(2.5, 2.0)))) == 1
+
+
+def test_what_determines_no_pose_starts_nobody_and_what_is_wrong_is_refused():
+    people, tracker = voodoo.People(detector=None), voodoo.Tracker(BODY, detector=None)
+    few = {name: person()[name] for name in ("l_wrist", "r_wrist")}
+    assert not len(people.step(frame(0.0, few, {})))
+    assert tracker.step(frame(0.0, few)).status == "searching"
+    people.step(frame(0.1, person()))
+    for joints, error, words in (
+        ({"l_nose": (0, 0, 0)}, BodyError, "l_nose"),
+        ({"l_hip": (0, 0)}, MeasurementError, "l_hip"),
+        ({"l_hip": (np.nan, 0, 0)}, MeasurementError, r"detections\[0\]"),
+    ):
+        with pytest.raises(error, match=words):
+            people.step(frame(0.2, joints))
+    for how, words in (
+        ({"weight": -1.0}, "weight"),
+        ({"log_odds": np.nan}, "log odds"),
+        ({"log_odds": "sure"}, "log_odds"),
+    ):
+        with pytest.raises(MeasurementError, match=words):
+            people.step(frame(0.2, person(), **how))
+    assert [one.id for one in people.step(frame(0.2, person()))] == [1]
