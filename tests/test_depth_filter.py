@@ -1,12 +1,9 @@
 """Depth edges."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from skin_scene import CAMERA, POSE, Z, at
-from voodoo import Camera, MeasurementError
+from voodoo import MeasurementError
 from voodoo.sensors.depth import DepthFilter
 
 

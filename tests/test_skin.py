@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import voodoo
+from measurement_data import data_folder
 from scene import rest_pose, turn
 from skin_scene import CAMERA, POSE, SKIN, Pose, Z, at, learned, picture, pixel_error
-from measurement_data import data_folder
 from voodoo import Config, MeasurementError
 from voodoo.measurements import DepthImage
 from voodoo.pipeline.front_end import FrontEnd
@@ -180,7 +180,7 @@ def test_a_hand_is_a_forearm_away_from_its_elbow():
 def test_a_door_of_the_same_color_gives_no_wrong_hand():
     skin = SkinTracker()
     door = (20, 60, 90, 235)
-    head, left, right = learned(skin, frames=60, door=door)
+    head, _, right = learned(skin, frames=60, door=door)
     for seed, hand in enumerate([(100, 125), (60, 150)]):  # near the door, and in front of it
         joints = Pose(head, hand, right).joints
         for ray in skin.observe(picture(head, hand, right, door=door, seed=seed), CAMERA, POSE, joints):
@@ -238,7 +238,12 @@ def test_no_places_and_places_that_are_nowhere_give_nothing():
     skin = SkinTracker()
     head, left, right = learned(skin)
     image = picture(head, left, right)
-    for joints in ({}, {"l_hand": np.full(3, np.nan)}, {"l_hand": np.array([-2.0, 0.0, 1.0])}, {"l_hand": np.full(3, 1e300)}):
+    for joints in (
+        {},
+        {"l_hand": np.full(3, np.nan)},
+        {"l_hand": np.array([-2.0, 0.0, 1.0])},
+        {"l_hand": np.full(3, 1e300)},
+    ):
         assert skin.observe(image, CAMERA, POSE, joints, depth=beside()) == []
     assert len(skin.observe(image, CAMERA, POSE, Pose(head, left, right).joints)) == 3
 

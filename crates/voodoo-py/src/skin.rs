@@ -94,6 +94,7 @@ impl PySkinCue {
         self.cue.assigned.clone()
     }
 
+    #[doc = stub!("SkinCue.observe")]
     #[pyo3(signature = (image, predicted, *, stamp, world_from_sensor, camera, depth, tracker, others))]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
@@ -133,7 +134,8 @@ impl PySkinCue {
                 (_, Some(meters)) => DepthPixels::F32(meters.as_slice()?),
                 _ => return Err(wrong()),
             };
-            let found = DepthBeside::new(pixels, *per_unit, camera, rows_of("world_from_depth", pose)?, &eye);
+            let depth = Eye { world_from_sensor: rows_of("world_from_depth", pose)?, camera };
+            let found = DepthBeside::new(pixels, *per_unit, depth, eye);
             beside = Some(found.map_err(|error| error.into_py(py))?);
         }
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
@@ -154,6 +156,7 @@ impl PySkinCue {
         Ok(found.iter().map(|site| (site.site, row(site.direction), site.place.map(row), site.depth)).collect())
     }
 
+    #[doc = stub!("SkinCue.learn")]
     #[pyo3(signature = (image, joints, sites, *, world_from_sensor, camera))]
     fn learn<'py>(
         &mut self,

@@ -52,6 +52,11 @@ impl Eye<'_> {
         self.camera.ray(pixel).unwrap_or([f64::NAN; 2])
     }
 
+    /// Position in the world at `(x/z, y/z)` and the depth z, meters.
+    pub fn place(&self, [x, y]: [f64; 2], z: f64) -> Vec3 {
+        self.origin() + z * (x * self.column(0) + y * self.column(1) + self.column(2))
+    }
+
     /// Unit vector in the world through `(x/z, y/z)`.
     pub fn direction(&self, [x, y]: [f64; 2]) -> Vec3 {
         (x * self.column(0) + y * self.column(1) + self.column(2)).normalize()

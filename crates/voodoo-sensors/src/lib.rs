@@ -1,5 +1,5 @@
-//! Converts sensor data to measurements for [`voodoo_core`]: keypoints of 2-D networks and their gates, depth registered to another
-//! camera's image, skin color, masks.
+//! Converts sensor data to measurements for [`voodoo_core`]: keypoints of 2-D networks and their gates, surfaces among registered
+//! depth points, skin color.
 
 pub mod carried;
 pub mod eye;

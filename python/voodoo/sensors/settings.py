@@ -89,6 +89,11 @@ class FrontEndSettings:
         if unknown or not self.use:
             raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
 
+    @property
+    def clothes(self) -> bool:
+        """Whether colors of clothes tell several persons apart: by default, and if a cue of color images is used."""
+        return self.use == default_inputs() or not {"color", "skin"}.isdisjoint(self.use)
+
     @classmethod
     def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:
         """Returns the defaults for a recording, with the inputs in `use`.

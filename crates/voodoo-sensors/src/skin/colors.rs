@@ -76,8 +76,8 @@ impl SkinColors {
     /// Learns from the pixels of a face, of which those near the colors of skin count, and from those that show no skin.
     pub(super) fn learn(&mut self, face: impl Iterator<Item = [u8; 3]>, rest: impl Iterator<Item = [u8; 3]>) {
         let near = |index: &usize| self.is_near[*index];
-        let Some(skin) = histogram(face.filter_map(bin).filter(near), FEWEST) else { return };
-        let Some(rest) = histogram(rest.filter_map(bin), FEWEST) else { return };
+        let Some(skin) = histogram(face.filter_map(bin).filter(near)) else { return };
+        let Some(rest) = histogram(rest.filter_map(bin)) else { return };
         let keep = if self.learned < FIRST_IMAGES { FORGETTING_AT_FIRST } else { FORGETTING };
         let mixed = |old: &mut f32, new: f32| *old = keep * *old + (1.0 - keep) * new;
         self.skin.iter_mut().zip(skin).for_each(|(old, new)| mixed(old, new));
@@ -88,8 +88,8 @@ impl SkinColors {
     }
 }
 
-/// Smoothed and normalized histogram of colors; `None` for fewer than `fewest`.
-fn histogram(bins: impl Iterator<Item = usize>, fewest: f32) -> Option<Vec<f32>> {
+/// Smoothed and normalized histogram of colors; `None` for fewer than [`FEWEST`].
+fn histogram(bins: impl Iterator<Item = usize>) -> Option<Vec<f32>> {
     let (mut values, mut count) = (vec![0.0_f32; BINS], 0.0_f32);
     bins.for_each(|bin| {
         values[bin] += 1.0;
@@ -106,7 +106,7 @@ fn histogram(bins: impl Iterator<Item = usize>, fewest: f32) -> Option<Vec<f32>>
         values = (0..BINS).map(smoothed).collect();
     }
     normalize(&mut values);
-    (count >= fewest).then_some(values)
+    (count >= FEWEST).then_some(values)
 }
 
 fn normalize(values: &mut [f32]) {
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn the_colors_of_a_face_are_learned_and_those_around_it_are_not() {
-        let (face, wood, hair) = ([120, 150, 205], [110, 140, 190], [60, 60, 60]);
+        let (face, wood, hair) = ([120, 150, 205], [60, 110, 170], [60, 60, 60]);
         let mut colors = SkinColors::default();
         assert!(colors.contains(face) && colors.contains(wood) && !colors.contains(hair));
         for _ in 0..8 {

@@ -1,52 +1,40 @@
 //! Looks up the depth of a color camera's pixels in the image of a depth camera beside it.
 
-use crate::eye::{Eye, Matrix};
-use voodoo_core::math::Vec3;
-use voodoo_core::{Camera, DepthPixels, TrackError};
+use crate::eye::Eye;
+use voodoo_core::{DepthPixels, TrackError};
 
 /// Two depths within this are of one surface, meters.
 const SAME: f64 = 0.1;
 
-/// A depth image and the transforms between its camera and a color camera.
+/// A depth image beside a color camera.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthBeside<'a> {
     image: DepthPixels<'a>,
     meters_per_unit: f64,
-    camera: &'a Camera,
-    depth_from_color: Matrix,
+    depth: Eye<'a>,
+    color: Eye<'a>,
 }
 
 impl<'a> DepthBeside<'a> {
-    /// A depth image whose camera has this pose, beside the color camera `eye`.
+    /// The image of the camera `depth` beside the camera `color`.
     ///
     /// # Errors
     /// [`TrackError::Measurement`] when the image is not of the camera's size.
     pub fn new(
         image: DepthPixels<'a>,
         meters_per_unit: f64,
-        camera: &'a Camera,
-        world_from_depth: Matrix,
-        eye: &Eye,
+        depth: Eye<'a>,
+        color: Eye<'a>,
     ) -> Result<Self, TrackError> {
-        if camera.pixels() != image.len() {
-            let found = format!("{} for {} pixels", image.len(), camera.pixels());
+        if depth.camera.pixels() != image.len() {
+            let found = format!("{} for {} pixels", image.len(), depth.camera.pixels());
             return Err(TrackError::measurement("depth", "a depth for every pixel of the camera", found));
         }
-        let depth = Eye { world_from_sensor: world_from_depth, camera };
-        let origin = depth.in_sensor(eye.origin()).to_array();
-        let mut depth_from_color = [[0.0; 4]; 4];
-        for row in 0..3 {
-            for column in 0..3 {
-                depth_from_color[row][column] =
-                    (0..3).map(|of| world_from_depth[of][row] * eye.world_from_sensor[of][column]).sum();
-            }
-            depth_from_color[row][3] = origin[row];
-        }
-        Ok(Self { image, meters_per_unit, camera, depth_from_color })
+        Ok(Self { image, meters_per_unit, depth, color })
     }
 
-    /// Depth along the color camera's axis, meters, of what is seen on its ray `(x/z, y/z)`, if that is near the depth `z`;
-    /// `None` if it is not known.
+    /// Depth along the color camera's axis, meters, of what is seen on its ray `(x/z, y/z)`; `None` if it is not known. `z` is the
+    /// depth that is expected.
     pub(super) fn at(&self, ray: [f64; 2], z: f64) -> Option<f64> {
         let first = self.look(ray, z)?;
         if (first - z).abs() < SAME {
@@ -56,25 +44,16 @@ impl<'a> DepthBeside<'a> {
         self.look(ray, first).filter(|second| (second - first).abs() < SAME)
     }
 
-    fn look(&self, [x, y]: [f64; 2], z: f64) -> Option<f64> {
-        let transform = &self.depth_from_color;
-        let turned =
-            |row: usize, [x, y, z]: [f64; 3]| transform[row][0] * x + transform[row][1] * y + transform[row][2] * z;
-        let place = [0, 1, 2].map(|row| turned(row, [x * z, y * z, z]) + transform[row][3]);
-        let [u, v] = self.camera.project(Vec3::from_array(place))?.map(f64::round);
-        let (width, height) = (self.camera.width() as f64, self.camera.height() as f64);
-        if !(u >= 0.0 && v >= 0.0 && u < width && v < height) {
+    /// Depth of what the depth camera sees where this ray has the depth `z`.
+    fn look(&self, ray: [f64; 2], z: f64) -> Option<f64> {
+        let camera = self.depth.camera;
+        let [u, v] = self.depth.pixel(self.depth.in_sensor(self.color.place(ray, z))).map(f64::round);
+        if !(u >= 0.0 && v >= 0.0 && u < camera.width() as f64 && v < camera.height() as f64) {
             return None;
         }
-        let index = v as usize * self.camera.width() + u as usize;
+        let index = v as usize * camera.width() + u as usize;
         let depth = f64::from(self.image.get(index)) * self.meters_per_unit;
-        if !(depth > 0.0 && depth.is_finite()) {
-            return None;
-        }
-        let [x, y] = self.camera.rays()[index].map(f64::from);
-        let offset = [x * depth, y * depth, depth];
-        let offset = [0, 1, 2].map(|row| offset[row] - transform[row][3]);
-        // The inverse of a rigid transform.
-        Some((0..3).map(|row| transform[row][2] * offset[row]).sum())
+        let place = self.depth.place(camera.rays()[index].map(f64::from), depth);
+        Some(self.color.in_sensor(place).z).filter(|z| depth > 0.0 && z.is_finite())
     }
 }

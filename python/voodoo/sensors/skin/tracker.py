@@ -130,7 +130,7 @@ class SkinTracker:
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
         self._stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
-        beside = depth and (depth.image, depth.meters_per_unit, depth.camera, depth.root_from_sensor)
+        beside = None if depth is None else (depth.image, depth.meters_per_unit, depth.camera, depth.root_from_sensor)
         found = self._cue.observe(
             np.ascontiguousarray(image),
             predicted,
