@@ -75,7 +75,7 @@ pub struct People {
     tentative: TentativeTracks,
     detector: BoundDetector,
     last_detection: Option<f64>,
-    /// Whether everybody is wanted, who stood still from the start as well; otherwise the one who is followed is.
+    /// Whether everybody is wanted; otherwise only the one who is followed, and others are looked for when something moves.
     everybody: bool,
     stamp: Option<f64>,
     threads: Threads,
@@ -335,7 +335,7 @@ impl People {
                 }
             }
             for found in found {
-                let still = self.everybody && self.scene.is_still(frame, number, &found.detection.pixels);
+                let still = self.scene.is_still(frame, number, &found.detection.pixels);
                 self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), still);
             }
         }
