@@ -210,8 +210,8 @@ impl SkinCue {
         let window = window(&input.eye, input.joints, SEARCHED);
         let (width, columns) = (input.eye.camera.width(), window[1].len());
         let index = |(row, column): (usize, usize)| row * width + column;
-        let colored =
-            pixels(&window).map(|pixel| u8::from(self.colors.contains(input.image[index(pixel)]))).collect::<Vec<_>>();
+        let rows = window[0].clone().flat_map(|row| &input.image[row * width..][window[1].clone()]);
+        let colored: Vec<u8> = rows.map(|color| u8::from(self.colors.contains(*color))).collect();
         let mut mask = smoothed(&colored, columns.max(1));
         let mut ranges = vec![f64::NAN; mask.len()];
         if let Some(depth) = &input.depth {
@@ -393,7 +393,8 @@ impl SkinCue {
             }
         }
         let within = |discs: &[([f64; 2], f64)], (row, column): (usize, usize)| {
-            discs.iter().any(|(middle, radius)| apart(*middle, [column as f64, row as f64]) <= *radius)
+            let off = |middle: &[f64; 2]| (middle[0] - column as f64).powi(2) + (middle[1] - row as f64).powi(2);
+            discs.iter().any(|(middle, radius)| off(middle) <= radius * radius)
         };
         let window = window(eye, joints, LEARNED);
         let color = |(row, column): (usize, usize)| image[row * eye.camera.width() + column];

@@ -2,17 +2,17 @@
 
 /// Whether at least `least` of a pixel and its eight neighbors are set; those outside do not count.
 fn counted(mask: &[u8], width: usize, least: u8) -> Vec<u8> {
-    let across: Vec<u8> = (0..mask.len())
-        .map(|index| {
-            let column = index % width;
-            mask[index]
-                + if column > 0 { mask[index - 1] } else { 0 }
-                + if column + 1 < width { mask[index + 1] } else { 0 }
-        })
-        .collect();
-    let at = |index: Option<usize>| index.and_then(|index| across.get(index)).copied().unwrap_or(0);
-    let sum = |index: usize| across[index] + at(index.checked_sub(width)) + at(Some(index + width));
-    (0..mask.len()).map(|index| u8::from(sum(index) >= least)).collect()
+    let add = |sums: &mut [u8], others: &[u8]| sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += other);
+    let mut across = mask.to_vec();
+    for (sums, row) in across.chunks_exact_mut(width).zip(mask.chunks_exact(width)) {
+        add(&mut sums[1..], row);
+        add(sums, &row[1..]);
+    }
+    let mut found = across.clone();
+    add(found.get_mut(width..).unwrap_or_default(), &across);
+    add(&mut found, across.get(width..).unwrap_or_default());
+    found.iter_mut().for_each(|sum| *sum = u8::from(*sum >= least));
+    found
 }
 
 /// Removes single pixels of a mask, and fills gaps of one.
