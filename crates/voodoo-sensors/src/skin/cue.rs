@@ -233,11 +233,12 @@ impl SkinCue {
         let ([rows, columns], mask) = &self.mask;
         let width = columns.len().max(1);
         let at = |index: usize| [(columns.start + index % width) as f64, (rows.start + index / width) as f64];
+        let smallest = sites.iter().map(|site| smallest(input, site)).fold(f64::INFINITY, f64::min);
         let largest = MOST_FACES * PI * (FACE / PALM * palm).powi(2);
         let mut found = Vec::new();
         for (region, members) in regions(mask, width).iter().enumerate() {
             let area = members.len();
-            if area < FEWEST_PIXELS || area as f64 > largest {
+            if area < FEWEST_PIXELS || !(smallest..=largest).contains(&(area as f64)) {
                 continue;
             }
             let mut add = |only: Option<usize>, pixel: [f64; 2]| {
@@ -303,9 +304,7 @@ impl SkinCue {
             let beside = input.depth.is_some() && side.is_some();
             let widest = if beside { self.settings.widest_gate } else { self.settings.lost_gate };
             let gate = (self.settings.gate + self.settings.growth * (input.stamp - since).max(0.0)).min(widest);
-            let smallest = SMALLEST[usize::from(input.depth.is_none())]
-                * PI
-                * (PALM * input.eye.focal() / input.eye.in_sensor(site.place).z).powi(2);
+            let smallest = smallest(input, site);
             let own_arm =
                 |role| matches!(role, Some(LimbRole::Forearm(own) | LimbRole::Hand(own)) if Some(own) == side);
             for (column, candidate) in self.candidates.iter().enumerate() {
@@ -402,6 +401,12 @@ impl SkinCue {
         self.colors.learn(face, pixels(&window).filter(|pixel| !within(&shown, *pixel)).map(color));
         Ok(())
     }
+}
+
+/// Least area of a region that is a site, pixels.
+fn smallest(input: &SkinInput, site: &Expected) -> f64 {
+    let palm = PALM * input.eye.focal() / input.eye.in_sensor(site.place).z;
+    SMALLEST[usize::from(input.depth.is_none())] * PI * palm * palm
 }
 
 fn check(image: &[[u8; 3]], eye: &Eye) -> Result<(), TrackError> {
