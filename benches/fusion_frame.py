@@ -17,7 +17,6 @@ import cv2
 import numpy as np
 
 import voodoo
-import voodoo.sensors.adapters.skin as skin_adapter
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings import ColorImage, KeypointImage, RecordedFrame, Recording, open_recording, sample_path
@@ -83,7 +82,7 @@ def run(recording: Recording, frames: list[RecordedFrame]) -> None:
     body = voodoo.Body.human(height=recording.start["height_m"], model="full")
     tracker = voodoo.Tracker(body)
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
-    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth", "scan", "keypoints", "skin"), ground_z=0.0))
     for recorded in frames:
         front_end.step(recorded)
 
@@ -113,8 +112,7 @@ def parts(recording: Recording, frames: list[RecordedFrame]) -> dict[str, float]
 
     owners = {
         "of it the tracker's step": (voodoo.Tracker, "step"),
-        "skin: body in the picture": (skin_adapter, "body_view"),
-        "skin: regions and their names": (SkinTracker, "observe"),
+        "skin: regions": (SkinTracker, "observe"),
         "skin: learning": (SkinTracker, "learn"),
         "keypoints": (KeypointsAdapter, "add"),
     }

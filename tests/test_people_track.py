@@ -301,7 +301,7 @@ REFUSED = {
     "`--init FILE`": ("init: expected none", ("--init", "start.json")),
     "`--draw-regions`, `--background`": ("draw-regions: expected none with", ("--draw-regions",)),
     "a body that the detector does not know": (
-        "by depth, skin alone the body 'lamp' is not found",
+        "by depth alone the body 'lamp' is not found",
         ("--body", "lamp.toml"),
     ),
 }
@@ -355,7 +355,7 @@ def test_what_works_with_several_people(run, with_sensor, what, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--layout", "body25"), "layout: expected an input it is for (keypoints), found depth, skin"),
+        (("--layout", "body25"), "layout: expected an input it is for (keypoints), found depth"),
         (("--marker-map", "map.toml"), "marker-map: expected an input it is for (markers)"),
         (("--draw-regions",), "draw-regions: expected an input it is for (color)"),
         (("--use", "skin", "--depth-range", "1,3"), "depth-range: expected an input it is for (depth), found skin"),

@@ -241,7 +241,7 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
     for refused in (range(0), range(0, 25, 2)):
         tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
         tracker.reset(joints=recording.start["joints"], fit_sizes=True)
-        front_end = FrontEnd(tracker)
+        front_end = FrontEnd(tracker, settings=FrontEndSettings(use=(*FrontEndSettings().use, "skin")))
         steps = []
         for index, plain in enumerate(frames):
             observed = with_keypoints(plain, tracker.estimate.joints)
@@ -319,7 +319,7 @@ def test_a_frozen_color_camera_is_left_out(whole):
     recording = open_recording(sample_path())
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
-    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth", "skin"), ground_z=0.0))
     named = 0
     for index, (recorded, _) in enumerate(zip(paired(recording), range(FRAMES), strict=False)):
         front_end.step(RecordedFrame(recorded.stamp, tuple(freeze(index, list(recorded.measurements)))))
@@ -331,7 +331,7 @@ def test_a_face_pulls_less_while_depth_shows_the_head():
     recording = open_recording(sample_path())
     tracker = voodoo.Tracker(voodoo.Body.human(height=recording.start["height_m"]))
     tracker.reset(joints=recording.start["joints"], fit_sizes=True)
-    front_end = FrontEnd(tracker, settings=FrontEndSettings(ground_z=0.0))
+    front_end = FrontEnd(tracker, settings=FrontEndSettings(use=("depth", "skin"), ground_z=0.0))
     biases = set()
     for recorded, _ in zip(paired(recording), range(12), strict=False):
         displayed = tracker.estimate.limb_status["head"] == "measured"

@@ -309,7 +309,7 @@ def test_the_found_pose_is_a_start(tmp_path):
 def test_what_nothing_can_find_is_reported_at_once(tmp_path):
     recording = open_recording(sample_path(), bare=True)
     lamp = voodoo.Body.load(Path(__file__).parent.parent / "examples" / "bodies" / "lamp.toml")
-    with pytest.raises(VoodooError, match=r"by depth, scan, skin alone the body 'lamp' is not found.*--init FILE"):
+    with pytest.raises(VoodooError, match=r"by depth, scan alone the body 'lamp' is not found.*--init FILE"):
         start_tracker(recording, body=lamp)
     with pytest.raises(VoodooError, match="by scan alone"):
         start_tracker(recording, use=("scan",), model="full")

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 __all__ = [
     "Body",
-    "BodyView",
     "Camera",
     "Chain",
     "ClosestPoints",
@@ -23,15 +22,12 @@ __all__ = [
     "SiteGate",
     "SiteRay",
     "SkinCue",
-    "SkinTeacher",
-    "StillDepth",
     "TaperedEllipticCylinder",
     "Tracker",
     "View",
     "__version__",
     "_estimate",
     "body_before",
-    "body_view",
     "carried",
     "config_fields",
     "euler_angles",
@@ -103,145 +99,57 @@ def linear_sum_assignment(costs: npt.NDArray[np.float64]) -> list[tuple[int, int
     """
 
 @final
-class BodyView:
-    """Depth measurements near the body, registered to the image of a color camera beside the depth camera.
-
-    Args:
-        mask: (H, W) of the image: True where a point near the body was measured, or outside the depth camera's field of view.
-        pixels: (N, 2) of the points in the image.
-        depths: (N,) of the points along the color camera's optical axis [m].
-        still: (N,) whether no surface behind a point was ever observed, so that it may be the scene. None: not known.
-        before: (H, W) of the image: True where a surface lies in front of one observed earlier. None: not known.
-
-    Raises:
-        MeasurementError: arrays whose shapes do not match.
-    """
-
-    def __new__(
-        cls,
-        mask: npt.NDArray[np.bool_],
-        pixels: npt.NDArray[np.float64],
-        depths: npt.NDArray[np.float64],
-        still: npt.NDArray[np.bool_] | None = None,
-        before: npt.NDArray[np.bool_] | None = None,
-    ) -> BodyView: ...
-    @property
-    def mask(self) -> npt.NDArray[np.bool_]: ...
-    @property
-    def pixels(self) -> npt.NDArray[np.float64]: ...
-    @property
-    def depths(self) -> npt.NDArray[np.float64]: ...
-    @property
-    def still(self) -> npt.NDArray[np.bool_] | None: ...
-    @property
-    def before(self) -> npt.NDArray[np.bool_] | None: ...
-
-@final
-class StillDepth:
-    """Candidates for the still scene of a static depth camera, so that a table's edge does not become a hand.
-
-    A pixel is a candidate if its depth has not changed over some images and no surface behind it was ever observed. A person
-    who has not moved yet is a candidate too, so only a negative answer is certain: that pixel has changed.
-    """
-
-    def __new__(cls) -> StillDepth: ...
-    def __copy__(self) -> StillDepth: ...
-
-def body_view(
-    depth: npt.NDArray[np.uint16] | npt.NDArray[np.float32],
-    camera: _Camera,
-    joints: npt.NDArray[np.float64],
-    *,
-    meters_per_unit: float,
-    world_from_depth: npt.NDArray[np.float64],
-    color_from_depth: npt.NDArray[np.float64],
-    color_camera: _Camera,
-    beyond: Callable[[float], npt.NDArray[np.bool_]],
-    reach: int,
-    step: int,
-    margin: float,
-    scene: StillDepth | None,
-) -> BodyView:
-    """Registers a depth image near the body to a color image; see voodoo.sensors.body_view.
-
-    Args:
-        depth: (H, W) depth image.
-        camera: its calibration.
-        joints: (N, 3) of the body in the world [m].
-        meters_per_unit: of `depth`.
-        world_from_depth, color_from_depth: (4, 4).
-        color_camera: calibration of the color camera.
-        beyond: returns, for a distance from the depth camera [m], the pixels (H, W) of the color image outside the depth
-            camera's field of view.
-        reach: a point covers the pixels within this many rows and columns, to close gaps.
-        step: every step-th row and column of the depth image is used.
-        margin: enlargement of the box around the body [m].
-        scene: is updated with the image.
-
-    Raises:
-        MeasurementError: arrays whose shapes do not match.
-    """
-
-@final
-class SkinTeacher:
-    """The color and background models of skin of one camera; see voodoo.sensors.skin."""
-
-    def __new__(cls) -> SkinTeacher: ...
-    @property
-    def learned(self) -> int: ...
-    @property
-    def skin(self) -> npt.NDArray[np.float32]: ...
-    def learn(
-        self,
-        cue: SkinCue,
-        image: npt.NDArray[np.uint8] | None,
-        places: npt.NDArray[np.float64],
-        *,
-        world_from_sensor: npt.NDArray[np.float64],
-        camera: _Camera,
-        half_life: float,
-        every: int,
-        settled: int,
-    ) -> None: ...
-
-@final
 class SkinCue:
-    """The tracked skin regions of one camera and their assignment to sites; see voodoo.sensors.skin."""
+    """The learned colors of skin of one camera, and regions of skin as candidates for head and hands; see voodoo.sensors.skin."""
 
     def __new__(
-        cls,
-        sites: Sequence[str],
-        *,
-        gate: float,
-        growth: float,
-        lost_gate: float,
-        widest_gate: float,
-        unexplained: float,
-        ambiguity: float,
+        cls, sites: Sequence[str], *, gate: float, growth: float, lost_gate: float, widest_gate: float
     ) -> SkinCue: ...
     def __copy__(self) -> SkinCue: ...
     @property
-    def mask(self) -> npt.NDArray[np.bool_] | None: ...
+    def learned(self) -> int: ...
     @property
-    def candidates(self) -> list[tuple[tuple[float, float], int, int, bool]]: ...
+    def colors(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def mask(self) -> npt.NDArray[np.bool_]: ...
+    @property
+    def candidates(self) -> list[tuple[tuple[float, float], int, int]]: ...
     @property
     def assigned(self) -> list[tuple[int, int]]: ...
     def observe(
         self,
-        teacher: SkinTeacher,
         image: npt.NDArray[np.uint8],
         predicted: Mapping[str, npt.NDArray[np.float64]],
         *,
         stamp: float,
         world_from_sensor: npt.NDArray[np.float64],
         camera: _Camera,
-        body: BodyView | None,
-        settled: bool,
-        arm_lost: Sequence[bool],
-        upper_arm_visible: Sequence[bool],
+        depth: tuple[npt.NDArray[Any], float, _Camera, npt.NDArray[np.float64]] | None,
         tracker: Tracker | tuple[People, int] | None,
         others: Sequence[Tracker | tuple[People, int]],
-    ) -> list[tuple[int, npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64] | None, float]]: ...
+    ) -> list[tuple[int, npt.NDArray[np.float64], npt.NDArray[np.float64] | None, float]]:
+        """Returns for each detected site its index, the direction of its ray, its position, and its predicted depth.
+
+        Args:
+            image: (H, W, 3) BGR.
+            predicted: site name -> (3,) in the world.
+            stamp: [s].
+            world_from_sensor, camera: pose (4, 4) and calibration.
+            depth: image, meters of one unit, calibration and pose of a depth camera.
+            tracker: the tracker of the body.
+            others: other persons.
+        """
+
+    def learn(
+        self,
+        image: npt.NDArray[np.uint8],
+        joints: npt.NDArray[np.float64],
+        sites: npt.NDArray[np.float64],
+        *,
+        world_from_sensor: npt.NDArray[np.float64],
+        camera: _Camera,
+    ) -> None:
+        """Learns the colors of the face; `joints` (N, 3) are the body's, and `sites` those of the cue, NaN where unknown."""
 
 @final
 class KeypointLayout:

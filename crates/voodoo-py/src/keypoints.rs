@@ -7,12 +7,10 @@ use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
 use crate::arrays::{PointArray, rows};
-use crate::body_view::rows_of;
-use crate::camera::camera_of;
+use crate::camera::{camera_of, rows_of};
 use crate::errors::IntoPy;
 use crate::people::TrackedBody;
 use crate::sites::{PySiteGate, PySiteRay, places_of};
-use crate::skin::before;
 
 type PixelRow = ((f64, f64), f64);
 /// Site, indices and weights of its keypoints, spread, and distance behind the surface.
@@ -51,7 +49,7 @@ impl PyKeypointLayout {
         let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
-        let (_, expected) = before(&eye, places);
+        let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place))).collect();
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
         Ok(nearest_person(people.into_iter(), &self.0, &expected, least))
     }

@@ -11,7 +11,6 @@ macro_rules! stub {
 mod arguments;
 mod arrays;
 mod body;
-mod body_view;
 mod borrowed;
 mod camera;
 mod config;
@@ -39,8 +38,6 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use super::body::PyBody;
-    #[pymodule_export]
-    use super::body_view::{PyBodyView, PyStillDepth, body_view};
     #[pymodule_export]
     use super::camera::PyCamera;
     #[pymodule_export]
@@ -71,7 +68,7 @@ mod _core {
     #[pymodule_export]
     use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
-    use super::skin::{PySkinCue, PySkinTeacher};
+    use super::skin::PySkinCue;
     #[pymodule_export]
     use super::tracker::{PyTracker, body_before};
 

@@ -20,7 +20,6 @@ pub(crate) fn nearest_surface(
         let text = format!("pixels: expected shape (N, 2), found ({}, {})", shape[0], shape[1]);
         return Err(exception(py, "MeasurementError", text));
     }
-    let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()?, still: None };
-    let found = measured.nearest_surface(pixel, radius).map_err(|error| error.into_py(py))?;
-    Ok(found.map(|(depth, _)| depth))
+    let measured = MeasuredPixels { places: pixels.as_slice()?.as_chunks().0, depths: depths.as_slice()? };
+    measured.nearest_surface(pixel, radius).map_err(|error| error.into_py(py))
 }

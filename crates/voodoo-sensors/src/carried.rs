@@ -1,6 +1,6 @@
 //! Extrapolates points that were measured before the frame to its time: each moves with the limb that it lies on.
 
-use crate::body_view::Matrix;
+use crate::eye::Matrix;
 use voodoo_core::BodyTracker;
 use voodoo_core::PointSlice;
 use voodoo_core::TrackError;

@@ -1,8 +1,10 @@
 //! A color camera and its pose.
 
-use crate::body_view::Matrix;
 use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
+
+/// A 4x4 transform, row by row.
+pub type Matrix = [[f64; 4]; 4];
 
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +50,11 @@ impl Eye<'_> {
     /// `(x/z, y/z)` of a pixel; NaN where the lens model has no ray for it.
     pub fn undistorted(&self, pixel: [f64; 2]) -> [f64; 2] {
         self.camera.ray(pixel).unwrap_or([f64::NAN; 2])
+    }
+
+    /// Position in the world at `(x/z, y/z)` and the depth z, meters.
+    pub fn place(&self, [x, y]: [f64; 2], z: f64) -> Vec3 {
+        self.origin() + z * (x * self.column(0) + y * self.column(1) + self.column(2))
     }
 
     /// Unit vector in the world through `(x/z, y/z)`.

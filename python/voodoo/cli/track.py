@@ -99,8 +99,8 @@ def track_command(
 ) -> None:
     """Find a person in a recording, track them, and write one row per frame.
 
-    All inputs of the recording are used: depth images, point clouds, laser scans, skin in color images, 2-D
-    keypoints, markers. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
+    All inputs of the recording are used: depth images, point clouds, laser scans, 2-D keypoints, markers; with --use
+    depth,skin also skin in color images. RECORDING may also be a Pose2Sim folder or a .trc or .c3d file.
 
     If there are only images of calibrated cameras (a bag, or a folder with videos and Calib*.toml), the color regions of the
     body are tracked; with other inputs, --use color does so. This needs a start: --init FILE, or a file beside the images.

@@ -160,11 +160,15 @@ class FrontEnd(Generic[E]):
     def _frames(self, recorded: RecordedFrame) -> tuple[Frame, dict[int, Frame], bool]:
         """The frame, those of single persons, and whether there are detections in it."""
         stamp, use, alone = recorded.stamp, self.settings.use, not isinstance(self.tracker, People)
-        clothes = not alone and cast(People, self.tracker).needs_color
+        clothes = not alone and self.settings.clothes and cast(People, self.tracker).needs_color
         unused = not (alone or clothes or ("skin" in use and self.settings.skin.each))
         alive = self._frozen.without(recorded.measurements, use=use, idle=lambda item: unused and _is_colored(item))
         self._alive = alive
-        used = [item for item in alive if any(adapter.kind in use for adapter in adapters_of(item))]
+        used = [
+            item
+            for item in alive
+            if any(adapter.kind in use for adapter in adapters_of(item)) or (clothes and _is_colored(item))
+        ]
         self._take_given(stamp, used)
         persons = self._contexts(stamp, alive)
         frame = Frame(stamp=stamp)

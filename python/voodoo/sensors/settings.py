@@ -28,8 +28,8 @@ WHOLE_BODY = ("depth", "points", "keypoints", "markers")
 
 
 def default_inputs() -> tuple[str, ...]:
-    """Returns the default inputs: all but color regions."""
-    return tuple(kind for kind in inputs() if kind != "color")
+    """Returns the default inputs: all but the two cues of color images."""
+    return tuple(kind for kind in inputs() if kind not in ("color", "skin"))
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class FrontEndSettings:
     """Which inputs are used, and with what weights.
 
     Args:
-        use: kinds of inputs, by default all but "color"; measurements of other kinds are ignored.
+        use: kinds of inputs, by default all but "color" and "skin"; measurements of other kinds are ignored.
         model: converts standard deviations to weights.
         depth_noise: of depth images and point clouds; the weight is that at the predicted range of the body. None:
             every point has weight 1, as in the papers (a time-of-flight point at 3 m).
@@ -89,13 +89,17 @@ class FrontEndSettings:
         if unknown or not self.use:
             raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
 
+    @property
+    def clothes(self) -> bool:
+        """Whether colors of clothes tell several persons apart: by default, and if a cue of color images is used."""
+        return self.use == default_inputs() or not {"color", "skin"}.isdisjoint(self.use)
+
     @classmethod
     def of(cls, recording: Recording, *, use: Sequence[str] | None = None) -> FrontEndSettings:
         """Returns the defaults for a recording, with the inputs in `use`.
 
         Without `use` all inputs are used, with exceptions: color regions are used only if no input determines the whole body's
-        pose (see WHOLE_BODY). Skin is not used if color images are the only input, nor for several persons. The floor is known
-        if the root frame is one of LEVEL_FRAMES.
+        pose (see WHOLE_BODY), and skin never. The floor is known if the root frame is one of LEVEL_FRAMES.
 
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
@@ -118,8 +122,7 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
-    alone = has == {"skin", "color"}
-    return tuple(kind for kind in inputs() if not (alone and kind == "skin"))
+    return tuple(kind for kind in inputs() if kind != "skin")
 
 
 def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:

@@ -1,9 +1,4 @@
-"""Skin color as a cue for head and hands (K06 III-A): adaptive segmentation, regions, and their assignment to sites.
-
-All regions are unlabeled candidates. They are tracked in 3-D, so that a hand keeps its label while the body model lags; the
-documentation of `voodoo_core::skin` lists the rules that keep each region with its site. With a depth image a region has a
-3-D position, not only a ray.
-"""
+"""Skin color as a cue for head and hands (K06 III-A): regions of skin become rays of the nearest predicted sites."""
 
 from __future__ import annotations
 
@@ -17,10 +12,10 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
+from voodoo.measurements import DepthImage
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
-from voodoo.sensors.body_view import BodyView
 from voodoo.sensors.pixels import FloatArray, checked_camera
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.settings import SkinSettings
@@ -28,7 +23,6 @@ from voodoo.tracker import Tracker
 
 Mask = npt.NDArray[np.bool_]
 ByteImage = npt.NDArray[np.uint8]
-
 
 _NOWHERE = np.full(3, np.nan)
 
@@ -39,15 +33,13 @@ class Candidate:
 
     Args:
         pixel: (u, v).
-        region: label of its region.
+        region: number of its region.
         area: of that region [px].
-        hand: False for the center of a region longer than a hand, which may be a face but not a hand.
     """
 
     pixel: tuple[float, float]
     region: int
     area: int
-    hand: bool = True
 
 
 class SkinTracker:
@@ -57,21 +49,18 @@ class SkinTracker:
         """Start with the colors of all skin tones; `learn` adapts them to one person."""
         self.settings = chosen = settings or SkinSettings()
         self._sites = tuple(chosen.sites)
-        self._teacher = _core.SkinTeacher()
         self._cue = _core.SkinCue(
             self._sites,
             gate=chosen.gate,
             growth=chosen.gate_growth,
             lost_gate=chosen.lost_gate,
             widest_gate=chosen.widest_gate,
-            unexplained=chosen.unexplained,
-            ambiguity=chosen.ambiguity,
         )
         self._stamp = 0.0
-        self._image: ByteImage | None = None
+        self._images = 0
 
     def __copy__(self) -> SkinTracker:
-        """Copy the state that `observe` changes; the models that `learn` changes are shared."""
+        """Copy the state."""
         twin = SkinTracker.__new__(SkinTracker)
         vars(twin).update(vars(self))
         twin._cue = copy(self._cue)
@@ -79,17 +68,17 @@ class SkinTracker:
 
     @property
     def settled(self) -> bool:
-        """True if the colors were learned from enough images."""
-        return self._teacher.learned >= self.settings.settled_frames
+        """True if the colors were learned from this person."""
+        return self._cue.learned > 0
 
     @property
     def colors(self) -> npt.NDArray[np.float32]:
-        """Histogram of skin colors (64, 64, 8), by Cr, Cb and Y."""
-        return self._teacher.skin
+        """Histogram of skin colors (64, 64), by Cr and Cb."""
+        return self._cue.colors
 
     @property
-    def mask(self) -> Mask | None:
-        """(H, W): skin of the body in the last image, without excluded pixels; None before the first image."""
+    def mask(self) -> Mask:
+        """(H, W): skin near the body in the last image; empty before the first image."""
         return self._cue.mask
 
     @property
@@ -111,11 +100,9 @@ class SkinTracker:
         predicted: Mapping[str, FloatArray],
         *,
         stamp: float | None = None,
-        body: BodyView | None = None,
+        depth: DepthImage | None = None,
         tracker: Tracker | Followed | None = None,
         others: Sequence[Followed] = (),
-        arm_lost: Collection[str] = (),
-        upper_arm_visible: Collection[str] = (),
         head_visible: Collection[str] = (),
         source: str = "skin",
         moved: Mapping[str, FloatArray] | None = None,
@@ -126,47 +113,42 @@ class SkinTracker:
             image: (H, W, 3) BGR uint8.
             camera: calibration.
             world_from_sensor: (4, 4).
-            predicted: site name -> (3,) in the world at the time of the picture.
+            predicted: site name -> (3,) in the world at the time of the picture; skin is searched for around them.
             stamp: time of the image [s]; None: 1/30 s after the last.
-            body: depth measurements near the body; None: not known. With them a candidate must lie approximately at the depth
-                of its site, so that the track of a hand hidden behind the body does not jump to a region in front.
-            tracker: the tracker of the body, with its last pose; None: the position of the body's surface is not known.
+            depth: image of a depth camera beside this one. With it, skin that is not at the body's distance is left out, and
+                a candidate has a position, not only a ray.
+            tracker: the tracker of the body, with its last pose: what is on its trunk or its legs is no hand, if `depth` is
+                given.
             others: other persons; a region nearer to them than to the body belongs to them.
-            arm_lost: sites whose limb is not supported by other sensors at its estimated pose.
-            upper_arm_visible: sites whose upper arm is supported there; the hand is then one forearm away from that elbow.
-            head_visible: sites whose own limb is supported there, see `SkinSettings.visible_bias`.
+            head_visible: sites whose own limb is measured by other sensors, see `SkinSettings.visible_bias`.
             source: name for `Estimate.sources`.
             moved: site name -> position (3,) at the time of the rays; None: the rays have the time of the image.
 
         Raises:
-            MeasurementError: the image is not of the camera's size, or `tracker` has no pose yet.
+            MeasurementError: an image is not of its camera's size, or `tracker` has no pose yet.
         """
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
         self._stamp = self._stamp + 1.0 / 30.0 if stamp is None else stamp
-        self._image = image
+        beside = None if depth is None else (depth.image, depth.meters_per_unit, depth.camera, depth.root_from_sensor)
         found = self._cue.observe(
-            self._teacher,
             np.ascontiguousarray(image),
             predicted,
             stamp=self._stamp,
             world_from_sensor=pose,
             camera=camera,
-            body=body,
-            settled=self.settled,
-            arm_lost=[site in arm_lost for site in self._sites],
-            upper_arm_visible=[site in upper_arm_visible for site in self._sites],
+            depth=beside,
             tracker=None if tracker is None else tracker._core,
             others=[other._core for other in others],
         )
         noise, focal = self.settings.noise, (camera.fx * camera.fy) ** 0.5
         rays = []
-        for number, origin, direction, place, z in found:
+        for number, direction, place, z in found:
             site = self._sites[number]
             bias = self.settings.sites[site]
             if site in head_visible:
                 bias = max(bias, self.settings.visible_bias.get(site, bias))
-            ray = SiteRay(site, origin, direction, noise.sigma(z, focal), source, bias=bias, place=place)
+            ray = SiteRay(site, pose[:3, 3], direction, noise.sigma(z, focal), source, bias=bias, place=place)
             rays.append(ray if moved is None else ray.moved(moved[site] - predicted[site]))
         return rays
 
@@ -177,38 +159,29 @@ class SkinTracker:
         world_from_sensor: npt.ArrayLike,
         estimate: Estimate,
         *,
-        rate_hz: float = 30.0,
         trusted_start: bool = False,
     ) -> None:
-        """Learn colors and background from an image and the estimate at its time, if its status is "tracking".
-
-        Colors are learned around the sites that were detected (all sites before the cue has settled). Only pixels whose
-        colors are close to those of skin are used, because a head seen from behind shows hair.
+        """Learn the colors of the face, if it was detected, from an image and the estimate at its time, if that is "tracking".
 
         Args:
             image, camera, world_from_sensor: as in `observe`.
             estimate: the estimate at the time of the image.
-            rate_hz: frame rate of the camera.
             trusted_start: the pose was set by the user and is learned from whatever the status is.
 
         Raises:
             MeasurementError: the image is not of the camera's size.
         """
-        if estimate.status != "tracking" and not trusted_start:
-            return
         pose = rigid(world_from_sensor)
         _check_image(image, camera)
-        names, positions = estimate.joint_names, estimate.joint_positions
-        self._teacher.learn(
-            self._cue,
-            None if image is self._image else np.ascontiguousarray(image),
-            np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites]),
-            world_from_sensor=pose,
-            camera=camera,
-            half_life=self.settings.static_seconds * rate_hz,
-            every=self.settings.learn_every,
-            settled=self.settings.settled_frames,
-        )
+        if estimate.status != "tracking" and not trusted_start:
+            return
+        self._images += 1
+        # The light changes slowly.
+        if self.settled and self._images % self.settings.learn_every:
+            return
+        names, positions = estimate.joint_names, np.ascontiguousarray(estimate.joint_positions)
+        sites = np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites])
+        self._cue.learn(np.ascontiguousarray(image), positions, sites, world_from_sensor=pose, camera=camera)
 
 
 def _check_image(image: ByteImage, camera: Camera) -> None:
