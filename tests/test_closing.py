@@ -14,7 +14,7 @@ def test_the_end_tells_stature_speed_root_frame_and_shares(tmp_path):
     assert second.startswith("stature 1.7") and "frames a second; root frame base_link" in second
     shares, _, rest = third.partition(" (")
     by_status = {status: int(share) for share, _, status in (part.split(" ") for part in shares.split(", "))}
-    assert by_status["tracking"] >= 97 and sum(by_status.values()) in (99, 100, 101)
+    assert by_status["tracking"] > 90 and sum(by_status.values()) in (99, 100, 101)
     assert rest == "docs/how-to/read-the-status.md says what that means)"
     told = run("track", sample_path(), "--height", "1.3", "--out", tmp_path / "o.csv")
     assert "1.30 m was told" in told.stderr

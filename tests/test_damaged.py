@@ -149,7 +149,7 @@ def test_a_picture_that_does_not_decode_costs_no_frame(entries, start):
         found[row] = damage.changed(found[row], data=np.full(100, 0xFF, np.uint8))
     bag = damage.write(start / "pictures", [entry for entry in found if entry[2] <= found[rows[-1]][2] + 200_000_000])
     out = start / "pictures.npz"
-    done = CliRunner().invoke(app, ["track", str(bag), "--out", str(out)])
+    done = CliRunner().invoke(app, ["track", str(bag), "--use", "depth,skin", "--out", str(out)])
     assert done.exit_code == 0 and "left out 3 that cannot be read" in done.stderr, done.output
     result = Track.load(out)
     assert len(result) == len(open_recording(bag)) and result.found.all()
