@@ -152,7 +152,7 @@ class Tracker:
 
     _core = voodoo.Tracker(voodoo.Body.human())._core
     """Of a body that has no pose: nothing is known of its motion."""
-    can_search, detector_failures = True, 0
+    can_search, detector_failures, refusal = True, 0, None
     reference = None
     offset = (0.0, 0.0, 0.0)
     found_at = None

@@ -127,6 +127,11 @@ class People:
         return self._core.detector_failures
 
     @property
+    def refusal(self) -> str | None:
+        """Why somebody who was detected in the last step is not tracked; None if nobody was, or everybody is."""
+        return self._core.refusal
+
+    @property
     def numbers(self) -> tuple[int, ...]:
         """Numbers of the persons who are present."""
         return tuple(self._core.present())

@@ -84,6 +84,11 @@ class Tracker:
         """Steps since the last `search` in which the detector failed; each of them warned (`voodoo.DetectorWarning`)."""
         return self._core.detector_failures
 
+    @property
+    def refusal(self) -> str | None:
+        """Why somebody who was detected in the last step is not tracked; None if nobody was, or everybody is."""
+        return self._core.refusal
+
     def reset(self, *, joints: Mapping[str, Sequence[float]], fit_sizes: bool = True) -> Estimate:
         """Set the pose, and the sizes, from positions of named joints and sites; stamps may restart afterwards.
 

@@ -197,7 +197,7 @@ pub use observation::frame::{
 };
 pub use observation::picture::{ColorImage, ColorPixels};
 pub use people::one::Tracker;
-pub use people::{People, PeopleOptions};
+pub use people::{People, PeopleOptions, Refusal};
 pub use regions::RegionLine;
 pub use shape::ray::RayHit;
 pub use shape::{Region, ShapeError, SurfaceBatch, SurfacePoint, TaperedEllipticCylinder};

@@ -123,6 +123,12 @@ impl PyPeople {
         self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
     }
 
+    /// Why a detected person is not tracked.
+    #[getter]
+    fn refusal(&self) -> Option<String> {
+        self.people.refusal().map(|refusal| refusal.to_string())
+    }
+
     /// Ids of the present persons.
     fn present(&self) -> Vec<usize> {
         self.people.present().map(|(id, _)| id).collect()

@@ -143,6 +143,12 @@ impl PyTracker {
         self.tracker.can_search()
     }
 
+    /// Why a detected person is not tracked.
+    #[getter]
+    fn refusal(&self) -> Option<String> {
+        self.tracker.refusal().map(|refusal| refusal.to_string())
+    }
+
     #[getter]
     fn detector_failures(&self) -> usize {
         self.detector_failures

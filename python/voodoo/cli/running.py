@@ -281,11 +281,24 @@ def _apart(output: PictureWriter | Viewer, call: Callable[..., None], *arguments
             output.failure = error
 
 
-def pictured(tracker: Tracker | People, keep: Callable[[Any, Mapping[int, Body]], None]) -> dict[str, Any]:
-    """How `run` keeps, draws and shows the frames; `keep` takes an estimate, and the bodies of the persons by number."""
+def pictured(
+    tracker: Tracker | People,
+    keep: Callable[[Any, Mapping[int, Body]], None],
+    *,
+    refused: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """How `run` keeps, draws and shows the frames.
+
+    Args:
+        tracker: which makes the estimates.
+        keep: takes an estimate, and the bodies of the persons by number.
+        refused: takes the reason why somebody who was detected is not tracked.
+    """
     bodies: dict[int, Body] = {}
 
     def take(step: TrackedFrame[Any]) -> None:
+        if refused is not None and tracker.refusal:
+            refused(tracker.refusal)
         if isinstance(tracker, People):
             bodies.update({person.id: tracker.body(person.id) for person in step.estimate})
         else:

@@ -240,7 +240,8 @@ def track_command(
                 tracker = start_tracker(source, init=beginning, **start)
             starts = starts_of(beginning, source)
             how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
-            how |= pictured(tracker, spool.add)
+            refusals: Counter[str] = Counter()
+            how |= pictured(tracker, spool.add, refused=lambda words: refusals.update([words]))
             with deferred():
                 done = run(source, **how)
                 sample = spool.sample()
@@ -272,10 +273,10 @@ def track_command(
         begun = spool.states - Counter({SEARCHING: 0 if beginning in (None, AUTO) else len(source)})
         for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
             print_message(f"{source.name}: {doubt}")
-        _print_warnings(source, spool, left_out)
+        _print_warnings(source, spool, left_out, refusals)
 
 
-def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -> None:
+def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, refusals: Counter[str]) -> None:
     """Print on stderr what was left out, and possible reasons if no person was tracked.
 
     Raises:
@@ -294,6 +295,9 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None) -
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
     if not spool.found:
+        if refusals:
+            words = refusals.most_common(1)[0][0]
+            print_message(f"{source.name}: somebody was detected in {refusals.total()} frames and not tracked: {words}")
         raise NoPoseError(
             f"{source.name}: nobody was found in {spool.frames} frames; voodoo info doubts what is unlikely"
         )

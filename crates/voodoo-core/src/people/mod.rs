@@ -23,6 +23,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, DetectedPerson, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
+use crate::relocalize::ENOUGH_ODDS;
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
 use clothes::Clothes;
@@ -43,6 +44,42 @@ const MOST_TOGETHER: usize = 4;
 const ONE_BODY: f64 = 0.3;
 /// A track that lasted for less than this is not remembered, seconds.
 const KNOWN_AFTER: f64 = 1.0;
+
+/// Why somebody who was detected is not tracked, see [`People::refusal`].
+///
+/// ```
+/// use voodoo_core::Refusal;
+///
+/// let words = Refusal::Doubtful { log_odds: 1.5 }.to_string();
+/// assert!(words.starts_with("log odds of 1.5"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The detections so far are not certain enough.
+    Doubtful {
+        /// Sum of their log odds.
+        log_odds: f64,
+    },
+    /// At the detected joints hardly any limb would be measured.
+    Unsupported,
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Doubtful { log_odds } => {
+                write!(
+                    f,
+                    "log odds of {log_odds:.1} that it is a person, expected {ENOUGH_ODDS:.1} before it is tracked"
+                )
+            }
+            Self::Unsupported => {
+                f.write_str("a body at the detected joints, of which hardly any limb would be measured")
+            }
+        }
+    }
+}
 
 /// Tracks several persons through a sequence of frames.
 ///
@@ -75,6 +112,7 @@ pub struct People {
     tentative: TentativeTracks,
     detector: BoundDetector,
     last_detection: Option<f64>,
+    refusal: Option<Refusal>,
     /// Whether everybody is wanted; otherwise only the one who is followed, and others are looked for when something moves.
     everybody: bool,
     stamp: Option<f64>,
@@ -95,6 +133,7 @@ impl People {
             tentative: TentativeTracks::default(),
             detector: BoundDetector::default(),
             last_detection: None,
+            refusal: None,
             everybody: true,
             stamp: None,
             threads,
@@ -112,6 +151,11 @@ impl People {
     /// The error of a detector in the last step, if one failed: that of the shared detector, else that of a person's.
     pub fn detector_error(&self) -> Option<&DetectError> {
         self.detector.error().or_else(|| self.persons.iter().find_map(|person| person.tracker.detector_error()))
+    }
+
+    /// Why somebody who was detected in the last step is not tracked; `None` if nobody was, or everybody is.
+    pub fn refusal(&self) -> Option<Refusal> {
+        self.refusal
     }
 
     /// Returns the body that every new person starts from.
@@ -183,6 +227,7 @@ impl People {
     /// Updates all persons with a frame that was checked.
     fn advance(&mut self, frame: &Frame, own: &[(usize, Frame)]) {
         self.stamp = Some(frame.stamp);
+        self.refusal = None;
         self.detector.clear_error();
         self.scene.register(frame);
         self.assign_pixels(frame);
@@ -286,6 +331,7 @@ impl People {
         }
         self.detect_new(frame);
         let confirmed = self.tentative.take_confirmed(frame.stamp);
+        self.refusal = self.tentative.greatest_at(frame.stamp).map(|log_odds| Refusal::Doubtful { log_odds });
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);
         }
@@ -437,6 +483,9 @@ impl People {
                 Some(number) => self.reactivate(frame, track, number, own.unwrap_or(number)),
                 None => self.spawn(frame, track, own.unwrap_or(first)),
             };
+            if !came {
+                self.refusal = Some(Refusal::Unsupported);
+            }
             if let Some(leaves) = leaves.filter(|_| came) {
                 self.persons[leaves].present = false;
             }

@@ -1,7 +1,7 @@
 //! The tracker of one person among whoever is there.
 
 use super::person::Person;
-use super::{People, PeopleOptions};
+use super::{People, PeopleOptions, Refusal};
 use crate::body::Body;
 use crate::config::Config;
 use crate::detect::{Detect, DetectError};
@@ -69,6 +69,11 @@ impl Tracker {
     /// The error of the detector in the last step, if it failed. The step then ran without detections.
     pub fn detector_error(&self) -> Option<&DetectError> {
         self.people.detector_error()
+    }
+
+    /// Why somebody who was detected in the last step is not tracked, see [`People::refusal`].
+    pub fn refusal(&self) -> Option<Refusal> {
+        self.people.refusal()
     }
 
     /// Sets the pose, and with `fit_sizes` the sizes, from positions of named sites (index of the site, world position). Sizes
