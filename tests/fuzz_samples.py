@@ -363,6 +363,8 @@ def call(rng: Random) -> None:
         lambda: frame.add_depth(array(rng), camera=a),
         lambda: frame.add_position("l_wrist", array(rng), weight=a, bias=b),
         lambda: frame.add_ray("l_wrist", origin=array(rng), direction=a),
+        lambda: frame.add_detection({"l_wrist": array(rng)}, log_odds=a, weight=b),
+        lambda: frame.add_detection(c, weight=a),
         lambda: frame.set_ground(normal=array(rng), offset=a),
         lambda: frame.exclude(array(rng), a),
         lambda: voodoo.render_depth(

@@ -107,3 +107,19 @@ def test_what_determines_no_pose_starts_nobody_and_what_is_wrong_is_refused():
         with pytest.raises(MeasurementError, match=words):
             people.step(frame(0.2, person(), **how))
     assert [one.id for one in people.step(frame(0.2, person()))] == [1]
+
+
+def test_an_empty_detection_is_nobodys_and_a_site_of_an_added_limb_is_of_the_one_who_is_followed():
+    people = voodoo.People(detector=None)
+    for index in range(5):
+        found = people.step(frame(index / 30.0, {}, person(), {}))
+        assert [one.id for one in found] == [1]
+    tracker = voodoo.Tracker(BODY, detector=None)
+    tracker.step(frame(0.0, person()))
+    box = voodoo.TaperedEllipticCylinder(0.3, 0.1, 0.1, 0.1, 0.1)
+    joint = voodoo.Joint(name="grip", on_parent=voodoo.Place(position=(0.0, 0.0, 0.1)))
+    tracker.add_limb("box", parent="r_hand", shape=box, joint=joint, sites={"box_end": (0.0, 0.0, 0.3)})
+    for index, x in enumerate((2.5, 2.52, 6.0, 6.0, 2.54), start=1):
+        end = {"box_end": np.add(tracker.estimate.joints["box_end"], (0.01, 0.0, 0.0))}
+        estimate = tracker.step(frame(index / 30.0, person(x) | end))
+        assert np.linalg.norm(root(estimate) - person()["humanoid_root"]) < 0.2, index

@@ -11,7 +11,9 @@ use voodoo_core::RawValue;
 use voodoo_core::math::{Aabb, Pose, Quat, Vec3};
 use voodoo_core::{Body, Config, Estimate, Status, TaperedEllipticCylinder, Tracker};
 use voodoo_core::{Camera, Lens};
-use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
+use voodoo_core::{
+    Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope,
+};
 use voodoo_core::{HumanModel, Joint, Limb, Site};
 use voodoo_core::{Rendering, Viewpoint};
 
@@ -212,8 +214,13 @@ fn step(from: &mut Hostile, tracker: &mut Tracker, good: &[[f64; 3]], stamp: &mu
     let position = PositionRelation { site, position: from.vector(2.0), weight, bias, source: 1 };
     let ray = RayRelation { site, origin: from.vector(2.0), direction: from.vector(1.0), weight, bias, source: 1 };
     let mut frame = Frame::empty(*stamp + if from.rarely() { from.number(1.0) } else { 0.033 });
+    let joints: Vec<PositionRelation> = (0..from.below(8))
+        .map(|_| PositionRelation { site: from.below(14), position: from.vector(2.0), ..position })
+        .collect();
+    let detections = [DetectedPerson { positions: &joints, person: from.number(9.0) }; 2];
     let (clouds, images, positions, rays) = ([cloud], [image], [position], [ray]);
-    match from.below(6) {
+    match from.below(7) {
+        4 => frame.detections = &detections[..from.below(3)],
         0 => frame.images = &images,
         1 => frame.positions = &positions,
         2 => frame.rays = &rays,

@@ -3,9 +3,9 @@
 
 use crate::detection::Fixed;
 use crate::scene;
-use voodoo_core::Camera;
 use voodoo_core::math::{Pose, Quat, Vec3};
 use voodoo_core::{Body, BodyError, Config, ConfigError, Status, TaperedEllipticCylinder, TrackError, Tracker};
+use voodoo_core::{Camera, DetectedPerson};
 use voodoo_core::{Cloud, DepthImage, DepthPixels, Frame, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 use voodoo_core::{HumanModel, Joint, JointKind, Limb, Site};
 use voodoo_core::{RawValue, Value};
@@ -106,7 +106,12 @@ fn bad_sites_and_floors_are_refused() {
         (PositionRelation { weight: f64::NAN, ..position }, "positions[0].weight"),
     ] {
         refused(&Frame::empty(2.0).with_positions(&[bad]), what);
+        let detection = DetectedPerson { positions: &[position, bad], person: 5.0 };
+        let what = what.replace("positions[0]", "detections[0].positions[1]");
+        refused(&Frame::empty(2.0).with_detections(&[detection]), &what);
     }
+    let nobody = DetectedPerson { positions: &[position], person: f64::NAN };
+    refused(&Frame::empty(2.0).with_detections(&[nobody]), "detections[0].person");
     let ray = RayRelation { site: 0, origin: Vec3::ZERO, direction: Vec3::X, weight: 1.0, bias: 0.0, source: 0 };
     for (bad, what) in [
         (RayRelation { site: sites, ..ray }, "rays[0].site"),

@@ -172,7 +172,7 @@ class FrontEnd(Generic[E]):
         self._take_given(stamp, used)
         persons = self._contexts(stamp, alive)
         frame = Frame(stamp=stamp)
-        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, alive, self._nobody, {})
+        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, alive, self._nobody)
         scene.add_scene(frame)
         own = {number: frame if alone else Frame(stamp=stamp) for number in persons}
         spare: list[Any] = []
@@ -214,24 +214,31 @@ class FrontEnd(Generic[E]):
             bodies = {number: Followed(self.tracker, number) for number in self.tracker.numbers}
         elif self._persons:
             bodies = {ONE: self.tracker}
-        everybody = {number: self._context(stamp, alive, body, body.predict(stamp)) for number, body in bodies.items()}
-        for number, context in everybody.items():
-            person = self._persons.setdefault(number, self._new(trusted_start=False))
-            others = [body for other, body in bodies.items() if other != number and isinstance(body, Followed)]
-            everybody[number] = replace(context, gate=person.gate, memory=person.memory, others=others)
+        everybody = {}
+        for number, body in bodies.items():
+            if number not in self._persons:
+                self._persons[number] = self._new(trusted_start=False)
+            others = [other for other in bodies.values() if other is not body and isinstance(other, Followed)]
+            everybody[number] = self._context(stamp, alive, body, self._persons[number], others)
         return everybody
 
     def _context(
-        self, stamp: float, alive: Sequence[Any], tracker: Tracker | Followed, predicted: Mapping[str, Any]
+        self,
+        stamp: float,
+        alive: Sequence[Any],
+        tracker: Tracker | Followed,
+        person: _Person | None = None,
+        others: Sequence[Followed] = (),
     ) -> Context:
         return Context(
             stamp=stamp,
             measurements=alive,
-            predicted=predicted,
+            predicted=tracker.predict(stamp) if person else {},
             settings=self.settings,
             tracker=tracker,
-            gate=self._gate(),
-            memory=self.memory,
+            gate=person.gate if person else self._gate(),
+            memory=person.memory if person else self.memory,
+            others=others,
         )
 
     def _gate(self) -> SiteGate:
@@ -252,11 +259,13 @@ class FrontEnd(Generic[E]):
 
     def _detect(self, frame: Frame, spare: Sequence[Any]) -> bool:
         """Add the persons who are found in measurements that belong to nobody; returns whether there are any."""
+        if not spare:
+            return False
         alone = not isinstance(self.tracker, People)
         body = self.tracker.prototype if isinstance(self.tracker, People) else self.tracker.body
         found: Sequence[FoundStart] = [] if self.found is None or self._persons else [self.found]
         for finder in self._starts.finders:
-            if not found and not finder.given and spare:
+            if not found and not finder.given:
                 found = finder.find(StartFrame(frame.stamp, spare, body, self.settings))
         # A single person is there; of several detections the best one is followed.
         for one in found[:1] if alone else found:
@@ -270,8 +279,8 @@ class FrontEnd(Generic[E]):
         if isinstance(estimate, PeopleEstimate):
             there = {person.id: person.estimate for person in estimate}
         else:
-            there = {ONE: estimate} if estimate.joints else {}
-            self._lost = str(estimate.status) == "lost"
+            status = str(estimate.status)
+            there, self._lost = {ONE: estimate} if status != SEARCHING else {}, status == "lost"
             if self._persons and not there:
                 # The next person moves and looks different.
                 for adapter in all_adapters():
@@ -280,7 +289,9 @@ class FrontEnd(Generic[E]):
         self.rays = self.rays if there else []
         self._persons = {number: person for number, person in self._persons.items() if number in there}
         for number, found in there.items():
-            person = self._persons.setdefault(number, self._new(trusted_start=trusted_start))
+            if number not in self._persons:
+                self._persons[number] = self._new(trusted_start=trusted_start)
+            person = self._persons[number]
             for item in self._alive:
                 for adapter in adapters_of(item):
                     adapter.learn(item, found, person.memory, trusted_start=person.trusted_start)

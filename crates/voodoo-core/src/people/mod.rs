@@ -268,9 +268,9 @@ impl People {
         let tracked: Vec<usize> = (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked()).collect();
         let distance = |detection: &DetectedPerson, person: &Person| {
             let body = person.tracker.body();
-            let each = detection.positions.iter();
+            let each = detection.positions.iter().filter(|of| of.site < body.sites().len());
             let sum: f64 = each.map(|of| body.site_position(&person.expected, of.site).distance(of.position)).sum();
-            sum / detection.positions.len().max(1) as f64
+            if detection.positions.is_empty() { f64::INFINITY } else { sum / detection.positions.len() as f64 }
         };
         let costs = |detection| tracked.iter().map(|number| distance(detection, &self.persons[*number])).collect();
         let costs: Vec<Vec<f64>> = frame.detections.iter().map(costs).collect();
@@ -287,8 +287,11 @@ impl People {
                 let ownership = assignment.ownership(number, scene);
                 let mut of = *own.iter().find(|(id, _)| *id == person.id).map_or(shared, |(_, frame)| frame);
                 let detection = shown.iter().position(|shown| *shown == Some(number));
-                let positions =
-                    detection.map(|detection| [of.positions, frame.detections[detection].positions].concat());
+                let positions = detection.map(|detection| {
+                    let count = person.tracker.body().sites().len();
+                    let known = frame.detections[detection].positions.iter().filter(|of| of.site < count);
+                    of.positions.iter().chain(known).copied().collect::<Vec<PositionRelation>>()
+                });
                 of.positions = positions.as_deref().unwrap_or(of.positions);
                 person.tracker.step(&of, ownership);
                 person.update(frame, ownership);
@@ -323,7 +326,7 @@ impl People {
     fn find_new(&mut self, frame: &Frame, shown: &[Option<usize>]) {
         self.tentative.prune(frame.stamp);
         for (detection, _) in frame.detections.iter().zip(shown).filter(|(_, shown)| shown.is_none()) {
-            let fitted = self.prototype.fit(&sites_of(detection.positions), true);
+            let fitted = self.detected_body().fit(&sites_of(detection.positions), true);
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
                 self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
@@ -515,8 +518,14 @@ impl People {
         let model = Model::new(self.prototype.clone());
         match track.positions.as_slice() {
             [] => fit_body(&model, self.detected(track)),
-            positions => model.fit(&sites_of(positions), true).ok(),
+            positions => self.detected_body().fit(&sites_of(positions), true).ok(),
         }
+    }
+
+    /// The body whose sites the frame's detections name: that of the one who is followed may have been edited.
+    fn detected_body(&self) -> &Body {
+        let followed = self.persons.first().filter(|person| person.followed);
+        followed.map_or(&self.prototype, |person| person.tracker.body())
     }
 
     /// Returns the colors of a tentative track's clothes.

@@ -221,7 +221,8 @@ impl BodyTracker {
     /// is there.
     pub(crate) fn start_at_positions(&mut self, frame: &Frame, ownership: OwnershipMask, fit_sizes: bool) -> bool {
         let positions: Vec<(usize, Vec3)> = frame.positions.iter().map(|of| (of.site, of.position)).collect();
-        let started = self.reset(&positions, fit_sizes).is_ok();
+        let count = self.model.body.sites().len();
+        let started = positions.iter().all(|(site, _)| *site < count) && self.reset(&positions, fit_sizes).is_ok();
         if started {
             self.step(frame, ownership);
         }
