@@ -138,10 +138,11 @@ def test_a_film_on_a_full_disk_is_released():
 
 
 def test_without_pyav_a_film_is_mpeg_4_and_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "av", None)
-    with PictureWriter(tmp_path / "look.mp4", rate_hz=30.0) as writer:
-        writer.write(draw())
-        writer.write(draw())
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "av", None)
+        with PictureWriter(tmp_path / "look.mp4", rate_hz=30.0) as writer:
+            writer.write(draw())
+            writer.write(draw())
     assert "look.mp4 is MPEG-4" in writer.note and "voodoo-tracker[film]" in writer.note
     read_back(tmp_path / "look.mp4", 2, "mpeg4")
 
