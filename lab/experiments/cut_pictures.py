@@ -8,18 +8,18 @@ that are called lost or have no pose, and the mean error of the joints in view, 
 """
 
 import argparse
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from changed_depth import ChangedDepth
 
 import voodoo
-from voodoo.measurements import DepthImage, RecordedFrame
+from voodoo.measurements import DepthImage
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import AUTO, start_tracker
 from voodoo.recordings import open_recording
-from voodoo.recordings.recording import Recording, RecordingInfo
+from voodoo.recordings.recording import Recording
 from voodoo.sensors.pixels import in_sensor
 from voodoo.sensors.settings import FrontEndSettings
 
@@ -30,30 +30,16 @@ IN_VIEW = 1.0 / 3.0
 """Least fraction of the joints in view for somebody who is there."""
 
 
-class Cut(Recording):
-    """A recording whose depth images end before a row (axis 1) or column (axis 0)."""
+def cut(recording: Recording, axis: int, line: float) -> ChangedDepth:
+    """The recording with depth images that end before a row (axis 1) or column (axis 0)."""
 
-    def __init__(self, recording: Recording, axis: int, line: float) -> None:
-        self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
-        self.start, self.reference, self.people = None, recording.reference, None
-        self._recording, self._axis, self._line = recording, axis, line
-
-    def __len__(self) -> int:
-        return len(self._recording)
-
-    def __iter__(self) -> Iterator[RecordedFrame]:
-        for recorded in self._recording:
-            items = (self._cut(item) if isinstance(item, DepthImage) else item for item in recorded.measurements)
-            yield RecordedFrame(recorded.stamp, tuple(items))
-
-    def info(self) -> RecordingInfo:
-        return self._recording.info()
-
-    def _cut(self, item: DepthImage) -> DepthImage:
+    def ended(item: DepthImage) -> DepthImage:
         size = [item.camera.width, item.camera.height]
-        size[self._axis] = round(min(self._line, size[self._axis]))
+        size[axis] = round(min(line, size[axis]))
         image = np.ascontiguousarray(item.image[: size[1], : size[0]])
         return replace(item, image=image, camera=replace(item.camera, width=size[0], height=size[1]))
+
+    return ChangedDepth(recording, ended)
 
 
 def line_of(recording: Recording, kind: str) -> tuple[int, float]:
@@ -93,10 +79,10 @@ def main() -> None:
     sums: dict[str, list[tuple[float, float, float, float]]] = {kind: [] for kind in CUTS}
     for path in options.recordings:
         recording = open_recording(path / "bag" if (path / "bag").is_dir() else path)
-        whole = tracked(Cut(recording, 1, np.inf))
+        whole = tracked(cut(recording, 1, np.inf))
         for kind in CUTS:
             axis, line = line_of(recording, kind)
-            estimates = tracked(Cut(recording, axis, line))
+            estimates = tracked(cut(recording, axis, line))
             seen = np.zeros(recording.reference.positions.shape[:2], dtype=bool)
             for index, (frame, places) in enumerate(zip(recording, recording.reference.positions, strict=False)):
                 item = next(item for item in frame.measurements if isinstance(item, DepthImage))
@@ -110,9 +96,9 @@ def main() -> None:
             sums[kind].append(row)
             print(f"| {recording.name} | {kind} | {row[0]} | {row[1]:.1f} | {row[2]:.1f} | {row[3]:.1f} |", flush=True)
     for kind, rows in sums.items():
-        late, lost, cut, uncut = np.array(rows).T
+        late, lost, joints, uncut = np.array(rows).T
         by = f"{np.sum(late <= 3)} of {len(rows)} by frame 3"
-        print(f"| all | {kind} | {by} | {lost.mean():.1f} | {np.nanmean(cut):.1f} | {np.nanmean(uncut):.1f} |")
+        print(f"| all | {kind} | {by} | {lost.mean():.1f} | {np.nanmean(joints):.1f} | {np.nanmean(uncut):.1f} |")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@
 Two kinds of sequences with exact truth are tracked by depth alone, through a pinhole and through a plumb-bob, a rational and a
 fisheye lens that show as much of the scene:
 
-- Rendered recordings, whose depth images are resampled through each lens (through_lens.py). The pinhole is resampled as well,
+- Rendered recordings, whose depth images are resampled through each lens (changed_depth.py). The pinhole is resampled as well,
   through a camera with a slightly different focal length and center, so that all images have the same sampling noise.
 - A person who walks about a room and one who swings every joint (`tests/synthetic`), rendered through each lens, pixel by pixel;
   the cameras are 100 degrees wide.
@@ -26,7 +26,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from through_lens import ThroughLens
+from changed_depth import ChangedDepth, resampled
 
 import voodoo
 from voodoo.evaluation.metrics import JOINTS
@@ -83,7 +83,9 @@ class Step:
 
 def recorded(folder: Path, name: str, seed: int) -> Iterator[Step]:
     """A rendered recording by its depth images alone."""
-    recording = ThroughLens(voodoo.open_recording(folder), lambda camera: sampled(name, camera, seed))
+    recording = ChangedDepth(
+        voodoo.open_recording(folder), lambda item: resampled(item, sampled(name, item.camera, seed))
+    )
     tracker = start_tracker(recording, use=("depth",))
     reference = recording.reference
     for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=("depth",))):

@@ -1,4 +1,4 @@
-"""Resampling of depth images by lab/experiments/through_lens.py."""
+"""Resampling of depth images by lab/experiments/changed_depth.py."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def through(name):
 
 def test_a_resampled_pixel_shows_what_the_recorded_one_nearest_to_its_ray_shows():
     straight, bent = through("none"), through("fisheye")
-    index = load_experiment("through_lens").sources(straight, bent)
+    index = load_experiment("changed_depth").sources(straight, bent)
     known = index >= 0
     rows, columns = np.divmod(index[known], straight.width)
     off = straight.rays()[rows, columns] - bent.rays()[known]

@@ -1,4 +1,4 @@
-"""A recording whose depth images are resampled for another depth camera at the same place, through any lens."""
+"""A recording whose depth images are changed: resampled for another lens, cut, ..."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -11,38 +11,40 @@ from voodoo.model.camera import Camera
 from voodoo.recordings.recording import Recording, RecordingInfo
 
 
-class ThroughLens(Recording):
-    """A recording whose depth images are resampled for other cameras; everything else is unchanged.
-
-    Every pixel takes the depth of the recorded pixel nearest to its ray, which has an error of the surface's slope over half a
-    pixel. Pixels whose ray is outside the recorded image, or that have no ray, have no return.
+class ChangedDepth(Recording):
+    """A recording whose depth images are changed; everything else is unchanged.
 
     Args:
         recording: with depth images.
-        lens: the camera in place of a recorded one.
+        change: what takes the place of a depth image.
     """
 
-    def __init__(self, recording: Recording, lens: Callable[[Camera], Camera]) -> None:
+    def __init__(self, recording: Recording, change: Callable[[DepthImage], DepthImage]) -> None:
         self.path, self.name, self.root_frame = recording.path, recording.name, recording.root_frame
         self.start, self.reference, self.people = recording.start, recording.reference, recording.people
-        self._recording, self._lens = recording, lens
+        self._recording, self._change = recording, change
 
     def __len__(self) -> int:
         return len(self._recording)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         for recorded in self._recording:
-            items = (self._resampled(item) if isinstance(item, DepthImage) else item for item in recorded.measurements)
+            items = (self._change(item) if isinstance(item, DepthImage) else item for item in recorded.measurements)
             yield RecordedFrame(recorded.stamp, tuple(items))
 
     def info(self) -> RecordingInfo:
         return self._recording.info()
 
-    def _resampled(self, item: DepthImage) -> DepthImage:
-        camera = self._lens(item.camera)
-        index = sources(item.camera, camera)
-        image = np.where(index >= 0, item.image.reshape(-1)[index], item.image.dtype.type(0))
-        return replace(item, image=image, camera=camera)
+
+def resampled(item: DepthImage, camera: Camera) -> DepthImage:
+    """The depth image of another camera at the same place, through any lens.
+
+    Every pixel takes the depth of the recorded pixel nearest to its ray, which has an error of the surface's slope over half a
+    pixel. Pixels whose ray is outside the recorded image, or that have no ray, have no return.
+    """
+    index = sources(item.camera, camera)
+    image = np.where(index >= 0, item.image.reshape(-1)[index], item.image.dtype.type(0))
+    return replace(item, image=image, camera=camera)
 
 
 @lru_cache(maxsize=4)

@@ -1,0 +1,331 @@
+//! Births and returns: detections become tentative tracks, and confirmed ones new persons, or lost and absent ones who come back.
+
+use super::clothes::Clothes;
+use super::person::Person;
+use super::pixel_assignment::PredictedBody;
+use super::tentative_tracks::{SAME_PERSON, TentativeTrack};
+use super::{ONE_BODY, People, Refusal, assign};
+use crate::body::{Body, Model};
+use crate::config::SolverKind;
+use crate::detect::{Detected, DetectionQuery, PlacedDetection, Surroundings, fit_body};
+use crate::math::{Pose, Vec3};
+use crate::observation::background::Background;
+use crate::observation::frame::{DepthImage, Frame, PositionRelation};
+use crate::observation::ownership::NO_OWNER;
+
+/// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
+const DETECT_EVERY: f64 = 0.06;
+/// Fraction of a detected person's segment that may show another person if the person does not explain it.
+const LEFT_OVER: f64 = 0.3;
+/// Largest number of persons after whom the rest of a segment is looked at again.
+const MOST_TOGETHER: usize = 4;
+
+impl People {
+    /// Searches for new persons: in the frame's detections that show nobody who is tracked, and in pixels that no person explains.
+    pub(super) fn find_new(&mut self, frame: &Frame, shown: &[Option<usize>]) {
+        self.tentative.prune(frame.stamp);
+        for (detection, _) in frame.detections.iter().zip(shown).filter(|(_, shown)| shown.is_none()) {
+            let fitted = self.detected_body().fit(&sites_of(detection.positions), true);
+            let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
+            if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
+                self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
+            }
+        }
+        self.detect_new(frame);
+        let confirmed = self.tentative.take_confirmed(frame.stamp);
+        self.refusal = self.tentative.greatest_at(frame.stamp).map(|log_odds| Refusal::Doubtful { log_odds });
+        if !confirmed.is_empty() {
+            self.associate(frame, &confirmed);
+        }
+    }
+
+    /// Detects persons in pixels that no person explains, if it is time to.
+    fn detect_new(&mut self, frame: &Frame) {
+        let everybody_there = self.options.only.as_ref().is_some_and(|only| {
+            only.iter().all(|id| self.persons.iter().any(|person| person.id == *id && person.is_tracked()))
+        });
+        let tracked = self.persons.iter().any(Person::is_tracked);
+        let wait = match tracked {
+            true if self.everybody || self.scene.shows_something_new() => DETECT_EVERY,
+            true => f64::INFINITY,
+            false => 0.0,
+        };
+        if everybody_there
+            || !self.finds_new(frame.stamp)
+            || !self.detector.knows()
+            || self.last_detection.is_some_and(|last| frame.stamp - last < wait)
+        {
+            return;
+        }
+        self.last_detection = Some(frame.stamp);
+        self.detect(frame, if tracked { DetectionQuery::New } else { DetectionQuery::Any });
+    }
+
+    /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.
+    fn finds_new(&self, stamp: f64) -> bool {
+        let unconfirmed = |person: &Person| person.is_tracked() && !person.tracker.is_confirmed(stamp);
+        let relocalizes = self.config.relocalization && self.config.solver != SolverKind::Limbwise;
+        (relocalizes || !self.persons.iter().any(|person| person.present)) && !self.persons.iter().any(unconfirmed)
+    }
+
+    fn detect(&mut self, frame: &Frame, query: DetectionQuery) {
+        for number in 0..frame.images.len() {
+            let mut found = self.detect_in_image(frame, number, query);
+            // Persons who touch are one segment: what a detected person leaves of it may show another one.
+            let mut newcomers = Vec::new();
+            for next in 0..MOST_TOGETHER {
+                let Some(one) = found.get(next) else { break };
+                let detected = Detected { detection: &one.detection, map: self.detector.map() };
+                newcomers.extend(fit_body(&Model::new(self.prototype.clone()), detected));
+                self.assign_segment(frame, number, &one.detection.pixels, &newcomers);
+                if let Some(place) = self.rest_of_segment(&frame.images[number], number, &one.detection.pixels) {
+                    found.extend(self.detect_in_image(frame, number, DetectionQuery::Near(place)));
+                }
+            }
+            for found in found {
+                let still = self.scene.is_still(frame, number, &found.detection.pixels);
+                let odds = still.then(|| self.detector.static_odds());
+                self.tentative.update(TentativeTrack::in_image(frame.stamp, found, number), odds);
+            }
+        }
+    }
+
+    /// Returns the persons who are detected in an image, and are to be tracked.
+    fn detect_in_image(&mut self, frame: &Frame, number: usize, query: DetectionQuery) -> Vec<PlacedDetection> {
+        let image = &frame.images[number];
+        let scene = self.scene.known().of_image(image).map_or(&[][..], Background::depth);
+        let around = Surroundings {
+            ground: frame.ground,
+            excluded: frame.excluded,
+            owners: self.assignment.owners().get(number).map_or(&[], Vec::as_slice),
+            // A person may have stood there since the camera started, so only an old background is excluded.
+            background: if self.scene.is_old(number, frame.stamp) { scene } else { &[] },
+            ..Surroundings::default()
+        };
+        let mut found = self.detector.detect(&self.prototype, image, &around, query);
+        found.retain(|found| {
+            let requested = self.is_requested(frame, found.root);
+            if !requested {
+                self.detector.reject(found.index);
+            }
+            requested
+        });
+        found
+    }
+
+    /// Assigns pixels of a segment to newcomers, who are numbered after all persons.
+    fn assign_segment(&mut self, frame: &Frame, image: usize, pixels: &[usize], newcomers: &[(Body, Vec<Pose>)]) {
+        let bodies = (self.persons.len() as u16..).zip(newcomers).map(|(number, (body, poses))| PredictedBody {
+            number,
+            body,
+            poses,
+        });
+        self.assignment.assign_segment(&frame.images[image], image, pixels, bodies);
+    }
+
+    /// Returns the middle of those pixels of a segment that nobody owns, world frame, if these are many.
+    fn rest_of_segment(&self, image: &DepthImage, number: usize, pixels: &[usize]) -> Option<Vec3> {
+        let owners = &self.assignment.owners()[number];
+        let free = || pixels.iter().filter(|pixel| owners[**pixel] == NO_OWNER);
+        let place = |pixel: usize| image.back_project(pixel, image.pixels.get(pixel) * image.meters_per_unit as f32);
+        let (count, sum) = (free().count() as f64, free().map(|pixel| place(*pixel)).sum::<Vec3>());
+        (count > LEFT_OVER * pixels.len() as f64).then(|| image.world_from_sensor * (sum / count))
+    }
+
+    /// Whether a person detected at a position is to be tracked.
+    fn is_requested(&self, frame: &Frame, place: Vec3) -> bool {
+        let others = self.tracked_except(None);
+        self.options.allows(place) && self.options.room(frame, place, &others).is_some()
+    }
+
+    /// Returns indices and positions of all tracked persons, except one.
+    fn tracked_except(&self, one: Option<usize>) -> Vec<(usize, Vec3)> {
+        let others =
+            (0..self.persons.len()).filter(|number| self.persons[*number].is_tracked() && Some(*number) != one);
+        others.map(|number| (number, self.persons[number].place)).collect()
+    }
+
+    /// Associates confirmed tentative tracks with absent persons by a linear assignment; spawns new tracks for the others. The
+    /// assignment includes all other tentative tracks of this frame.
+    fn associate(&mut self, frame: &Frame, confirmed: &[TentativeTrack]) {
+        let absent: Vec<usize> = (0..self.persons.len()).filter(|number| self.may_match(*number, confirmed)).collect();
+        if !absent.is_empty() {
+            self.detect(frame, DetectionQuery::All);
+            self.tentative.discard(confirmed);
+        }
+        let cost = |track: &TentativeTrack| {
+            let clothes = self.clothes_of_track(frame, track);
+            let size = |number: usize| self.persons[number].stature_cost(self.detected(track));
+            let cost =
+                |number: &usize| person_cost(&self.persons[*number], size(*number), track, &clothes, frame.stamp);
+            absent.iter().map(cost).collect()
+        };
+        let costs: Vec<Vec<f64>> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).map(cost).collect();
+        let known: Vec<Option<usize>> =
+            assign::assign(&costs, NEW).into_iter().map(|column| column.map(|column| absent[column])).collect();
+        let numbers = self.assign_to_newcomers(frame, confirmed, &known);
+        for ((track, known), own) in confirmed.iter().zip(known).zip(numbers) {
+            let others = self.tracked_except(known);
+            let Some(leaves) = self.options.room(frame, track.place, &others) else { continue };
+            let came = match known {
+                Some(number) => self.reactivate(frame, track, number, own.unwrap_or(number)),
+                None => own.is_some_and(|own| self.spawn(frame, track, own)),
+            };
+            if !came {
+                self.refusal = Some(Refusal::Unsupported);
+            }
+            if let Some(leaves) = leaves.filter(|_| came) {
+                self.persons[leaves].present = false;
+            }
+            if came && self.options.limit.is_some_and(|limit| self.present().count() > limit) {
+                // With the limit exceeded, the new person replaces those who are hidden.
+                self.persons.iter_mut().for_each(|person| person.present &= person.is_tracked());
+            }
+        }
+    }
+
+    /// Assigns the segments of confirmed tracks to the bodies that start there, and to those of this frame's other tentative tracks,
+    /// so that each gets their own pixels. Returns the number that owns the pixels of each confirmed track; a person who is tracked
+    /// already has pixels.
+    fn assign_to_newcomers(
+        &mut self,
+        frame: &Frame,
+        confirmed: &[TentativeTrack],
+        known: &[Option<usize>],
+    ) -> Vec<Option<usize>> {
+        let (first, mut newcomers, mut numbers) = (self.persons.len(), Vec::new(), Vec::new());
+        for (track, known) in confirmed.iter().zip(known) {
+            let tracked = known.is_some_and(|number| self.persons[number].is_tracked());
+            let fitted = if tracked { None } else { self.fit_track(track) };
+            numbers.push(fitted.is_some().then_some(first + newcomers.len()));
+            newcomers.extend(fitted);
+        }
+        newcomers.extend(self.tentative.updated_at(frame.stamp).filter_map(|track| self.fit_track(track)));
+        for track in confirmed.iter().filter(|track| !track.detection.pixels.is_empty()) {
+            self.assign_segment(frame, track.image, &track.detection.pixels, &newcomers);
+        }
+        numbers
+    }
+
+    /// Whether this person may match one of the tentative tracks: an absent or lost person, and one who explains fewer pixels
+    /// than a tentative track near them.
+    fn may_match(&self, number: usize, candidates: &[TentativeTrack]) -> bool {
+        let person = &self.persons[number];
+        let beside = |track: &&TentativeTrack| track.place.distance(person.place) < SAME_PERSON;
+        let visible = candidates.iter().filter(beside).map(|track| track.detection.pixels.len()).max();
+        !person.is_tracked() || visible.is_some_and(|visible| self.assignment.count(number) < visible)
+    }
+
+    /// Returns the detection of a tentative track.
+    fn detected<'a>(&'a self, track: &'a TentativeTrack) -> Detected<'a> {
+        Detected { detection: &track.detection, map: self.detector.map() }
+    }
+
+    /// Returns the body of a tentative track, in its sizes, and its poses.
+    fn fit_track(&self, track: &TentativeTrack) -> Option<(Body, Vec<Pose>)> {
+        let model = Model::new(self.prototype.clone());
+        match track.positions.as_slice() {
+            [] => fit_body(&model, self.detected(track)),
+            positions => self.detected_body().fit(&sites_of(positions), true).ok(),
+        }
+    }
+
+    /// The body whose sites the frame's detections name: that of the one who is followed may have been edited.
+    fn detected_body(&self) -> &Body {
+        let followed = self.persons.first().filter(|person| person.followed);
+        followed.map_or(&self.prototype, |person| person.tracker.body())
+    }
+
+    /// Returns the colors of a tentative track's clothes.
+    fn clothes_of_track(&self, frame: &Frame, track: &TentativeTrack) -> Clothes {
+        let mut clothes = Clothes::default();
+        if let Some((body, poses)) = self.fit_track(track) {
+            let tracked = |owner: u16| usize::from(owner) < self.persons.len();
+            let free = |image: usize, pixel: usize| {
+                self.assignment.owners()[image].get(pixel).is_some_and(|owner| !tracked(*owner))
+            };
+            clothes.observe(frame, &body, &poses, free);
+        }
+        clothes
+    }
+
+    /// Spawns a new person at a tentative track. Returns whether the person is there.
+    fn spawn(&mut self, frame: &Frame, track: &TentativeTrack, own: usize) -> bool {
+        let full = self.persons.len() >= usize::from(NO_OWNER);
+        if full || !self.options.includes(self.next_id) {
+            return false;
+        }
+        let Ok(person) = self.nobody_yet(frame.stamp) else { return false };
+        self.persons.push(person);
+        let came = self.reactivate(frame, track, self.persons.len() - 1, own);
+        if came {
+            self.next_id += 1;
+        } else {
+            self.persons.pop();
+        }
+        came
+    }
+
+    /// Starts a person's tracker at a tentative track, in the pixels whose owner is `own`. Returns whether the person is there.
+    fn reactivate(&mut self, frame: &Frame, track: &TentativeTrack, number: usize, own: usize) -> bool {
+        self.scene.release(frame, track.image, &track.detection.pixels);
+        let person = &mut self.persons[number];
+        if !self.options.includes(person.id) {
+            return false;
+        }
+        let known = person.created < frame.stamp;
+        let ownership = self.assignment.ownership(own, self.scene.known());
+        let detected = Detected { detection: &track.detection, map: self.detector.map() };
+        let placed = PlacedDetection { index: 0, root: track.place, detection: track.detection.clone() };
+        let depth_frame = &Frame { colors: &[], ..*frame };
+        let came = if !track.positions.is_empty() {
+            let frame = depth_frame.with_positions(&track.positions);
+            person.tracker.start_at_positions(&frame, ownership, !known)
+        } else if person.present {
+            person.tracker.recover(depth_frame, ownership, placed)
+        } else {
+            person.tracker.start_at_detection(depth_frame, ownership, placed, known)
+        };
+        if came {
+            person.present = true;
+            person.created = person.created.min(frame.stamp);
+            person.update_stature(detected);
+        }
+        person.update(frame, ownership);
+        // A lost person's own tracker may have found them in the same frame.
+        let place = person.place;
+        let twice = self.tracked_except(Some(number)).iter().any(|(_, other)| other.distance(place) < ONE_BODY);
+        self.persons[number].present &= !twice;
+        came && !twice
+    }
+}
+
+/// Sites and their measured positions.
+fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
+    positions.iter().map(|relation| (relation.site, relation.position)).collect()
+}
+
+/// Cost of a new person in the assignment, nats.
+pub(super) const NEW: f64 = 4.0;
+/// Distance that a person may move, meters: at once, and in addition per second.
+const COMES: [f64; 2] = [0.4, 1.2];
+/// Mean and standard deviation of the clothes distance between two views of one person.
+const CLOTHES: [f64; 2] = [0.10, 0.07];
+/// Evidence of equal clothes for the same person, nats.
+const LIKE_CLOTHES: f64 = 3.0;
+
+/// Returns the cost of a person's having moved to a position, nats.
+pub(super) fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
+    let reach = COMES[0] + COMES[1] * (stamp - person.last_tracked);
+    let far = person.place.distance(place) / reach;
+    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
+}
+
+/// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.
+fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
+    let far = distance_cost(person, track.place, stamp);
+    let distance = person.clothes.distance(clothes);
+    let color =
+        distance.map_or(0.0, |distance| 0.5 * ((distance - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
+    far + size + color
+}
