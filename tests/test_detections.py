@@ -1,12 +1,20 @@
 """Detections that come with a frame: who is measured, who comes back, who is new."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
 import voodoo
 from scene import standing_joints
 from voodoo.errors import BodyError, MeasurementError
+from voodoo.live.assembly import LiveFrame
+from voodoo.live.follow import Follower
+from voodoo.measurements import MarkerSet, RecordedFrame
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.start import stature
+from voodoo.sensors.adapters import Adapter, register, unregister
+from voodoo.sensors.settings import FrontEndSettings
 
 BODY = voodoo.Body.human(1.75)
 
@@ -123,3 +131,56 @@ def test_an_empty_detection_is_nobodys_and_a_site_of_an_added_limb_is_of_the_one
         end = {"box_end": np.add(tracker.estimate.joints["box_end"], (0.01, 0.0, 0.0))}
         estimate = tracker.step(frame(index / 30.0, person(x) | end))
         assert np.linalg.norm(root(estimate) - person()["humanoid_root"]) < 0.2, index
+
+
+class Tag(NamedTuple):
+    """A position (3,) [m] of a site, from somebody's tag."""
+
+    sensor: str
+    stamp: float
+    site: str
+    position: np.ndarray
+
+
+class TagAdapter(Adapter):
+    kind = "tag"
+    measurement = Tag
+
+    def add(self, frame, item, context):
+        if item.site in context.predicted:
+            frame.add_position(item.site, item.position, source=item.sensor)
+
+
+def test_suits_are_persons_and_a_tag_is_that_of_the_nearest():
+    register(TagAdapter())
+    try:
+        front_end = FrontEnd(voodoo.People(detector=None), settings=FrontEndSettings(use=("markers", "tag")))
+        for index in range(10):
+            stamp, (near, far) = index / 30.0, (person(2.0, 0.6), person(3.0, -0.6))
+            suits = [MarkerSet("a", stamp, near), MarkerSet("b", stamp, far)][:: -1 if index % 2 else 1]
+            tag = Tag("tag", stamp, "l_wrist", far["l_wrist"])
+            stray = Tag("stray", stamp, "l_wrist", far["l_wrist"] + (0.0, 0.0, 2.0))
+            found = front_end.step(RecordedFrame(stamp, (*suits, tag, stray)))
+        assert [one.id for one in found] == [1, 2]
+        sources = [set(one.estimate.sources) for one in found]
+        assert sources == [{"a"}, {"b", "tag"}]
+    finally:
+        unregister("tag")
+
+
+def test_a_clock_that_is_set_back_keeps_pose_and_sizes_but_not_for_the_next_person():
+    tracker = voodoo.Tracker(BODY)
+    follower = Follower(tracker, settings=FrontEndSettings(use=("markers",)))
+    child = {name: 0.7 * place for name, place in person().items()}
+
+    def step(index, stamp, *, breaks=False):
+        suit = MarkerSet("suit", stamp, child)
+        live = follower.step(LiveFrame(stamp, (suit,), index, index / 30.0, index / 30.0, breaks))
+        return live.estimates[1].status, live.bodies[1]
+
+    for index in range(10):
+        _, before = step(index, 10.0 + index / 30.0)
+    status, body = step(10, 0.0, breaks=True)
+    assert status == "tracking" and stature(body) == pytest.approx(stature(before), rel=0.01)
+    follower.restart(back=False, gone=True)
+    assert tracker.body == BODY and not tracker.estimate.joints

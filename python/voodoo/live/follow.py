@@ -155,9 +155,7 @@ class Follower:
             if not tracker.estimate.joints or (gone and tracker.can_search):
                 tracker.search()
             else:
-                poses = dict(tracker.estimate.world_from_limb)
-                tracker = Tracker(tracker.body, config=tracker.config, detector=tracker.detector)
-                tracker.reset_pose(poses)
+                tracker.reset_pose(dict(tracker.estimate.world_from_limb))
             self._front = FrontEnd(tracker, **self._how)
         elif back and self._make:
             # `People` handles a gap by itself.

@@ -24,7 +24,7 @@ from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.starts.base import FoundStart, StartFrame
 from voodoo.pipeline.starts.chosen import Starts, automatic_starts
-from voodoo.sensors.adapters import NOBODY, Adapter, Context, Memory, adapters_of, all_adapters
+from voodoo.sensors.adapters import NOBODY, Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sensor import KeypointReport
 from voodoo.sensors.rays import SiteRay
@@ -186,7 +186,9 @@ class FrontEnd(Generic[E]):
                     adapter.add(frame, item, scene)
                     spare.append(item)
                     continue
-                shares = dict.fromkeys(persons, item) if alone else self._shares(adapter, item, persons)
+                shares: Mapping[int, Any] = dict.fromkeys(persons, item)
+                if not alone:
+                    shares = adapter.shares(item, persons) if persons else {NOBODY: item}
                 for number, part in shares.items():
                     if number == NOBODY:
                         spare.append(part)
@@ -203,9 +205,6 @@ class FrontEnd(Generic[E]):
             spare = [] if persons and not self._lost else used
         detected = self._detect(frame, spare)
         return frame, {number: own[number] for number in sorted(filled)}, detected
-
-    def _shares(self, adapter: Adapter[Any], item: Any, persons: Mapping[int, Context]) -> Mapping[int, Any]:  # noqa: ANN401
-        return adapter.shares(item, persons) if persons else {NOBODY: item}
 
     def _contexts(self, stamp: float, alive: Sequence[Any]) -> dict[int, Context]:
         """What the adapters may read about every person who is tracked."""
@@ -259,11 +258,11 @@ class FrontEnd(Generic[E]):
 
     def _detect(self, frame: Frame, spare: Sequence[Any]) -> bool:
         """Add the persons who are found in measurements that belong to nobody; returns whether there are any."""
-        if not spare:
+        found: Sequence[FoundStart] = [] if self.found is None or self._persons else [self.found]
+        if not (spare or found):
             return False
         alone = not isinstance(self.tracker, People)
         body = self.tracker.prototype if isinstance(self.tracker, People) else self.tracker.body
-        found: Sequence[FoundStart] = [] if self.found is None or self._persons else [self.found]
         for finder in self._starts.finders:
             if not found and not finder.given:
                 found = finder.find(StartFrame(frame.stamp, spare, body, self.settings))

@@ -12,18 +12,26 @@ from voodoo.sensors.pixels import FloatArray
 
 
 class MarkersStart(StartFinder):
-    """Finds a person in a frame whose markers determine the pose."""
+    """Finds a person in every set of markers that determines the pose; else in all sets together, as those of single trackers."""
 
     name = "markers"
 
     def find(self, frame: StartFrame) -> Sequence[FoundStart]:
         """See StartFinder."""
-        joints: dict[str, FloatArray] = {}
-        sigma: dict[str, float] = {}
-        for item in frame.measurements:
-            if isinstance(item, MarkerSet):
+        sets = [item for item in frame.measurements if isinstance(item, MarkerSet)]
+        return self._found([[item] for item in sets], frame) or self._found([sets], frame)
+
+    def _found(self, groups: Sequence[Sequence[MarkerSet]], frame: StartFrame) -> list[FoundStart]:
+        """The persons whose pose the sets of a group determine."""
+        found, names = [], frame.body.site_names
+        for group in groups:
+            joints: dict[str, FloatArray] = {}
+            sigma: dict[str, float] = {}
+            for item in group:
                 for site, position in item.positions.items():
-                    if site in frame.body.site_names and np.isfinite(position).all():
+                    if site in names and np.isfinite(position).all():
                         joints[site] = np.asarray(position, dtype=np.float64)
                         sigma[site] = frame.settings.marker_sigma if item.sigma is None else item.sigma
-        return [FoundStart(joints, sigma, self.name)] if fixes_pose(joints, frame.body) else []
+            if fixes_pose(joints, frame.body):
+                found.append(FoundStart(joints, sigma, self.name))
+        return found
