@@ -1,8 +1,9 @@
-"""Parses the name of a source: realsense, ros2:TOPIC, grow:FOLDER, or a recording."""
+"""Parses the name of a source: a camera, ros2:TOPIC, grow:FOLDER, or a recording."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ from voodoo.live.source import Source
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 
-REALSENSE, ROS2, GROW = "realsense", "ros2", "grow"
+CAMERAS = {"realsense": "RealSenseSource", "oak": "OakSource", "orbbec": "OrbbecSource"}
+"""Kind, which is also the name of its module -> class."""
+ROS2, GROW = "ros2", "grow"
 _OF_TOPICS = ("meters_per_unit", "tf_max_age")
 
 
@@ -27,7 +30,8 @@ def source_of(
     """The source with a given name.
 
     Args:
-        word: "realsense", "realsense:SERIAL", "ros2:TOPIC[,TOPIC...]", "grow:FOLDER", or the path of a recording.
+        word: "realsense", "oak" or "orbbec", with ":SERIAL" for one of several, "orbbec:FILE.bag", "ros2:TOPIC[,TOPIC...]",
+            "grow:FOLDER", or the path of a recording.
         rate: for a recording: playback speed relative to real time.
         loop: for a recording: start again at its end.
         root_frame: for a recording or ROS 2: root frame to use instead of its own.
@@ -41,10 +45,9 @@ def source_of(
     kind, colon, rest = str(word).partition(":")
     options = dict(options or {})
     refuse_unused([str(word)], options)
-    if kind == REALSENSE:
-        from voodoo.live.sources.realsense import RealSenseSource
-
-        return RealSenseSource(serial=rest or None, calibration=calibration)
+    if kind in CAMERAS:
+        camera: type[Source] = getattr(import_module(f"voodoo.live.sources.{kind}"), CAMERAS[kind])
+        return camera(serial=rest or None, calibration=calibration)  # type: ignore[call-arg]
     if kind == ROS2 and colon:
         from voodoo.live.sources.ros2 import Ros2Source
 
@@ -70,7 +73,7 @@ def source_of(
 def options_for(word: str, options: Mapping[str, Any]) -> dict[str, Any]:
     """Those of several sources' options that one of them uses."""
     kind = word.partition(":")[0]
-    known = _OF_TOPICS if kind == ROS2 else () if kind in (REALSENSE, GROW) else options
+    known = _OF_TOPICS if kind == ROS2 else () if kind in (*CAMERAS, GROW) else options
     return {name: value for name, value in options.items() if name in known}
 
 
@@ -87,7 +90,7 @@ def refuse_unused(words: Sequence[str], options: Mapping[str, Any]) -> None:
     kinds = {word.partition(":")[0] for word in words}
     known = ("frame", *_OF_TOPICS) if ROS2 in kinds else ()
     unknown = sorted(set(options) - set(known))
-    if unknown and kinds <= {REALSENSE, ROS2, GROW}:
+    if unknown and kinds <= {*CAMERAS, ROS2, GROW}:
         raise VoodooError(
             f"{', '.join(words)}: expected no {', '.join(unknown)}, found some; options: {', '.join(known) or 'none'}"
         )
