@@ -196,7 +196,12 @@ def test_a_viewer_is_served_at_a_port(word):
 
 
 def test_missing_libraries_are_named():
-    for word, extra, module in (("realsense", "realsense", "pyrealsense2"), ("ros2:/depth", "ros2", "cyclonedds")):
+    for word, extra, module in (
+        ("realsense", "realsense", "pyrealsense2"),
+        ("oak", "oak", "depthai"),
+        ("orbbec", "orbbec", "pyorbbecsdk"),
+        ("ros2:/depth", "ros2", "cyclonedds"),
+    ):
         try:
             __import__(module)
         except ImportError:

@@ -71,6 +71,12 @@ def test_realsense(ours):
     check(ours, "check_realsense.py")
 
 
+def test_oak_and_orbbec(request):
+    # Without what pyorbbecsdk2 requires for its examples, which has no wheels for every Python.
+    packages = ("--no-deps", "depthai>=3.12", "pyorbbecsdk2>=2.1")
+    check(environment(request.config.cache, "cameras", packages), "check_cameras.py")
+
+
 def test_view(ours):
     check(ours, "check_view.py")
 

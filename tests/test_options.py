@@ -57,7 +57,7 @@ def test_an_option_of_reading_is_never_ignored(words, option, reason, tmp_path: 
     assert done.exit_code in (1, 2) and reason in done.stderr, done.output
 
 
-@pytest.mark.parametrize("word", ["realsense", "grow:folder", "ros2:/depth"])
+@pytest.mark.parametrize("word", ["realsense", "oak", "orbbec:1", "grow:folder", "ros2:/depth"])
 def test_a_live_source_takes_no_option_that_it_does_not_know(word):
     with pytest.raises(VoodooError, match="depth_topic"):
         source_of(word, options={"depth_topic": "/other"})

@@ -24,7 +24,8 @@ def live_command(
         list[str],
         typer.Argument(
             metavar="SOURCE...",
-            help="realsense[:SERIAL], ros2:TOPIC[,TOPIC...], grow:FOLDER, or a recording to play.",
+            help="realsense[:SERIAL], oak[:ID], orbbec[:SERIAL|:FILE.bag], ros2:TOPIC[,TOPIC...], grow:FOLDER, or a "
+            "recording to play.",
         ),
     ],
     init: options.InitOption = None,

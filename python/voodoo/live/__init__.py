@@ -37,8 +37,7 @@ def open(
     """Live sources as an iterator of recorded frames; use it in a `with` block.
 
     Args:
-        *sources: "realsense", "realsense:SERIAL", "ros2:TOPIC[,TOPIC...]", "grow:FOLDER", the path of a recording, or a Source of
-            your own. The first one's images make the frames.
+        *sources: see voodoo.live.sources.words.source_of, or a Source of your own. The first one's images make the frames.
         rate: for recordings: playback speed relative to real time.
         loop: for recordings: start again at the end.
         root_frame: for recordings and ROS 2: root frame to use instead of their own.
