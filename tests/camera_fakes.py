@@ -189,7 +189,7 @@ def orbbec_frame(image, us, scale=1.0, global_us=0):
 def fake_orbbec(profiles, serials=("CL8F25300AB",), *, related=False):
     """The module, with cameras of these numbers, whose streams are `profiles` by sensor."""
     module = SimpleNamespace(
-        sent={},
+        sent={"there": list(serials)},
         OBError=type("OBError", (Exception,), {}),
         OBFormat=Enum("OBFormat", "Y16 Z16 RGB BGR MJPG YUYV"),
         OBSensorType=Enum("OBSensorType", "COLOR_SENSOR DEPTH_SENSOR"),
@@ -219,11 +219,11 @@ def fake_orbbec(profiles, serials=("CL8F25300AB",), *, related=False):
 
     class Device:
         def __init__(self, serial):
-            module.sent["serial"] = serial
+            module.sent["serial"] = self.serial = serial
             self._status = module.OBPlaybackStatus.PLAYING
 
         def get_device_info(self):
-            return SimpleNamespace(get_name=lambda: "Orbbec Femto Bolt")
+            return SimpleNamespace(get_name=lambda: "Orbbec Femto Bolt", get_serial_number=lambda: self.serial)
 
         def is_global_timestamp_supported(self):
             return related
@@ -244,10 +244,7 @@ def fake_orbbec(profiles, serials=("CL8F25300AB",), *, related=False):
             assert level is module.OBLogLevel.NONE
 
         def query_devices(self):
-            return DeviceList(list(serials))
-
-        def set_device_changed_callback(self, callback):
-            module.sent["changed"] = lambda removed: callback(DeviceList(removed), DeviceList([]))
+            return DeviceList(module.sent["there"])
 
     class Config:
         def __init__(self):

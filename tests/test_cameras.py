@@ -196,14 +196,15 @@ def test_orbbec_stamps_by_the_hosts_clock(monkeypatch):
 def test_orbbec_is_lost(monkeypatch):
     ob, source, clock = orbbec(monkeypatch, depth=orbbec_profile(*DEPTH), serials=("A", "B"))
     assert ob.sent["serial"] == "A"
-    ob.sent["changed"](["B"])
+    ob.sent["there"] = ["A"]
     assert source.read(0.0) == []
-    ob.sent["changed"](["A"])
+    ob.sent["there"] = ["B"]
     with pytest.raises(SourceGone, match="it was unplugged"):
         source.read(0.0)
     source.close()
+    ob.sent["there"] = ["B", "A"]
     source.open(clock, Faults())
-    assert source.read(0.0) == []
+    assert source.read(0.0) == [] and ob.sent["serial"] == "B"
 
 
 def test_orbbec_that_is_not_there_or_has_no_depth(monkeypatch):

@@ -109,7 +109,7 @@ def test_the_fake_of_orbbec_has_its_names():
         (ob.SensorList, "get_count get_type_by_index"),
         (ob.DepthFrame, "get_data get_depth_scale get_timestamp_us get_global_timestamp_us"),
         (ob.FrameSet, "get_depth_frame get_color_frame"),
-        (ob.DeviceInfo, "get_name"),
+        (ob.DeviceInfo, "get_name get_serial_number"),
         (ob.OBCameraIntrinsic, "fx fy cx cy width height"),
         (ob.OBCameraDistortion, "k1 k2 k3 k4 k5 k6 p1 p2 model"),
         (ob.OBExtrinsic, "rot transform"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate, Person
 from voodoo.pipeline.floor import detections
 from voodoo.pipeline.front_end import ONE, FrontEnd
-from voodoo.pipeline.run import decodable
 from voodoo.pipeline.starts.base import FoundStart
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.sensors.settings import FrontEndSettings
@@ -161,9 +160,3 @@ class Follower:
             # `People` handles a gap by itself.
             self._numbers = self._most
             self._front = FrontEnd(self._make(), **self._how)
-
-
-def without_damaged(frame: LiveFrame) -> tuple[LiveFrame, list[VoodooError]]:
-    """The frame without the undecodable images, and the reasons."""
-    kept, errors = decodable(frame.measurements)
-    return replace(frame, measurements=kept), errors

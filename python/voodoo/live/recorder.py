@@ -12,7 +12,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from voodoo.errors import VoodooError
-from voodoo.export.ros2 import STORE, cdr, description, instant, person_id, tracked
+from voodoo.export.ros2 import STORE, cdr, description, instant, person_id, tracked, transforms_message
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
@@ -20,7 +20,6 @@ from voodoo.model.camera import Camera
 from voodoo.model.rotations import quaternions
 from voodoo.whole import Hidden, move_whole
 
-_TF = "tf2_msgs/msg/TFMessage"
 _QUALITY = 95
 
 
@@ -130,19 +129,8 @@ class Recorder(Output):
 
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
     """A tf2_msgs/TFMessage of one transform (4, 4)."""
-    x, y, z = (float(value) for value in parent_from_child[:3, 3])
-    qx, qy, qz, qw = quaternions(parent_from_child[:3, :3]).tolist()
-    transform = _new(
-        "geometry_msgs/msg/TransformStamped",
-        header=_header(stamp, parent),
-        child_frame_id=child,
-        transform=_new(
-            "geometry_msgs/msg/Transform",
-            translation=_new("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
-            rotation=_new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
-        ),
-    )
-    return _new(_TF, transforms=[transform])
+    row = [*parent_from_child[:3, 3].tolist(), *quaternions(parent_from_child[:3, :3]).tolist()]
+    return transforms_message(round(stamp * 1e9), [(parent, child, row)])
 
 
 def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401

@@ -14,12 +14,13 @@ import numpy as np
 
 from voodoo.errors import VoodooError, reason
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.follow import Follower, Step, without_damaged
+from voodoo.live.follow import Follower, Step
 from voodoo.live.latencies import Latencies
 from voodoo.live.mailbox import Mailbox
 from voodoo.live.stream import Live
 from voodoo.live.upright import Upright
 from voodoo.measurements import FloatArray
+from voodoo.pipeline.run import decodable
 
 _RATE_S = 2.0
 _LATE_S = 1.0
@@ -219,12 +220,12 @@ class Session:
             return follower.step(frame)
         except VoodooError as refusal:
             error = refusal
-            kept, damaged = without_damaged(frame)
+            kept, damaged = decodable(frame.measurements)
             for problem in damaged:
                 faults.add_error(problem, clock.now(), "damaged picture")
             if damaged:
                 try:
-                    return follower.step(kept)
+                    return follower.step(replace(frame, measurements=kept))
                 except VoodooError as again:
                     error = again
             faults.add_error(error, clock.now(), "refused")

@@ -14,11 +14,8 @@ from rosbags.interfaces import Nodetype
 from voodoo.errors import VoodooError, installed
 from voodoo.export.ros2 import STORE
 
-_BASE = {
-    "int8": "int8", "int16": "int16", "int32": "int32", "int64": "int64", "uint8": "uint8", "uint16": "uint16",
-    "uint32": "uint32", "uint64": "uint64", "float32": "float32", "float64": "float64", "byte": "uint8", "char": "uint8",
-    "octet": "uint8",
-}  # fmt: skip
+_BYTES = ("byte", "char", "octet")
+"""Names of ROS for uint8; those of other numbers are the library's, too."""
 
 
 def idl() -> Any:  # noqa: ANN401 - a module that may not be installed
@@ -45,14 +42,6 @@ def ros_name(name: str) -> str:
     return f"{parts[0]}/msg/{parts[3][:-1]}"
 
 
-def _deserialize(kind: Any, data: bytes, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - with options of the library
-    return message_of(kind, data)
-
-
-def _serialize(message: Any, *_: Any, **__: Any) -> bytes:  # noqa: ANN401 - with options of the library
-    return bytes(message.data_as_sent)
-
-
 def message_of(kind: Any, data: bytes) -> Any:  # noqa: ANN401
     """A message of a class of `dds_type` from its bytes (CDR with its header of four bytes), kept as `data_as_sent`."""
     message = kind.__new__(kind)
@@ -68,8 +57,9 @@ def dds_type(kind: str) -> Any:  # noqa: ANN401 - a class made at run time
         VoodooError: `cyclonedds` is not installed, or an unknown type.
     """
     made = _struct(kind, topic=True)
-    made.serialize = _serialize
-    made.deserialize = made.deserialize_key = classmethod(_deserialize)
+    # The library adds options.
+    made.serialize = lambda message, *_, **__: bytes(message.data_as_sent)
+    made.deserialize = made.deserialize_key = lambda data, *_, **__: message_of(made, data)
     return made
 
 
@@ -97,4 +87,4 @@ def _field(node: Any) -> Any:  # noqa: ANN401
     name = content[0]
     if name == "string":
         return str
-    return bool if name == "bool" else getattr(types, _BASE[name])
+    return bool if name == "bool" else getattr(types, "uint8" if name in _BYTES else name)

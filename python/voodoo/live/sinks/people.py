@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from threading import Lock
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -66,19 +65,17 @@ class Shown:
         return body_covariances(turned @ found @ turned.T, self.frames.places[:, 0] - self.limb_poses[:, 0, :3, 3])
 
 
-_made: WeakKeyDictionary[Step, dict[str, Shown | None]] = WeakKeyDictionary()
 _lock = Lock()
+"""Sinks ask for the same step at the same time."""
 
 
 def shown(step: Step, root_frame: str) -> Shown | None:
     """The persons of a step who have a pose; None without any."""
     with _lock:
-        known = _made.setdefault(step, {})
-        if root_frame not in known:
-            known[root_frame] = _shown(step, root_frame)
-        return known[root_frame]
+        return _shown(step, root_frame)
 
 
+@lru_cache(maxsize=2)
 def _shown(step: Step, root_frame: str) -> Shown | None:
     there = {number: one for number, one in step.estimates.items() if len(one.joint_positions)}
     if not there:

@@ -3,37 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from importlib import import_module
 
 from voodoo.errors import VoodooError
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import Sink
 
 
-def _vmc() -> Sink:
-    from voodoo.live.sinks.vmc import VmcSink
-
-    return VmcSink
-
-
-def _websocket() -> Sink:
-    from voodoo.live.sinks.websocket import WebSocketSink
-
-    return WebSocketSink
+def _found(module: str, name: str) -> Sink:
+    found: Sink = getattr(import_module(f"voodoo.live.sinks.{module}"), name)
+    return found
 
 
-def _ros2() -> Sink:
-    from voodoo.live.sinks.ros2 import Ros2Sink
-
-    return Ros2Sink
-
-
-def _foxglove() -> Sink:
-    from voodoo.live.sinks.foxglove import FoxgloveSink
-
-    return FoxgloveSink
-
-
-_sinks: dict[str, Callable[[], Sink]] = {"foxglove": _foxglove, "ros2": _ros2, "vmc": _vmc, "ws": _websocket}
+_sinks: dict[str, Callable[[], Sink]] = {
+    "foxglove": partial(_found, "foxglove", "FoxgloveSink"),
+    "ros2": partial(_found, "ros2", "Ros2Sink"),
+    "vmc": partial(_found, "vmc", "VmcSink"),
+    "ws": partial(_found, "websocket", "WebSocketSink"),
+}
 
 
 def register(scheme: str, find: Callable[[], Sink]) -> None:

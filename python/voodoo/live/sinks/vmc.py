@@ -14,7 +14,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.skeleton import FloatArray, Skeleton
 from voodoo.export.template import Template
@@ -51,12 +51,9 @@ class VmcSink(Output):
 
     def __init__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> None:
         """Find the host."""
-        try:
-            from pythonosc import osc_bundle_builder, osc_message_builder
-        except ImportError:
-            advice = "pip install 'voodoo-tracker[stream]'"
-            raise VoodooError(f"{address}: expected python-osc, found none; {advice}") from None
-        self._bundle_of, self._message_of = osc_bundle_builder.OscBundleBuilder, osc_message_builder.OscMessageBuilder
+        missing = f"{address}: expected python-osc, found none; pip install 'voodoo-tracker[stream]'"
+        self._bundle_of = installed("pythonosc.osc_bundle_builder", missing).OscBundleBuilder
+        self._message_of = installed("pythonosc.osc_message_builder", missing).OscMessageBuilder
         self.name, self.receiver = address, True
         self._root = root_frame
         host, port, _ = parts_of(address, host=None, port=PORT)
@@ -90,7 +87,8 @@ class VmcSink(Output):
         template, ends = self._templates[names]
         sent = template.filled(np.concatenate([[step.stamp - self._start], numbers.ravel()]))
         for first, end in pairwise(ends):
-            self._send(sent[first:end])
+            with suppress(BlockingIOError):
+                self._socket.send(sent[first:end])
 
     def _datagrams(self, names: tuple[str, ...], numbers: list[float]) -> list[bytes]:
         """Messages of the time and of bones, whose seven numbers each follow it."""
@@ -107,10 +105,6 @@ class VmcSink(Output):
                 message.add_arg(value)
             bundle.add_content(message.build())
         return bytes(bundle.build().dgram)
-
-    def _send(self, datagram: bytes) -> None:
-        with suppress(BlockingIOError):
-            self._socket.send(datagram)
 
     def close(self) -> None:
         """See Output."""

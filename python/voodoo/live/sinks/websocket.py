@@ -18,7 +18,7 @@ from urllib.parse import parse_qs
 
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import parts_of
@@ -54,15 +54,11 @@ class WebSocketSink(Output):
 
     def __init__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> None:
         """Start the server."""
-        try:
-            from websockets.asyncio.server import broadcast, serve
-            from websockets.exceptions import ConnectionClosed
-        except ImportError:
-            raise VoodooError(
-                f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
-            ) from None
+        missing = f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
+        server = installed("websockets.asyncio.server", missing)
+        self._left, self._broadcast = installed("websockets.exceptions", missing).ConnectionClosed, server.broadcast
         self.name, self.receiver = address, True
-        self._root, self._on_message, self._left, self._broadcast = root_frame, on_message, ConnectionClosed, broadcast
+        self._root, self._on_message = root_frame, on_message
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
         origins = [None, _OWN_PAGES, *parse_qs(parts.query).get("origin", ())]
         self._loop = asyncio.new_event_loop()
@@ -71,9 +67,8 @@ class WebSocketSink(Output):
         self._thread.start()
 
         async def start() -> Any:  # noqa: ANN401 - of websockets
-            return await serve(
-                self._serve, host, port, origins=origins, compression=None, max_size=_BUFFER, logger=_LOG
-            )
+            how = {"origins": origins, "compression": None, "max_size": _BUFFER, "logger": _LOG}
+            return await server.serve(self._serve, host, port, **how)
 
         try:
             self._server = asyncio.run_coroutine_threadsafe(start(), self._loop).result()

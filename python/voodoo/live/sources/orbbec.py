@@ -22,7 +22,6 @@ class OrbbecSource(CameraSource):
     """
 
     kind, size = "orbbec", (640, 576)
-    _is_gone = False
 
     def _imported(self) -> Vendor:
         stdout = os.dup(1)
@@ -37,25 +36,18 @@ class OrbbecSource(CameraSource):
         return ob
 
     def _found(self) -> Vendor:
-        self._context, self._is_gone = self._library.Context(), False
-        self.stays = not str(self._serial).endswith(".bag")
-        if not self.stays:
-            device = self._library.PlaybackDevice(self._serial)
-        else:
+        self._context, self.stays = self._library.Context(), not str(self._serial).endswith(".bag")
+        if self.stays:
             there = self._context.query_devices()
-            serials = _serials(there)
-            index = self._chosen({serial: index for index, serial in enumerate(serials)})
-            device = there.get_device_by_index(index)
-
-            def changed(removed: Vendor, _added: Vendor) -> None:
-                self._is_gone = self._is_gone or serials[index] in _serials(removed)
-
-            self._context.set_device_changed_callback(changed)
+            device = there.get_device_by_index(self._chosen({serial: at for at, serial in enumerate(_serials(there))}))
+        else:
+            device = self._library.PlaybackDevice(self._serial)
         self._about["camera"] = device.get_device_info().get_name()
         return device
 
     def _is_there(self) -> bool:
-        return not self._is_gone
+        serial = self._device.get_device_info().get_serial_number()
+        return not self.stays or serial in _serials(self._context.query_devices())
 
     def _start(self) -> None:
         ob = self._library

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import VoodooError, installed
 from voodoo.live.source import Arrival
 from voodoo.live.sources.camera import CameraSource, Vendor, camera_of, rigid
 from voodoo.measurements import FloatArray
@@ -19,14 +19,8 @@ class RealSenseSource(CameraSource):
     kind, size = "realsense", (640, 480)
 
     def _imported(self) -> Vendor:
-        try:
-            import pyrealsense2
-        except ImportError as error:
-            hint = "pip install 'voodoo-tracker[realsense]'"
-            if "libusb" in str(error):
-                hint = "apt install libusb-1.0-0"
-            raise VoodooError(f"RealSense cameras need pyrealsense2, which cannot be used ({error}): {hint}") from error
-        return pyrealsense2
+        advice = "pip install 'voodoo-tracker[realsense]', and libusb: apt install libusb-1.0-0"
+        return installed("pyrealsense2", f"RealSense cameras need pyrealsense2, which cannot be imported: {advice}")
 
     def _found(self) -> Vendor:
         info = self._library.camera_info
