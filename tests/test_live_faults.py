@@ -11,6 +11,7 @@ import pytest
 
 from live_rig import ByHand, Rig, depth_of, follower_of
 from voodoo.evaluation.metrics import JOINTS
+from voodoo.export.ros2 import cdr
 from voodoo.live import FAULTS
 from voodoo.live.recorder import _depth, _header, camera_info, transforms
 from voodoo.live.ros2.feed import CAMERA_INFO, IMAGE, TF, RosFeed
@@ -70,7 +71,7 @@ class Bus:
         self.calibrate()
 
     def send(self, topic, kind, message):
-        for arrival in self.feed.take_message(topic, kind, message):
+        for arrival in self.feed.take(topic, kind, cdr(message)):
             self.rig.deliver(arrival)
 
     def place(self, pose=None, *, stamp=0.0, topic="/tf_static"):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from voodoo.errors import RecordingError, VoodooError
 
@@ -57,17 +58,20 @@ class Fault(RecordingError):
     def __init__(self, kind: str, message: str) -> None:
         """Store kind and message."""
         super().__init__(message, reason=kind)
-        self.kind = kind
 
 
-def kind_of(error: VoodooError, otherwise: str) -> str:
-    """The name in FAULTS for the cause of an error."""
-    return error.kind if isinstance(error, Fault) else kind_of_reason(getattr(error, "reason", ""), otherwise)
+def kind_of(reason: str, otherwise: str) -> str:
+    """The name in FAULTS for the `reason` of an error, or for what recordings leave out."""
+    return _OF_REASONS.get(reason, reason if reason in FAULTS else otherwise)
 
 
-def kind_of_reason(reason: str, otherwise: str) -> str:
-    """The name in FAULTS for a reason why recordings leave out a measurement."""
-    return _OF_REASONS.get(reason, otherwise)
+@contextmanager
+def faulty(otherwise: str, where: str = "") -> Iterator[None]:
+    """Errors of recordings raised inside become faults, of the kind `otherwise` if their reason determines none."""
+    try:
+        yield
+    except RecordingError as error:
+        raise Fault(kind_of(error.reason, otherwise), f"{where}{error}") from error
 
 
 class Faults:
@@ -110,7 +114,7 @@ class Faults:
 
     def add_error(self, error: VoodooError, now: float, otherwise: str) -> None:
         """Count the cause of an error; `otherwise` is its name if the error does not determine one."""
-        self.add(kind_of(error, otherwise), error, now)
+        self.add(kind_of(getattr(error, "reason", ""), otherwise), error, now)
 
     def log(self, words: str) -> None:
         """Report an event that is not a fault."""

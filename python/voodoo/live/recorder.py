@@ -80,30 +80,15 @@ class Recorder(Output):
     def _write_item(self, item: Measurement) -> None:
         if not isinstance(item, DepthImage | ColorImage | PointCloud | LaserScan):
             return
+        topic, made = _WRITTEN[type(item)]
         name = item.sensor.strip("/").replace("/", "_").replace(" ", "_") or "sensor"
         frame = f"{name}_frame"
         self._write("/tf", transforms(self._root(), frame, item.stamp, item.root_from_sensor))
         header = _header(item.stamp, frame)
-        if isinstance(item, DepthImage):
-            self._write_camera(f"/{name}/depth/camera_info", header, item.camera)
-            self._write(f"/{name}/depth/image_raw", _depth(header, item))
-        elif isinstance(item, ColorImage):
-            self._write_camera(f"/{name}/color/camera_info", header, item.camera)
-            done, data = cv2.imencode(".jpg", item.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-            if done:
-                picture = _new(
-                    "sensor_msgs/msg/CompressedImage", header=header, format="bgr8; jpeg compressed bgr8", data=data
-                )
-                self._write(f"/{name}/color/image_raw/compressed", picture)
-        elif isinstance(item, PointCloud):
-            self._write(f"/{name}/points", _cloud(header, item))
-        else:
-            self._write(f"/{name}/scan", _scan(header, item))
-
-    def _write_camera(self, topic: str, header: Any, camera: Camera) -> None:  # noqa: ANN401
-        if self._cameras.get(topic) != camera:
-            self._cameras[topic] = camera
-            self._write(topic, camera_info(header, camera))
+        if isinstance(item, DepthImage | ColorImage) and self._cameras.get(item.sensor) != item.camera:
+            self._cameras[item.sensor] = item.camera
+            self._write(f"/{name}/{topic.partition('/')[0]}/camera_info", camera_info(header, item.camera))
+        self._write(f"/{name}/{topic}", made(header, item))
 
     def _write(self, topic: str, message: Any) -> None:  # noqa: ANN401
         if topic not in self._topics:
@@ -169,6 +154,11 @@ def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
     )
 
 
+def _color(header: Any, item: ColorImage) -> Any:  # noqa: ANN401
+    _, data = cv2.imencode(".jpg", item.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    return _new("sensor_msgs/msg/CompressedImage", header=header, format="bgr8; jpeg compressed bgr8", data=data)
+
+
 def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
     points = np.ascontiguousarray(item.points, dtype=np.float32)
     fields = [
@@ -203,6 +193,14 @@ def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
         ranges=item.ranges.astype(np.float32),
         intensities=np.empty(0, dtype=np.float32),
     )
+
+
+_WRITTEN: dict[type, tuple[str, Callable[[Any, Any], Any]]] = {
+    DepthImage: ("depth/image_raw", _depth),
+    ColorImage: ("color/image_raw/compressed", _color),
+    PointCloud: ("points", _cloud),
+    LaserScan: ("scan", _scan),
+}
 
 
 def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 
 from voodoo.errors import RecordingError, reading
 from voodoo.export.ros2 import STORE
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Fault, Faults, kind_of
+from voodoo.live.faults import Fault, Faults, faulty
 from voodoo.live.source import Arrival
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
@@ -76,7 +75,7 @@ class RosFeed:
     ) -> None:
         """Start without messages."""
         self.unusable = 0
-        self._topics, self._faults, self._clock = tuple(topics), faults, clock
+        self._topics, self.faults, self.clock = tuple(topics), faults, clock
         self._scale, self._float_scale = (0.001, 1.0) if meters_per_unit is None else (meters_per_unit, meters_per_unit)
         self._pose = sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
@@ -84,9 +83,7 @@ class RosFeed:
         self._newest = -math.inf
         self._root = root_frame if sensor_pose is None else sensor_pose[0]
         self._since: float | None = None
-        self._cameras: dict[
-            str, tuple[Camera, tuple[object, ...]]
-        ] = {}  # and the fields of the message it was made from
+        self._cameras: dict[str, Camera] = {}
         self.expects_transforms = True
         for kind in (*MEASURED, CAMERA_INFO, TF):
             STORE.get_msgdef(kind)  # otherwise the first message of a type takes tens of milliseconds
@@ -117,18 +114,10 @@ class RosFeed:
             kind: its type, e.g. "sensor_msgs/msg/Image".
             raw: as it was sent (CDR, with its header of four bytes).
         """
+        now = self.clock.now()
         try:
             with reading(topic, f"a {kind} message"):
                 message = STORE.deserialize_cdr(raw, kind)
-        except RecordingError as error:
-            self._refuse(topic, error, "unreadable message")
-            return []
-        return self.take_message(topic, kind, message)
-
-    def take_message(self, topic: str, kind: str, message: Message) -> list[Arrival]:
-        """Process a deserialized message."""
-        now = self._clock.now()
-        try:
             if kind == TF:
                 with self._lock:
                     self._take_transforms(message, static=topic.endswith("tf_static"))
@@ -139,12 +128,9 @@ class RosFeed:
                     return [self._arrival(topic, kind, message)]
                 self.unusable += topic == self._topics[0]
         except RecordingError as error:
-            self._refuse(topic, error, kind_of(error, "unreadable message"))
+            self.unusable += topic == self._topics[0]
+            self.faults.add_error(error, now, "unreadable message")
         return []
-
-    def _refuse(self, topic: str, error: RecordingError, kind: str) -> None:
-        self.unusable += topic == self._topics[0]
-        self._faults.add(kind, error, self._clock.now())
 
     def _take_transforms(self, message: Message, *, static: bool) -> None:
         for item in message.transforms:
@@ -155,10 +141,10 @@ class RosFeed:
                     self._newest = stamp
                 self._newest = max(self._newest, stamp)
             try:
-                with reading("tf", "a transform"):
-                    self._tree.add(_one(item), static=static)
+                with reading("tf", "a transform"):  # each alone, so that an invalid one does not affect the others
+                    self._tree.add(STORE.types[TF](transforms=[item]), static=static)
             except RecordingError as error:
-                self._faults.add("transform unusable", error, self._clock.now())
+                self.faults.add("transform unusable", error, self.clock.now())
         if not static:
             self._tree.keep(self._newest - _KEPT_S, math.inf)
 
@@ -166,15 +152,9 @@ class RosFeed:
         for image in self._topics:
             if self.info_topic(image) != topic:
                 continue
-            key = (message.width, message.height, message.distortion_model, message.binning_x, message.binning_y)
-            key += tuple(values.tobytes() for values in (message.k, message.d, message.p))
-            if self._cameras.get(image, (None, None))[1] == key:
-                continue
-            try:
-                self._cameras[image] = camera_of(message, image, f"{topic}"), key
-            except RecordingError as error:
-                self._cameras.pop(image, None)
-                raise Fault("calibration unusable", str(error)) from error
+            self._cameras.pop(image, None)
+            with faulty("calibration unusable"):
+                self._cameras[image] = camera_of(message, image, topic)
 
     def _arrival(self, topic: str, kind: str, message: Message) -> Arrival:
         stamp = stamp_of(message, topic)
@@ -210,16 +190,14 @@ class RosFeed:
         if not reached and self.expects_transforms and now - self._since < ROOT_PATIENCE_S:
             return False
         self._root = next(iter(reached), frame)
-        self._faults.log(f"root frame {self._root!r}")
+        self.faults.log(f"root frame {self._root!r}")
         return True
 
     def _root_from_sensor(self, topic: str, frame: str, stamp: float) -> FloatArray:
         if self._pose is not None and topic == self._topics[0]:
             return self._pose[1]
-        try:
+        with faulty("transform missing", f"{topic}, stamp {stamp:.6f}: "):
             return self.root_from(frame, stamp)
-        except RecordingError as error:
-            raise Fault(kind_of(error, "transform missing"), f"{topic}, stamp {stamp:.6f}: {error}") from error
 
     def _measure(self, topic: str, kind: str, measured: str, message: Message, stamp: float, frame: str) -> Measurement:
         where = f"{topic}, stamp {stamp:.6f}"
@@ -227,27 +205,20 @@ class RosFeed:
         if measured == "scan":
             return LaserScan(topic, stamp, **scan_fields(message, where), root_from_sensor=pose)
         if measured == "points":
-            with _whole(message):
+            with faulty(_cut(message)):
                 return PointCloud(topic, stamp, cloud_points(message, where), pose)
         if topic not in self._cameras:
             raise Fault(
                 "calibration missing", f"{where}: expected a calibration on {self.info_topic(topic)}, found none"
             )
-        camera, _ = self._cameras[topic]
+        camera = self._cameras[topic]
         if measured == "color":
             decode = partial(color_image, message, camera, where, compressed=kind == COMPRESSED)
             return ColorImage(topic, stamp, decode, camera, pose)
-        if kind == COMPRESSED:
-            try:
-                image = compressed_depth_image(message, camera, where)
-            except RecordingError as error:
-                raise Fault(kind_of(error, "damaged picture"), str(error)) from error
-        else:
-            with _whole(message):
-                image = depth_image(message, camera, where)
-        return DepthImage(
-            topic, stamp, image, self._scale if image.dtype.kind == "u" else self._float_scale, camera, pose
-        )
+        with faulty("damaged picture" if kind == COMPRESSED else _cut(message)):
+            image = (compressed_depth_image if kind == COMPRESSED else depth_image)(message, camera, where)
+        unit = self._scale if image.dtype.kind == "u" else self._float_scale
+        return DepthImage(topic, stamp, image, unit, camera, pose)
 
 
 def _measured_as(topic: str, kind: str, message: Message) -> str:
@@ -270,17 +241,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     raise Fault("unknown encoding", f"{topic}: expected one of {known}, found {message.encoding!r}")
 
 
-@contextmanager
-def _whole(message: Message) -> Iterator[None]:
-    """Report inconsistent sizes: a message with fewer bytes than its fields announce."""
-    try:
-        yield
-    except RecordingError as error:
-        row = int(getattr(message, "row_step", 0)) or int(getattr(message, "step", 0))
-        cut = len(message.data) < row * int(message.height)
-        raise Fault(kind_of(error, "half a message" if cut else "unreadable message"), str(error)) from error
-
-
-def _one(item: Message) -> Message:
-    """Split into TFMessages of one transform, so that an invalid one does not affect the others."""
-    return STORE.types[TF](transforms=[item])
+def _cut(message: Message) -> str:
+    """The fault of a message that cannot be read: it may have fewer bytes than its fields announce."""
+    row = int(getattr(message, "row_step", 0)) or int(getattr(message, "step", 0))
+    return "half a message" if len(message.data) < row * int(message.height) else "unreadable message"

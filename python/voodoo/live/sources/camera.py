@@ -80,7 +80,8 @@ class CameraSource(Source):
             place = read_calibration(calibration)
             self._root, self._root_from_depth = place.root_frame, place.depth.root_from_sensor
         self._ends: list[Callable[[], object]] = []
-        self._arrivals: deque[Arrival | VoodooError] = deque(maxlen=_WAITING)
+        self._arrivals: deque[Arrival] = deque(maxlen=_WAITING)
+        self._error: VoodooError | None = None
         self._came = threading.Condition()
         self._about: dict[str, Any] = {"name": self.name, "kind": self.kind}
 
@@ -119,19 +120,18 @@ class CameraSource(Source):
         with self._came:
             if not self._arrivals:
                 self._came.wait(timeout)
-            found = list(self._arrivals)
+            arrivals = list(self._arrivals)
             self._arrivals.clear()
         now = self._clock.now()
-        if found:
+        if self._error is not None:
+            raise self._error
+        if arrivals:
             self._last = now
         elif not self._is_there():
             raise SourceGone(f"{self.name}: it was unplugged")
         elif now - self._last > _SILENT_S:
             raise SourceGone(f"{self.name}: no image for {now - self._last:.1f} s, its streams are started again")
-        for one in found:
-            if isinstance(one, VoodooError):
-                raise one
-        return [one for one in found if isinstance(one, Arrival)]
+        return arrivals
 
     def close(self) -> None:
         """See Source."""
@@ -162,15 +162,14 @@ class CameraSource(Source):
 
     def _take(self, made: Callable[[Vendor], Arrival | None], frame: Vendor) -> None:
         """Called in threads of the library, which end the process where an error leaves them: `read` raises it."""
-        arrival: Arrival | VoodooError | None
         try:
             arrival = made(frame)
         except Exception as error:
-            arrival = VoodooError(f"{self.name}: an image that cannot be used: {error}")
-        if arrival is not None:
-            with self._came:
-                self._arrivals.append(arrival)
-                self._came.notify()
+            self._error = VoodooError(f"{self.name}: an image that cannot be used: {error}")
+            return
+        with self._came:
+            self._arrivals.extend([] if arrival is None else [arrival])
+            self._came.notify()
 
     def _depth(self, stamp: float, image: npt.ArrayLike, unit: float, camera: Camera) -> Arrival:
         sensor = f"{self.name}/depth"

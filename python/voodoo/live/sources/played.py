@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Faults, kind_of_reason
+from voodoo.live.faults import Faults, kind_of
 from voodoo.live.source import Arrival, Source, SourceEnded
 from voodoo.measurements import FloatArray, Measurement, RecordedFrame
 from voodoo.pipeline.pairing import paired
@@ -93,7 +94,7 @@ class PlayedSource(Source):
         for reason, count in self._left_out.counts.items():
             new = count - self._optional_fields.get(reason, 0)
             if new:
-                kind = kind_of_reason(reason, "unreadable message")
+                kind = kind_of(reason, "unreadable message")
                 self._faults.add(kind, self._left_out.first[reason], self._clock.now(), new)
                 self._optional_fields[reason] = count
         return following
@@ -109,7 +110,7 @@ class PlayedSource(Source):
                     sensor=item.sensor,
                     kind=adapter.recorded_as or adapter.kind,
                     stamp=item.stamp + self._shift,
-                    measure=_shifted(item, self._shift),
+                    measure=partial(_shifted, item, self._shift),
                     drives=item is driver,
                     taken=due,
                 )
@@ -129,7 +130,5 @@ class PlayedSource(Source):
         return {"name": self.name, "kind": "recording", "path": str(self.recording.path), "rate": self._rate}
 
 
-def _shifted(item: Measurement, shift: float) -> Callable[[], Measurement]:
-    if not shift:
-        return lambda: item
-    return lambda: replace(item, stamp=item.stamp + shift)
+def _shifted(item: Measurement, shift: float) -> Measurement:
+    return replace(item, stamp=item.stamp + shift) if shift else item

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from voodoo.errors import VoodooError
-from voodoo.live.clock import Clock
+from voodoo.live.clock import Clock, HostClock
 from voodoo.live.faults import Faults
 from voodoo.live.ros2.dds import Node, Offer, Subscription
 from voodoo.live.ros2.feed import CAMERA_INFO, COMPRESSED, IMAGE, MEASURED, TF, RosFeed
@@ -50,38 +51,38 @@ class Ros2Source(Source):
             raise VoodooError("ros2: expected ros2:TOPIC[,TOPIC...], found no topic")
         self._topics = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
         self.name = f"ros2:{self._topics[0]}"
-        self._options: dict[str, Any] = {
-            "root_frame": root_frame,
-            "meters_per_unit": meters_per_unit,
-            "tf_max_age": tf_max_age,
-        }
-        if calibration is not None:
-            place = read_calibration(calibration)
-            self._options["sensor_pose"] = (place.root_frame, place.depth.root_from_sensor)
-        self._node: Node | None = None
-        self._feed: RosFeed | None = None
+        place = None if calibration is None else read_calibration(calibration)
+        self._feed = RosFeed(
+            self._topics,
+            Faults(),
+            HostClock(),
+            root_frame=root_frame,
+            meters_per_unit=meters_per_unit,
+            tf_max_age=tf_max_age,
+            sensor_pose=None if place is None else (place.root_frame, place.depth.root_from_sensor),
+        )
         self._subscriptions: dict[str, Subscription] = {}
         self._gone = False
+
+    @cached_property
+    def _node(self) -> Node:
+        return Node()
 
     @property
     def root_frame(self) -> str:
         """See Source."""
-        return "" if self._feed is None else self._feed.root_frame
+        return self._feed.root_frame
 
     @property
     def unusable(self) -> int:  # type: ignore[override]
         """See Source."""
-        return 0 if self._feed is None else self._feed.unusable
+        return self._feed.unusable
 
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
-        self._clock, self._faults = clock, faults
-        if self._feed is None:
-            self._feed = RosFeed(self._topics, faults, clock, **self._options)
-        if self._node is None:
-            self._node = Node()
-            self._subscribe("/tf", Offer(TF, reliable=True, latched=False), _TF_DEPTH)
-            self._subscribe("/tf_static", Offer(TF, reliable=True, latched=True), _TF_DEPTH)
+        self._feed.faults, self._feed.clock = faults, clock
+        self._subscribe("/tf", Offer(TF, reliable=True, latched=False), _TF_DEPTH)
+        self._subscribe("/tf_static", Offer(TF, reliable=True, latched=True), _TF_DEPTH)
         until = time.monotonic() + _DISCOVERY_S
         while not self._discover():
             if time.monotonic() > until:
@@ -94,8 +95,6 @@ class Ros2Source(Source):
 
     def _discover(self) -> bool:
         """Subscribe to the topics offered so far; returns whether all are."""
-        assert self._node is not None
-        assert self._feed is not None
         offers = self._node.offers()
         self._feed.expects_transforms = bool({"/tf", "/tf_static"} & offers.keys())
         for topic in self._topics:
@@ -114,14 +113,11 @@ class Ros2Source(Source):
         return self._topics[0] in self._subscriptions
 
     def _subscribe(self, topic: str, offer: Offer, depth: int) -> None:
-        assert self._node is not None
         if topic not in self._subscriptions:
             self._subscriptions[topic] = self._node.subscribe(topic, offer, depth=depth)
 
     def read(self, timeout: float) -> Sequence[Arrival]:
         """See Source."""
-        assert self._node is not None
-        assert self._feed is not None
         self._node.wait(timeout)
         arrivals: list[Arrival] = []
         # Transforms and calibrations first, because images wait for them.
@@ -130,7 +126,8 @@ class Ros2Source(Source):
                 arrivals += self._feed.take(subscription.topic, subscription.kind, raw)
         lost = self._subscriptions[self._topics[0]].lost()
         if lost:
-            self._faults.add("lost on the way", f"{self._topics[0]}: messages did not arrive", self._clock.now(), lost)
+            now = self._feed.clock.now()
+            self._feed.faults.add("lost on the way", f"{self._topics[0]}: messages did not arrive", now, lost)
         if not arrivals:
             self._check_states()
         return arrivals
@@ -140,9 +137,10 @@ class Ros2Source(Source):
         self._discover()
         gone = self._subscriptions[self._topics[0]].publishers == 0
         if gone and not self._gone:
-            self._faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", self._clock.now())
+            now = self._feed.clock.now()
+            self._feed.faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", now)
         elif self._gone and not gone:
-            self._faults.log(f"{self.name}: it is there again")
+            self._feed.faults.log(f"{self.name}: it is there again")
         self._gone = gone
 
     def close(self) -> None:
@@ -150,7 +148,7 @@ class Ros2Source(Source):
 
     def root_from(self, frame: str, stamp: float) -> FloatArray | None:
         """See Source."""
-        return None if self._feed is None else self._feed.root_from(frame, stamp)
+        return self._feed.root_from(frame, stamp)
 
     def about(self) -> dict[str, Any]:
         """See Source."""
