@@ -12,9 +12,8 @@ from live_rig import ByHand, Rig, arrival_of, wall
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.live import FAULTS, Faults, SourceEnded, SourceGone
 from voodoo.live.assembly import Assembler
-from voodoo.live.inbox import Inbox
 from voodoo.live.latencies import Latencies
-from voodoo.live.mailbox import Mailbox
+from voodoo.live.mailbox import Inbox, Mailbox
 from voodoo.live.stamps import HostTime, Stamps
 from voodoo.measurements import ColorImage, LaserScan
 
@@ -37,7 +36,7 @@ def test_the_latest_wins_in_a_mailbox():
     box = Mailbox()
     for number in range(5):
         box.put(number)
-    assert (len(box), box.dropped, box.take(0.0), box.take(0.0)) == (1, 4, 4, None)
+    assert (box.dropped, box.take(0.0), box.take(0.0)) == (4, 4, None)
     box.put(5)
     box.close()
     box.put(6)
@@ -58,9 +57,9 @@ def test_a_mailbox_wakes_who_waits():
 def test_an_inbox_keeps_the_newest_image_and_the_newest_four_of_others():
     inbox = Inbox()
     for number in range(9):
-        inbox.put(arrival_of(scan(number), drives=False), 0.0)
-        inbox.put(arrival_of(wall(float(number))), 0.0)
-    items = [(arrival.sensor, arrival.stamp) for arrival, _ in inbox.take(0.0)]
+        inbox.put((arrival_of(scan(number), drives=False), 0.0))
+        inbox.put((arrival_of(wall(float(number))), 0.0))
+    items = [(arrival.sensor, arrival.stamp) for arrival, _ in inbox.take_all(0.0)]
     assert items == [("laser", 5), ("laser", 6), ("laser", 7), ("laser", 8), ("depth", 8)]
     assert inbox.dropped == 8
 

@@ -324,7 +324,6 @@ class Session:
         """Summary of the session for a JSON file."""
         span = self._end - self._first if self._first is not None else 0.0
         rate = (self.published - 1) / span if self.published > 1 and span > 0.0 else 0.0
-        refused = self.live.refused + self.refused
         return {
             "rate_hz": rate,
             "latency_ms": _milliseconds(self.latency),
@@ -335,15 +334,10 @@ class Session:
             "published": self.published,
             "with_pose": self.with_pose,
             "dropped": self.dropped,
-            "refused": refused,
+            "refused": self.live.refused + self.refused,
             "faults": dict(sorted(self.live.faults.counts.items())),
             "first_faults": dict(sorted(self.live.faults.first.items())),
-            "late_outputs": {
-                output.name: lane.box.dropped
-                for lane in self._lanes
-                if lane is not self._prompt
-                for output in lane.outputs
-            },
+            "late_outputs": {output.name: lane.box.dropped for lane in self._lanes[1:] for output in lane.outputs},
             "seconds": self.live.clock.now() - self._began,
             "status": self.live.status,
             "sources": self.live.about(),

@@ -5,15 +5,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from types import TracebackType
 from typing import Any, Literal, TypeAlias
 
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.assembly import WAIT_S, Assembler, LiveFrame
 from voodoo.live.clock import Clock, HostClock
 from voodoo.live.faults import Faults
-from voodoo.live.inbox import Inbox
-from voodoo.live.mailbox import Mailbox
+from voodoo.live.mailbox import Inbox, Mailbox
 from voodoo.live.source import Arrival, Source, SourceEnded, SourceGone
 from voodoo.measurements import FloatArray
 from voodoo.sensors.keypoints.networks import KeypointNetwork
@@ -92,9 +90,7 @@ class Live:
         self._run(self._decode)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the sources."""
         self.close()
 
@@ -269,12 +265,12 @@ class Live:
     def deliver(self, arrival: Arrival) -> None:
         """Add new arrivals from a source."""
         self._delivered += arrival.drives
-        self._inbox.put(arrival, self.clock.now())
+        self._inbox.put((arrival, self.clock.now()))
 
     def turn(self, timeout: float) -> None:
         """One iteration of the decoding stage, which waits for arrivals for at most `timeout` [s]."""
         assembler = self._assembler
-        for arrival, at in self._inbox.take(min(assembler.due(self.clock.now()), timeout, _TICK_S)):
+        for arrival, at in self._inbox.take_all(min(assembler.due(self.clock.now()), timeout, _TICK_S)):
             if arrival.drives:
                 self._hand_on(assembler.flush(self.clock.now()))
             assembler.feed(arrival, at)

@@ -90,10 +90,9 @@ class Ros2Sink(Output):
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", TF, 100)
         self._publish_on(TRACKED, IDS, 1)
-        # Subscribers can discover these topics before the first pose.
-        self._publish_on(f"{BODIES}/{person_id(1)}/joint_states", JOINTS, 10)
-        self._publish_on(f"{BODIES}/{person_id(1)}/pose", POSE, 10)
-        self._publish_on(f"{BODIES}/{person_id(1)}/markers", _MARKERS, 10)
+        for name, kind in (("joint_states", JOINTS), ("pose", POSE), ("markers", _MARKERS)):
+            # Subscribers can discover these topics before the first pose.
+            self._publish_on(f"{BODIES}/{person_id(1)}/{name}", kind)
 
     def publish(self, step: Step) -> None:
         """See Output."""
@@ -110,7 +109,7 @@ class Ros2Sink(Output):
         for number in self._displayed | observed:
             # They take as long as everything else together; those of persons who left are deleted once.
             topic = f"{BODIES}/{person_id(number)}/markers"
-            if self._publish_on(topic, _MARKERS, 10).subscribers:
+            if self._publish_on(topic, _MARKERS).subscribers:
                 estimate = step.estimates[number] if number in observed else nobody(step.stamp)
                 how: Any = {"root_frame": self._root(), "person": person_id(number), "turn": step.turn}
                 made = instant(estimate, step.bodies.get(number) or self._bodies[number], **how)
@@ -164,7 +163,7 @@ class Ros2Sink(Output):
         message: Callable[[list[float]], Any],
     ) -> None:
         """Publish a message, which is made again when its key changes, with numbers at a time, if somebody subscribes."""
-        publication = self._publish_on(topic, kind, 10)
+        publication = self._publish_on(topic, kind)
         if publication.subscribers:
             values = numbers().ravel()
             key = key, len(values)
@@ -173,7 +172,7 @@ class Ros2Sink(Output):
                 self._templates[topic] = key, made
             publication.write(self._templates[topic][1].filled(values, _stamp(round(stamp * 1e9))))
 
-    def _publish_on(self, topic: str, kind: str, depth: int) -> Publication:
+    def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:
             STORE.get_msgdef(kind)
             self._topics[topic] = self._node.advertise(topic, kind, depth=depth, latched=kind == STRING)
@@ -182,8 +181,7 @@ class Ros2Sink(Output):
     def _write(self, messages: Mapping[str, Any]) -> None:
         for topic, message in messages.items():
             kind = message.__msgtype__
-            depth = 1 if kind == STRING else 10
-            self._publish_on(topic, kind, depth).write(bytes(STORE.serialize_cdr(message, kind)))
+            self._publish_on(topic, kind, 1 if kind == STRING else 10).write(cdr(message))
 
 
 def _stamp(nanoseconds: int) -> bytes:
