@@ -251,11 +251,6 @@ class Session:
 
     # What is known
 
-    @property
-    def running(self) -> bool:
-        """Whether the session is running."""
-        return self._thread.is_alive()
-
     def wait(self, seconds: float) -> bool:
         """Wait for this long [s], or until the session ends; returns whether it is still running.
 
@@ -266,7 +261,7 @@ class Session:
         for lane in self._lanes:
             lane.watch()
         self._raise()
-        return self.running
+        return self._thread.is_alive()
 
     def _raise(self) -> None:
         error = _together([self._error, *(lane.error for lane in self._lanes)])

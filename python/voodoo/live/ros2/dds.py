@@ -166,7 +166,11 @@ class Subscription:
 
 
 class Publication:
-    """A publication on a topic."""
+    """A publication on a topic.
+
+    Attributes:
+        key: unique identifier.
+    """
 
     def __init__(self, participant: Any, topic: str, kind: str, depth: int, latched: bool) -> None:  # noqa: ANN401
         """Advertise."""
@@ -175,11 +179,7 @@ class Publication:
 
         self._type = dds_type(kind)
         self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, latched, depth))
-
-    @property
-    def key(self) -> str:
-        """Unique identifier."""
-        return str(self._writer.guid)
+        self.key = str(self._writer.guid)
 
     def write(self, message: bytes) -> None:
         """Publish a message (CDR with its header).

@@ -47,7 +47,6 @@ class CameraSource(Source):
     Args:
         serial: of the camera; None: the first one.
         calibration: a calibration.toml whose `root_frame` and `root_from_sensor` give the pose of the depth camera.
-        size: (width, height) [px] to request; None: that of the class.
         rate: images per second to request.
         device: a device of the library, instead of a search for one.
 
@@ -57,13 +56,13 @@ class CameraSource(Source):
 
     kind: str
     size: tuple[int, int]
+    """(width, height) [px] that is requested."""
 
     def __init__(
         self,
         *,
         serial: str | None = None,
         calibration: Path | None = None,
-        size: tuple[int, int] | None = None,
         rate: int = 30,
         device: Vendor = None,
     ) -> None:
@@ -73,7 +72,6 @@ class CameraSource(Source):
         self._library = self._imported()
         self._serial, self._rate, self._given = serial, rate, device
         self._device: Vendor = None
-        self._size = self.size if size is None else size
         self._root, self._root_from_depth = "camera_depth_optical_frame", np.eye(4)
         self.placed = calibration is not None
         if calibration is not None:
@@ -156,7 +154,7 @@ class CameraSource(Source):
         """Of streams with their width, height and rate, the one nearest to what is requested; None if there are none."""
 
         def differs(stream: tuple[int, int, int, Vendor]) -> tuple[int, int]:
-            return abs(stream[0] * stream[1] - self._size[0] * self._size[1]), abs(stream[2] - self._rate)
+            return abs(stream[0] * stream[1] - self.size[0] * self.size[1]), abs(stream[2] - self._rate)
 
         return min(streams, key=differs, default=(0, 0, 0, None))[3]
 

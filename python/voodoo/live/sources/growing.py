@@ -93,14 +93,9 @@ class GrowingSource(Source):
             new = sorted(name for name in self._listed(kind) if name not in self._names[kind])
             self._names[kind].update(new)
             self._waiting += [(kind, self._path / kind / name, now) for name in new]
-        arrivals, waiting = [], []
-        for kind, path, since in self._waiting:
-            arrival = self._arrival(kind, path, since, now)
-            if arrival is None:
-                waiting.append((kind, path, since))
-            else:
-                arrivals += arrival
-        self._waiting = waiting
+        found = [(one, self._arrival(*one, now)) for one in self._waiting]
+        self._waiting = [one for one, made in found if made is None]
+        arrivals = [arrival for _, made in found for arrival in made or ()]
         return sorted(arrivals, key=lambda arrival: (arrival.stamp, arrival.drives))
 
     def _arrival(self, kind: str, path: Path, since: float, now: float) -> list[Arrival] | None:

@@ -42,14 +42,14 @@ class OakSource(CameraSource):
             raise VoodooError(f"{self.name}: expected a camera with a stereo pair, found none")
         self._pipeline = pipeline = dai.Pipeline(self._device)
         self._ends.insert(0, pipeline.stop)
-        stereo = pipeline.create(dai.node.StereoDepth).build(True, size=self._size, fps=self._rate)
+        stereo = pipeline.create(dai.node.StereoDepth).build(True, size=self.size, fps=self._rate)
         stereo.initialConfig.setDepthUnit(dai.LengthUnit.MILLIMETER)
         self._depth_from: Vendor = None
         self._listen(stereo.depth, self._depth_image)
         for socket in self._device.getConnectedCameras(dai.CameraSensorType.COLOR):
             if socket not in (pairs[0].left, pairs[0].right):
                 camera = pipeline.create(dai.node.Camera).build(socket)
-                color = camera.requestOutput(self._size, dai.ImgFrame.Type.BGR888i, fps=self._rate)
+                color = camera.requestOutput(self.size, dai.ImgFrame.Type.BGR888i, fps=self._rate)
                 self._listen(color, self._color_image)
                 break
         self._zero = self._clock.now() - dai.Clock.now().total_seconds()
