@@ -104,8 +104,7 @@ class _Lane:
                 self.error = _together([self.error, error])
 
     def _publish(self, output: Output, step: Step) -> None:
-        began = time.monotonic()
-        self._busy = output, began
+        self._busy = output, time.monotonic()
         try:
             output.publish(step)
         except OSError as error:
@@ -113,11 +112,9 @@ class _Lane:
                 raise
             self._name(output, f"nobody receives: {error.strerror or error}")
         finally:
+            self.watch()
             self._busy = None
-        now = time.monotonic()
-        if output.receiver and now - began > _LATE_S:
-            self._name(output, _HANGS)
-        if output in self._named and now - self._named[output] > _BACK_S:
+        if output in self._named and time.monotonic() - self._named[output] > _BACK_S:
             del self._named[output]
             self._on_message(f"{output.name}: receives again")
 
