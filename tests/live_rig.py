@@ -47,9 +47,9 @@ class Rig:
         steps: of all frames that were tracked.
     """
 
-    def __init__(self, follower: Follower | None = None, *, source: Source | None = None, wait: float = 0.010) -> None:
+    def __init__(self, follower: Follower | None = None, *, source: Source | None = None) -> None:
         self.clock, self.messages = HandClock(), []
-        self.live = Live([source or ByHand()], clock=self.clock, on_message=self.messages.append, wait=wait)
+        self.live = Live([source or ByHand()], clock=self.clock, on_message=self.messages.append)
         self.follower = follower
         self.frames: list[LiveFrame] = []
         self.steps = []

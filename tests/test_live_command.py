@@ -329,7 +329,7 @@ def test_new_images_of_a_folder_are_tracked(tmp_path):
     (tmp_path / "depth").mkdir()
     (tmp_path / "calibration.toml").write_text(calibration_of(depth_of(frames[0])))
     (tmp_path / "depth" / "1.000000.png").write_bytes(b"what lay there before is left")
-    rig = Rig(follower_of(), source=GrowingSource(tmp_path, sleep=lambda _: None))
+    rig = Rig(follower_of(), source=GrowingSource(tmp_path))
     source = rig.live.sources[0]
     source.open(rig.clock, rig.live.faults)
     for path, data, number in grown(tmp_path, frames):

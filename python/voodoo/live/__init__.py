@@ -41,7 +41,7 @@ def open(
         rate: for recordings: playback speed relative to real time.
         loop: for recordings: start again at the end.
         root_frame: for recordings and ROS 2: root frame to use instead of their own.
-        tell: called with a readable line for every fault.
+        on_message: called with a readable line for every fault.
 
     Raises:
         VoodooError: no such recording, or a library that the source needs is missing.

@@ -78,7 +78,7 @@ class Faults:
     """Counts faults by name and reports them; a persisting fault is reported once per second.
 
     Args:
-        tell: called with a readable line; None: no reports.
+        on_message: called with a readable line; None: no reports.
 
     Attributes:
         counts: name -> number of faults.

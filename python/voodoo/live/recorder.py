@@ -56,7 +56,6 @@ class Recorder(Output):
         self._cameras: dict[str, Camera] = {}
         self._described: set[str] = set()
         self._at = 0
-        self.frames = 0
 
     def publish(self, step: Step) -> None:
         """See Output."""
@@ -75,7 +74,6 @@ class Recorder(Output):
         there = [person_id(number) for number, one in step.estimates.items() if one.joints]
         for topic, message in tracked(step.stamp, there, root_frame=self._root()).items():
             self._write(topic, message)
-        self.frames += 1
 
     def _write_item(self, item: Measurement) -> None:
         if not isinstance(item, DepthImage | ColorImage | PointCloud | LaserScan):

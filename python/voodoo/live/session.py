@@ -68,11 +68,7 @@ class _Lane:
     """Outputs with a queue and a thread."""
 
     def __init__(
-        self,
-        outputs: Sequence[Output],
-        done: Callable[[Step], None] | None = None,
-        *,
-        on_message: Callable[[str], None] = print,
+        self, outputs: Sequence[Output], on_message: Callable[[str], None], done: Callable[[Step], None] | None = None
     ) -> None:
         self.outputs = outputs
         self.box: Mailbox[Step] = Mailbox(max((output.waiting for output in outputs), default=1))
@@ -174,8 +170,8 @@ class Session:
         self._error: BaseException | None = None
         prompt = [output for output in outputs if output.prompt]
         log = live.faults.log
-        self._prompt = _Lane(prompt, self._count, on_message=log)
-        self._lanes = [self._prompt, *(_Lane([output], on_message=log) for output in outputs if not output.prompt)]
+        self._prompt = _Lane(prompt, log, self._count)
+        self._lanes = [self._prompt, *(_Lane([output], log) for output in outputs if not output.prompt)]
         self._thread = threading.Thread(target=self._track, daemon=True)
         self._thread.start()
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.live.assembly import WAIT_S, Assembler, LiveFrame
+from voodoo.live.assembly import Assembler, LiveFrame
 from voodoo.live.clock import Clock, HostClock
 from voodoo.live.faults import Faults
 from voodoo.live.mailbox import Inbox, Mailbox
@@ -36,8 +36,7 @@ class Live:
     Args:
         sources: images of the first one define the frames; measurements of the others join them.
         clock: host clock.
-        tell: called with a readable line for every fault.
-        wait: how long a frame waits for the images and transforms that belong to it [s].
+        on_message: called with a readable line for every fault.
         eager: decode color images at once, in parallel to the tracker; False: at first access.
         network: finds keypoints in color images, in parallel to the tracker; frames wait for it.
 
@@ -51,7 +50,6 @@ class Live:
         *,
         clock: Clock | None = None,
         on_message: Callable[[str], None] | None = None,
-        wait: float = WAIT_S,
         eager: bool = True,
         network: KeypointNetwork | None = None,
     ) -> None:
@@ -64,7 +62,7 @@ class Live:
         self.faults = Faults(on_message)
         self._delivered = 0
         self._network = network
-        self._assembler = Assembler(self.faults, wait=wait, eager=eager)
+        self._assembler = Assembler(self.faults, eager=eager)
         self._inbox = Inbox()
         self._frames: Mailbox[LiveFrame] = Mailbox()
         self._stop = threading.Event()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,21 +28,11 @@ class GrowingSource(Source):
     Args:
         path: the folder; it may be created later.
         calibration: None: calibration.toml in the folder.
-        rate: images per second where names are numbers of images; None: 30.
-        sleep: waits for a number of seconds.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        *,
-        calibration: Path | None = None,
-        rate: float | None = None,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
+    def __init__(self, path: Path, *, calibration: Path | None = None) -> None:
         """Store the settings; the folder is not read yet."""
         self.name, self._path = path.resolve().name, path
-        self._rate, self._sleep = rate, sleep
         self._file = path / "calibration.toml" if calibration is None else calibration
         self._names: dict[str, set[str]] = {}
         self._changed: dict[str, int] = {}
@@ -85,7 +75,7 @@ class GrowingSource(Source):
             arrivals = self._list_arrivals()
             if arrivals or self._clock.now() >= until:
                 return arrivals
-            self._sleep(_POLL_S)
+            time.sleep(_POLL_S)
 
     def _list_arrivals(self) -> list[Arrival]:
         now = self._clock.now()
@@ -105,7 +95,7 @@ class GrowingSource(Source):
         if kind == "rgb" and color is None:
             return []
         try:
-            stamp = NameClock(self._rate).of([path])[0]
+            stamp = NameClock(None).of([path])[0]
             if kind == "rgb" and color is not None:
                 image = color_image(stamp, path, color)
                 _ = image.image

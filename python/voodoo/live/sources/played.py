@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -26,23 +26,16 @@ class PlayedSource(Source):
         rate: playback speed relative to real time.
         loop: start again at the end; stamps continue to rise.
         left_out: damaged measurements that the recording leaves out; they are reported as they occur.
-        sleep: waits for a number of seconds.
     """
 
     stays = False
 
     def __init__(
-        self,
-        recording: Recording,
-        *,
-        rate: float = 1.0,
-        loop: bool = False,
-        left_out: LeftOut | None = None,
-        sleep: Callable[[float], None] = time.sleep,
+        self, recording: Recording, *, rate: float = 1.0, loop: bool = False, left_out: LeftOut | None = None
     ) -> None:
         """Store the settings; nothing is read yet."""
         self.name, self.recording = recording.name, recording
-        self._rate, self._loop, self._sleep = rate, loop, sleep
+        self._rate, self._loop = rate, loop
         self._left_out = LeftOut() if left_out is None else left_out
         self._optional_fields: dict[str, int] = {}
         self._frames: Iterator[RecordedFrame] = iter(())
@@ -73,7 +66,7 @@ class PlayedSource(Source):
         due = self._began + (frame.stamp + self._shift - self._first) / self._rate
         wait = due - self._clock.now()
         if wait > 0.0:
-            self._sleep(min(wait, timeout))
+            time.sleep(min(wait, timeout))
             if wait > timeout:
                 return ()
         arrivals = self._arrivals(frame, due)
