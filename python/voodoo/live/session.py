@@ -211,16 +211,12 @@ class Session:
         faults, clock = self.live.faults, self.live.clock
         try:
             return follower.step(frame)
-        except VoodooError as refusal:
-            error = refusal
+        except VoodooError as error:
             kept, damaged = decodable(frame.measurements)
             for problem in damaged:
                 faults.add_error(problem, clock.now(), "damaged picture")
             if damaged:
-                try:
-                    return follower.step(replace(frame, measurements=kept))
-                except VoodooError as again:
-                    error = again
+                return self._step(follower, replace(frame, measurements=kept))
             faults.add_error(error, clock.now(), "refused")
             self.refused += 1
             return None

@@ -152,25 +152,20 @@ class RosFeed:
         for image in self._topics:
             if self.info_topic(image) != topic:
                 continue
-            self._cameras.pop(image, None)
-            with faulty("calibration unusable"):
-                self._cameras[image] = camera_of(message, image, topic)
+            try:
+                with faulty("calibration unusable"):
+                    self._cameras[image] = camera_of(message, image, topic)
+            except Fault:
+                self._cameras.pop(image, None)
+                raise
 
     def _arrival(self, topic: str, kind: str, message: Message) -> Arrival:
         stamp = stamp_of(message, topic)
         measured = _measured_as(topic, kind, message)
-        drives = topic == self._topics[0]
-        frame = frame_of(message)
+        drives, frame = topic == self._topics[0], frame_of(message)
         measure = partial(self._measure, topic, kind, measured, message, stamp, frame)
-        return Arrival(
-            sensor=topic,
-            kind=measured,
-            stamp=stamp,
-            measure=measure,
-            drives=drives,
-            ready=lambda: self._is_ready(frame, stamp),
-            patience=_TF_PATIENCE_S,
-        )
+        ready = partial(self._is_ready, frame, stamp)
+        return Arrival(topic, measured, stamp, measure, drives, ready=ready, patience=_TF_PATIENCE_S)
 
     def _is_ready(self, frame: str, stamp: float) -> bool:
         if self._pose is not None or self.root_frame == frame:
@@ -207,11 +202,10 @@ class RosFeed:
         if measured == "points":
             with faulty(_cut(message)):
                 return PointCloud(topic, stamp, cloud_points(message, where), pose)
-        if topic not in self._cameras:
-            raise Fault(
-                "calibration missing", f"{where}: expected a calibration on {self.info_topic(topic)}, found none"
-            )
-        camera = self._cameras[topic]
+        camera = self._cameras.get(topic)
+        if camera is None:
+            expected = f"a calibration on {self.info_topic(topic)}"
+            raise Fault("calibration missing", f"{where}: expected {expected}, found none")
         if measured == "color":
             decode = partial(color_image, message, camera, where, compressed=kind == COMPRESSED)
             return ColorImage(topic, stamp, decode, camera, pose)

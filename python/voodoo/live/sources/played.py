@@ -97,17 +97,9 @@ class PlayedSource(Source):
         made_for = [item for item in frame.measurements if item.stamp == frame.stamp]
         driver = next((item for item in made_for if item.sensor == self._driver), made_for[-1])
         for item in (*(item for item in frame.measurements if item is not driver), driver):
-            adapter = adapter_of(item)
-            arrivals.append(
-                Arrival(
-                    sensor=item.sensor,
-                    kind=adapter.recorded_as or adapter.kind,
-                    stamp=item.stamp + self._shift,
-                    measure=partial(_shifted, item, self._shift),
-                    drives=item is driver,
-                    taken=due,
-                )
-            )
+            adapter, measure = adapter_of(item), partial(_shifted, item, self._shift)
+            kind, stamp = adapter.recorded_as or adapter.kind, item.stamp + self._shift
+            arrivals.append(Arrival(item.sensor, kind, stamp, measure, item is driver, taken=due))
         return arrivals
 
     def close(self) -> None:
