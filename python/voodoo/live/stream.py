@@ -144,7 +144,7 @@ class Live:
     @property
     def lost(self) -> bool:
         """Whether there were no usable data for LOST_S, or two and a half periods of a slow source; also true at its end."""
-        return self._good is not None and self.silent > self._patience
+        return self._good is not None and self.silent > max(LOST_S, _PERIODS * self._period)
 
     @property
     def silent(self) -> float:
@@ -301,10 +301,6 @@ class Live:
             raise VoodooError(
                 f"sources: expected one root frame, found {frames}; --calibration and --frame say where they are"
             )
-
-    @property
-    def _patience(self) -> float:
-        return max(LOST_S, _PERIODS * self._period)
 
     def _check_states(self) -> None:
         """Report that a source stalls."""

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from importlib import import_module
 
 from voodoo.errors import VoodooError
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import Sink
 
-
-def _found(module: str, name: str) -> Sink:
-    found: Sink = getattr(import_module(f"voodoo.live.sinks.{module}"), name)
-    return found
-
-
 _sinks: dict[str, Callable[[], Sink]] = {
-    "foxglove": partial(_found, "foxglove", "FoxgloveSink"),
-    "ros2": partial(_found, "ros2", "Ros2Sink"),
-    "vmc": partial(_found, "vmc", "VmcSink"),
-    "ws": partial(_found, "websocket", "WebSocketSink"),
+    "foxglove": lambda: import_module("voodoo.live.sinks.foxglove").FoxgloveSink,
+    "ros2": lambda: import_module("voodoo.live.sinks.ros2").Ros2Sink,
+    "vmc": lambda: import_module("voodoo.live.sinks.vmc").VmcSink,
+    "ws": lambda: import_module("voodoo.live.sinks.websocket").WebSocketSink,
 }
 
 

@@ -54,6 +54,7 @@ class CameraSource(Source):
         VoodooError: the library is missing, or the calibration is invalid.
     """
 
+    root_frame = "camera_depth_optical_frame"
     kind: str
     size: tuple[int, int]
     """(width, height) [px] that is requested."""
@@ -72,21 +73,15 @@ class CameraSource(Source):
         self._library = self._imported()
         self._serial, self._rate, self._given = serial, rate, device
         self._device: Vendor = None
-        self._root, self._root_from_depth = "camera_depth_optical_frame", np.eye(4)
-        self.placed = calibration is not None
+        self._root_from_depth, self.placed = np.eye(4), calibration is not None
         if calibration is not None:
             place = read_calibration(calibration)
-            self._root, self._root_from_depth = place.root_frame, place.depth.root_from_sensor
+            self.root_frame, self._root_from_depth = place.root_frame, place.depth.root_from_sensor
         self._ends: list[Callable[[], object]] = []
         self._arrivals: deque[Arrival] = deque(maxlen=_WAITING)
         self._error: VoodooError | None = None
         self._came = threading.Condition()
         self._about: dict[str, Any] = {"name": self.name, "kind": self.kind}
-
-    @property
-    def root_frame(self) -> str:
-        """See Source."""
-        return self._root
 
     @abstractmethod
     def _imported(self) -> Vendor:

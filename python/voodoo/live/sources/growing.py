@@ -30,6 +30,8 @@ class GrowingSource(Source):
         calibration: None: calibration.toml in the folder.
     """
 
+    root_frame = "camera_depth_optical_frame"
+
     def __init__(self, path: Path, *, calibration: Path | None = None) -> None:
         """Store the settings; the folder is not read yet."""
         self.name, self._path = path.resolve().name, path
@@ -39,17 +41,13 @@ class GrowingSource(Source):
         self._waiting: list[tuple[str, Path, float]] = []
         self._calibration: FolderCalibration | None = None
 
-    @property
-    def root_frame(self) -> str:
-        """See Source."""
-        return "camera_depth_optical_frame" if self._calibration is None else self._calibration.root_frame
-
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
         self._clock, self._faults = clock, faults
         if not (self._path.is_dir() and self._file.is_file()):
             raise SourceGone(f"{self._path}: expected a folder and {self._file.name}, found none yet")
         self._calibration = read_calibration(self._file)
+        self.root_frame = self._calibration.root_frame
         if not self._names:
             # Images added while the source is gone are read when it is available again.
             self._names = {kind: set(self._listed(kind)) for kind in _SUFFIXES}

@@ -25,29 +25,23 @@ class PlayedSource(Source):
         recording: recording to replay.
         rate: playback speed relative to real time.
         loop: start again at the end; stamps continue to rise.
-        left_out: damaged measurements that the recording leaves out; they are reported as they occur.
+        left_out: damaged measurements that the recording leaves out; they are reported as they occur, and counted no longer.
     """
 
-    stays = False
+    stays, root_frame = False, ""
 
     def __init__(
         self, recording: Recording, *, rate: float = 1.0, loop: bool = False, left_out: LeftOut | None = None
     ) -> None:
         """Store the settings; nothing is read yet."""
-        self.name, self.recording = recording.name, recording
+        self.name, self.recording, self.root_frame = recording.name, recording, recording.root_frame
         self._rate, self._loop = rate, loop
         self._left_out = LeftOut() if left_out is None else left_out
-        self._optional_fields: dict[str, int] = {}
         self._frames: Iterator[RecordedFrame] = iter(())
         self._next: RecordedFrame | None = None
         self._shift = 0.0
         self._about = recording.info()
         self._driver = self._about.sensors[0].name if self._about.sensors else ""
-
-    @property
-    def root_frame(self) -> str:
-        """See Source."""
-        return self.recording.root_frame
 
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
@@ -85,11 +79,9 @@ class PlayedSource(Source):
         """The next frame; reports what was left out before it."""
         following = next(self._frames, None)
         for reason, count in self._left_out.counts.items():
-            new = count - self._optional_fields.get(reason, 0)
-            if new:
-                kind = kind_of(reason, "unreadable message")
-                self._faults.add(kind, self._left_out.first[reason], self._clock.now(), new)
-                self._optional_fields[reason] = count
+            kind = kind_of(reason, "unreadable message")
+            self._faults.add(kind, self._left_out.first[reason], self._clock.now(), count)
+        self._left_out.counts.clear()
         return following
 
     def _arrivals(self, frame: RecordedFrame, due: float) -> list[Arrival]:
