@@ -88,8 +88,7 @@ class Follower:
         self._how: dict[str, Any] = {"settings": settings or FrontEndSettings(), "starts": starts}
         first: Any = people() if people else tracker
         self._front: FrontEnd[Any] = FrontEnd(first, **self._how)
-        self._numbers = 0
-        self._most = 0
+        self._numbers = self._most = 0
         self._stamp: float | None = None
         self._arrived = 0.0
 

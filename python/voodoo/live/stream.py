@@ -101,8 +101,7 @@ class Live:
         if not self._threads and not self._frames.closed:
             raise VoodooError("live sources: expected a `with` block around the loop, found none")
         while not self._frames.closed:
-            frame = self.next(_TICK_S)
-            if frame is not None:
+            if (frame := self.next(_TICK_S)) is not None:
                 yield frame
         self._raise()
 

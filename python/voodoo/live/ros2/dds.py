@@ -50,9 +50,8 @@ def domain_id() -> int:
 
 def on_loopback() -> bool:
     """Whether the environment restricts ROS 2 to this machine, by the variables that ROS 2 defines."""
-    return os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST" or (
-        os.environ.get("ROS_LOCALHOST_ONLY", "") == "1"
-    )
+    discovered = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper()
+    return discovered == "LOCALHOST" or os.environ.get("ROS_LOCALHOST_ONLY", "") == "1"
 
 
 class Node:

@@ -24,8 +24,7 @@ def idl() -> Any:  # noqa: ANN401 - a module that may not be installed
     Raises:
         VoodooError: it is not installed.
     """
-    missing = "ROS 2 topics need Cyclone DDS, which is not installed: pip install 'voodoo-tracker[ros2]'"
-    return installed("cyclonedds.idl", missing)
+    return installed("cyclonedds.idl", "ROS 2 topics need Cyclone DDS: pip install 'voodoo-tracker[ros2]'")
 
 
 def dds_name(kind: str) -> str:

@@ -39,14 +39,13 @@ class GrowingSource(Source):
         self._names: dict[str, set[str]] = {}
         self._changed: dict[str, int] = {}
         self._waiting: list[tuple[str, Path, float]] = []
-        self._calibration: FolderCalibration | None = None
 
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
         self._clock, self._faults = clock, faults
         if not (self._path.is_dir() and self._file.is_file()):
             raise SourceGone(f"{self._path}: expected a folder and {self._file.name}, found none yet")
-        self._calibration = read_calibration(self._file)
+        self._calibration: FolderCalibration = read_calibration(self._file)
         self.root_frame = self._calibration.root_frame
         if not self._names:
             # Images added while the source is gone are read when it is available again.
@@ -83,12 +82,10 @@ class GrowingSource(Source):
             self._waiting += [(kind, self._path / kind / name, now) for name in new]
         found = [(one, self._arrival(*one, now)) for one in self._waiting]
         self._waiting = [one for one, made in found if made is None]
-        arrivals = [arrival for _, made in found for arrival in made or ()]
-        return sorted(arrivals, key=lambda arrival: (arrival.stamp, arrival.drives))
+        return sorted((one for _, made in found for one in made or ()), key=lambda one: (one.stamp, one.drives))
 
     def _arrival(self, kind: str, path: Path, since: float, now: float) -> list[Arrival] | None:
         """The arrival of a file; none if it is unusable, None while it may still be being written."""
-        assert self._calibration is not None
         color = self._calibration.color
         if kind == "rgb" and color is None:
             return []

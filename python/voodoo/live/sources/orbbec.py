@@ -56,10 +56,9 @@ class OrbbecSource(CameraSource):
             self._device.enable_global_timestamp(True)
         pipeline, config = ob.Pipeline(self._device), ob.Config()
         depth = self._stream(pipeline, ob.OBSensorType.DEPTH_SENSOR, ob.OBFormat.Y16, ob.OBFormat.Z16)
-        formats = (ob.OBFormat.RGB, ob.OBFormat.BGR, ob.OBFormat.MJPG)
-        color = self._stream(pipeline, ob.OBSensorType.COLOR_SENSOR, *formats)
         if depth is None:
             raise VoodooError(f"{self.name}: expected a stream of 16-bit depth, found none")
+        color = self._stream(pipeline, ob.OBSensorType.COLOR_SENSOR, ob.OBFormat.RGB, ob.OBFormat.BGR, ob.OBFormat.MJPG)
         config.enable_stream(depth)
         depth_image, color_image = partial(self._depth_image, self._camera(depth)), None
         if color is not None:

@@ -37,7 +37,6 @@ class PlayedSource(Source):
         self.name, self.recording, self.root_frame = recording.name, recording, recording.root_frame
         self._rate, self._loop = rate, loop
         self._left_out = LeftOut() if left_out is None else left_out
-        self._frames: Iterator[RecordedFrame] = iter(())
         self._next: RecordedFrame | None = None
         self._shift = 0.0
         self._about = recording.info()
@@ -46,7 +45,7 @@ class PlayedSource(Source):
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
         self._clock, self._faults = clock, faults
-        self._frames = iter(paired(self.recording))
+        self._frames: Iterator[RecordedFrame] = iter(paired(self.recording))
         self._next = self._following()
         self._first = 0.0 if self._next is None else self._next.stamp
         self._began = clock.now()

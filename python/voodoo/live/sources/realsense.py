@@ -35,10 +35,8 @@ class RealSenseSource(CameraSource):
     def _start(self) -> None:
         rs = self._library
         sensors = self._device.query_sensors()
-        depth = next((sensor for sensor in sensors if sensor.is_depth_sensor()), None)
-        if depth is None:
-            raise VoodooError(f"{self.name}: expected a camera with a depth sensor, found none")
-        profile = self._stream(depth, rs.stream.depth, rs.format.z16)
+        depth: Vendor = next((sensor for sensor in sensors if sensor.is_depth_sensor()), None)
+        profile = None if depth is None else self._stream(depth, rs.stream.depth, rs.format.z16)
         if profile is None:
             raise VoodooError(f"{self.name}: expected a stream of 16-bit depth, found none")
         unit = depth.as_depth_sensor().get_depth_scale()
@@ -60,9 +58,9 @@ class RealSenseSource(CameraSource):
                 self._take(made[uid], frame)
 
         for sensor, profiles in chosen.values():
+            self._ends += [sensor.stop, sensor.close]
             sensor.open(profiles)
             sensor.start(sort)
-            self._ends += [sensor.stop, sensor.close]
 
     def _stream(self, sensor: Vendor, stream: Vendor, *formats: Vendor) -> Vendor:
         profiles = (

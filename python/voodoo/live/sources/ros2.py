@@ -137,8 +137,7 @@ class Ros2Source(Source):
         self._discover()
         gone = self._subscriptions[self._topics[0]].publishers == 0
         if gone and not self._gone:
-            now = self._feed.clock.now()
-            self._feed.faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", now)
+            self._feed.faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", self._feed.clock.now())
         elif self._gone and not gone:
             self._feed.faults.log(f"{self.name}: it is there again")
         self._gone = gone
