@@ -210,7 +210,7 @@ def test_the_overlay_shows_everybody_in_a_color_of_their_own():
     people = voodoo.People()
     *_, last = track(two_people(), people)
     bodies = {person.id: people.body(person.id) for person in last.estimate}
-    picture = Overlay(two_people()).draw_people(last.recorded, last.estimate, bodies, index=last.index)
+    picture = Overlay(two_people()).draw(last.recorded, bodies, last.estimate, index=last.index)
     assert sorted(bodies) == [1, 2]
     for one in bodies:
         assert (np.abs(picture.astype(int) - person_color(one)).max(axis=2) < 40).sum() > 300

@@ -137,8 +137,8 @@ def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path)
     path = tmp_path / "people.rrd"
     with Viewer(save=path) as viewer:
         for step in steps[-2:]:
-            viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
-        viewer.log_people(PeopleEstimate(9.0, ()), bodies)
+            viewer.log(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
+        viewer.log(PeopleEstimate(9.0, ()), bodies)
     command = Path(sys.executable).with_name("rerun")
     displayed = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
     rows = re.findall(r"with (\d+) rows .* - (/world/people\S*) - .*\[(\S+?)[\] ]", displayed)

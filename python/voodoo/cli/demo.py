@@ -37,7 +37,7 @@ def demo_command(
         source = opened(sample_path(), None, None)
         tracker = start_tracker(source, init=AUTO)
         estimates: list[Estimate] = []
-        how = pictured(tracker, lambda estimate, _: estimates.append(estimate))
+        how = pictured(lambda estimate, _: estimates.append(estimate))
         steps = track(source, tracker)
         seconds, sheet, interrupted, _, failures = run(source, steps, overlay=out / "overlay.mp4", sheet=6, **how)
         if interrupted:

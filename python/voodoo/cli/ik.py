@@ -80,9 +80,9 @@ def ik_command(
     """
     from voodoo.cli.running import opened, run, spool_of, turn_of
     from voodoo.export.files import upright_words
-    from voodoo.export.spool import ONE
     from voodoo.export.track import Track
     from voodoo.model.body import Body
+    from voodoo.people import ONE
     from voodoo.pipeline.ik import Positions, Solved, follow
     from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
 

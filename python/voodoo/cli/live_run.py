@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from voodoo._core import Estimate
 from voodoo.cli.common import print_message
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
@@ -34,7 +35,7 @@ from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.names import HumanModel
-from voodoo.pipeline.front_end import ONE
+from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.start import Beginning, start_people, start_tracker, starts_of
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.networks import KeypointNetwork
@@ -205,6 +206,10 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
     return outputs, files
 
 
+def _estimate_of(step: Step, *, several: bool) -> Estimate | PeopleEstimate:
+    return step.people if several else step.estimates[ONE]
+
+
 class FileOutput(Output):
     """Keeps poses on disk, and writes the files when the session ends; see `Spool`.
 
@@ -225,7 +230,7 @@ class FileOutput(Output):
     def publish(self, step: Step) -> None:
         """See Output."""
         self._turn = step.turn
-        self._spool.add(step.people if self._several else step.estimates[ONE], step.bodies)
+        self._spool.add(_estimate_of(step, several=self._several), step.bodies)
 
     def close(self) -> None:
         """Write the files.
@@ -249,12 +254,8 @@ class ShowOutput(Output):
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        if self._several:
-            self.viewer.log_people(step.people, step.bodies, recorded=step.frame, seconds=step.seconds)
-            return
-        self.viewer.log(
-            step.estimates[ONE], step.bodies[ONE], recorded=step.frame, front_end=step.front_end, seconds=step.seconds
-        )
+        how: dict[str, Any] = {"recorded": step.frame, "front_end": step.front_end, "seconds": step.seconds}
+        self.viewer.log(_estimate_of(step, several=self._several), step.bodies, **how)
 
     def close(self) -> None:
         """See Output."""

@@ -23,9 +23,7 @@ from voodoo.export.spool import Spool
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
 from voodoo.model.body import Body
-from voodoo.people import People
 from voodoo.pipeline.floor import seen_floor
-from voodoo.pipeline.front_end import ONE
 from voodoo.pipeline.run import TrackedFrame
 from voodoo.pipeline.start import Beginning
 from voodoo.recordings.left_out import LeftOut
@@ -34,7 +32,6 @@ from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
-from voodoo.tracker import Tracker
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.ink import Picture
 from voodoo.visualization.overlay import Overlay
@@ -282,40 +279,28 @@ def _apart(output: PictureWriter | Viewer, call: Callable[..., None], *arguments
 
 
 def pictured(
-    tracker: Tracker | People,
-    keep: Callable[[Any, Mapping[int, Body]], None],
-    *,
-    refused: Callable[[str], None] | None = None,
+    keep: Callable[[Any, Mapping[int, Body]], None], *, refused: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
     """How `run` keeps, draws and shows the frames.
 
     Args:
-        tracker: which makes the estimates.
         keep: takes an estimate, and the bodies of the persons by number.
         refused: takes the reason why somebody who was detected is not tracked.
     """
     bodies: dict[int, Body] = {}
 
     def take(step: TrackedFrame[Any]) -> None:
-        if refused is not None and tracker.refusal:
-            refused(tracker.refusal)
-        if isinstance(tracker, People):
-            bodies.update({person.id: tracker.body(person.id) for person in step.estimate})
-        else:
-            bodies[ONE] = tracker.body
+        if refused is not None and (why := step.front_end.tracker.refusal):
+            refused(why)
+        bodies.update(step.front_end.bodies)
         keep(step.estimate, bodies)
 
     def draw(drawing: Overlay, step: TrackedFrame[Any]) -> Picture:
-        if isinstance(tracker, People):
-            return drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index)
-        return drawing.draw(step.recorded, bodies[ONE], step.estimate, index=step.index, front_end=step.front_end)
+        return drawing.draw(step.recorded, bodies, step.estimate, index=step.index, front_end=step.front_end)
 
     def show(viewer: Viewer, step: TrackedFrame[Any]) -> None:
-        how: dict[str, Any] = {"recorded": step.recorded, "seconds": step.seconds}
-        if isinstance(tracker, People):
-            viewer.log_people(step.estimate, bodies, **how)
-        else:
-            viewer.log(step.estimate, bodies[ONE], front_end=step.front_end, **how)
+        how: dict[str, Any] = {"recorded": step.recorded, "front_end": step.front_end, "seconds": step.seconds}
+        viewer.log(step.estimate, bodies, **how)
 
     return {"take": take, "draw": draw, "show": show}
 

@@ -241,7 +241,7 @@ def track_command(
             starts = starts_of(beginning, source)
             how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
             refusals: Counter[str] = Counter()
-            how |= pictured(tracker, spool.add, refused=lambda words: refusals.update([words]))
+            how |= pictured(spool.add, refused=lambda words: refusals.update([words]))
             with deferred():
                 done = run(source, **how)
                 sample = spool.sample()

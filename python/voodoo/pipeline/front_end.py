@@ -19,7 +19,7 @@ from voodoo._core import Estimate, Frame
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.names import INPUTS, SEARCHING
-from voodoo.people import Followed, People, PeopleEstimate
+from voodoo.people import ONE, Followed, People, PeopleEstimate
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.starts.base import FoundStart, StartFrame
@@ -35,9 +35,6 @@ from voodoo.tracker import Tracker
 __all__ = ["INPUTS", "LEVEL_FRAMES", "ONE", "FrontEnd", "FrontEndSettings", "nobody", "paired"]
 
 E = TypeVar("E", Estimate, PeopleEstimate)
-
-ONE = 1
-"""Number of the person if a `Tracker` follows one."""
 
 
 @dataclass
@@ -106,6 +103,13 @@ class FrontEnd(Generic[E]):
     def posed(self) -> bool:
         """Whether anybody is tracked."""
         return bool(self._persons)
+
+    @property
+    def bodies(self) -> dict[int, Body]:
+        """Number -> body, with current sizes, of the persons of the last frame; until the next one."""
+        if isinstance(self.tracker, People):
+            return {person.id: self.tracker.body(person.id) for person in self.tracker.estimate}
+        return {ONE: self.tracker.body}
 
     @property
     def frozen(self) -> tuple[str, ...]:

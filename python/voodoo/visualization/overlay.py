@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,7 +16,7 @@ from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView
 from voodoo.model.standing import is_optical
 from voodoo.names import SEARCHING
-from voodoo.people import PeopleEstimate
+from voodoo.people import ONE, PeopleEstimate, everybody
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
@@ -67,51 +68,34 @@ class Overlay:
     def draw(
         self,
         recorded: RecordedFrame,
-        body: Body,
-        estimate: Estimate,
+        bodies: Body | Mapping[int, Body],
+        estimate: Estimate | PeopleEstimate,
         *,
         index: int,
-        front_end: FrontEnd[Estimate] | None = None,
+        front_end: FrontEnd[Any] | None = None,
     ) -> Picture:
         """Draw one frame over the image of each camera, side by side or two by two; without images, as a view from above.
 
+        Several persons have a separate color and number each, and are drawn without the measurements.
+
         Args:
             recorded: the measurements.
-            body: with the sizes it had in this frame.
-            estimate: the pose.
+            bodies: with the sizes they had in this frame: that of a single person, or number -> body.
+            estimate: the poses.
             index: number of the frame, from 0, for the caption.
             front_end: provides the rays and skin regions of the frame.
         """
-        pictures = [_drawn(canvas, recorded, body, estimate, front_end) for canvas in self._canvases(recorded)]
+        bodies = bodies if isinstance(bodies, Mapping) else {ONE: bodies}
+        pictures = [_drawn(canvas, recorded, bodies, estimate, front_end) for canvas in self._canvases(recorded)]
         if not pictures:
-            if estimate.joints:
-                x, y, z = (float(value) for value in np.median(list(estimate.joints.values()), axis=0))
+            places = [place for one in everybody(estimate) for place in one.estimate.joints.values()]
+            if places:
+                x, y, z = (float(value) for value in np.median(places, axis=0))
                 self._center = x, y, z
             top = TopView(self._center, _TOP_METERS / _TOP_SIZE, _TOP_SIZE, self._axes)
-            pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
+            pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, bodies, estimate, front_end))
         picture = in_rows(pictures, columns=self._columns)
         caption(picture, self._when(index, estimate.stamp), estimate)
-        return picture
-
-    def draw_people(
-        self, recorded: RecordedFrame, estimate: PeopleEstimate, bodies: Mapping[int, Body], *, index: int
-    ) -> Picture:
-        """Draw all persons in a frame, each with a separate color and number.
-
-        Args:
-            recorded: the measurements; a camera image is needed.
-            estimate: the persons.
-            bodies: of all persons, with their sizes in this frame.
-            index: number of the frame, from 0, for the caption.
-        """
-        pictures = []
-        for canvas in self._canvases(recorded):
-            draw_people(canvas.picture, estimate, bodies, canvas.view)
-            canvas.finish()
-            pictures.append(canvas.picture)
-        picture = in_rows(pictures, columns=self._columns)
-        captions = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
-        write_parts(picture, [(self._when(index, estimate.stamp), INK), *captions])
         return picture
 
     def _canvases(self, recorded: RecordedFrame) -> Iterator[OverlayCanvas]:
@@ -156,26 +140,35 @@ def _pictured(recorded: RecordedFrame) -> Sequence[Pictured]:
 
 
 def _drawn(
-    canvas: OverlayCanvas, recorded: RecordedFrame, body: Body, estimate: Estimate, front_end: FrontEnd[Estimate] | None
+    canvas: OverlayCanvas,
+    recorded: RecordedFrame,
+    bodies: Mapping[int, Body],
+    estimate: Estimate | PeopleEstimate,
+    front_end: FrontEnd[Any] | None,
 ) -> Picture:
-    draw_body(canvas.picture, body, estimate, canvas.view)
-    memory = Memory() if front_end is None else front_end.memory
-    for item in recorded.measurements:
-        for adapter in adapters_of(item):
-            adapter.draw(item, canvas, memory)
-    if front_end is not None:
-        canvas.rays(front_end.rays, estimate)
+    if isinstance(estimate, PeopleEstimate):
+        draw_people(canvas.picture, estimate, bodies, canvas.view)
+    else:
+        draw_body(canvas.picture, bodies[ONE], estimate, canvas.view)
+        memory = Memory() if front_end is None else front_end.memory
+        for item in recorded.measurements:
+            for adapter in adapters_of(item):
+                adapter.draw(item, canvas, memory)
+        if front_end is not None:
+            canvas.rays(front_end.rays, estimate)
     canvas.finish()
     return canvas.picture
 
 
-def caption(picture: Picture, text: str, estimate: Estimate) -> None:
-    """Write frame number, status and, if there is one, residual into the top left corner."""
-    status = str(estimate.status)
-    parts = [(text, INK), (status, _STATUS.get(status, INK))]
-    if np.isfinite(estimate.residual):
-        parts.append((f"{1e3 * estimate.residual:.0f} mm", INK))
-    write_parts(picture, parts)
+def caption(picture: Picture, text: str, estimate: Estimate | PeopleEstimate) -> None:
+    """Write frame number, status and, if there is one, residual into the top left corner; of several the status of each."""
+    if isinstance(estimate, PeopleEstimate):
+        parts = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
+    else:
+        parts = [(estimate.status, _STATUS.get(estimate.status, INK))]
+        if np.isfinite(estimate.residual):
+            parts.append((f"{1e3 * estimate.residual:.0f} mm", INK))
+    write_parts(picture, [(text, INK), *parts])
 
 
 def legend(width: int) -> Picture:
