@@ -12,6 +12,7 @@ from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo.cli import running
 from voodoo.cli.common import NO_POSE
+from voodoo.drawing.ink import LEFT, RIGHT
 from voodoo.errors import RecordingError
 from voodoo.evaluation import evaluate as evaluate_module
 from voodoo.export.track import Track
@@ -21,7 +22,6 @@ from voodoo.pipeline.start import Init, start_tracker
 from voodoo.sensors.adapters.skin import SKIN
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.visualization.ink import LEFT, RIGHT
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from made_up import places_in, two_people
 from synthetic.people import COLOR, MadeUpRecording
 from voodoo.cli import app
 from voodoo.cli.common import NO_POSE
+from voodoo.drawing.ink import person_color
 from voodoo.errors import VoodooError
 from voodoo.evaluation.people_evaluate import judge
 from voodoo.export.files import save
@@ -26,7 +27,6 @@ from voodoo.pipeline.run import track
 from voodoo.recordings import SensorInfo
 from voodoo.sensors.adapters import Adapter, register, unregister
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.visualization.ink import person_color
 from voodoo.visualization.overlay import Overlay
 
 

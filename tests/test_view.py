@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import voodoo
 from made_up import two_people
+from voodoo.drawing.body_geometry import bands, nearest_limb
+from voodoo.drawing.rerun_log import rounded_millimeters
 from voodoo.errors import VoodooError
 from voodoo.model.limb_mesh import limb_mesh
 from voodoo.people import PeopleEstimate
@@ -20,8 +22,6 @@ from voodoo.pipeline.run import track
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
-from voodoo.visualization.body_geometry import bands, nearest_limb
-from voodoo.visualization.rerun_log import rounded_millimeters
 from voodoo.visualization.rerun_viewer import Viewer
 
 

@@ -17,6 +17,7 @@ from voodoo.cli.recover import recover_before
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
+from voodoo.drawing.ink import Picture
 from voodoo.errors import NoPoseError, VoodooError
 from voodoo.export.files import check_target, is_table
 from voodoo.export.spool import Spool
@@ -33,7 +34,6 @@ from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
 from voodoo.visualization.image_writer import PictureWriter
-from voodoo.visualization.ink import Picture
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.rerun_viewer import Viewer
 

@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
+from voodoo.drawing.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, point, side_color
 from voodoo.model.body import Body
 from voodoo.model.projection import View, limb_rings, limb_silhouette, transform
-from voodoo.visualization.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, point, side_color
 
 _OPACITY = 0.62
 _FACETS = 64

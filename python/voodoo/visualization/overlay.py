@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
+from voodoo.drawing.canvas import Canvas, Pictured, same_place
+from voodoo.drawing.ink import INK, LEFT, MIDDLE, PAPER, RIGHT, SUBPIXEL, Color, Picture, person_color, point
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView
@@ -21,12 +23,9 @@ from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
-from voodoo.sensors.adapters.drawing import Pictured
 from voodoo.sensors.adapters.points import SCAN
 from voodoo.sensors.adapters.skin import SKIN
 from voodoo.visualization.body_drawing import draw_body
-from voodoo.visualization.canvas import OverlayCanvas, same_place
-from voodoo.visualization.ink import INK, LEFT, MIDDLE, PAPER, RIGHT, SUBPIXEL, Color, Picture, person_color, point
 from voodoo.visualization.people_drawing import draw_people
 from voodoo.visualization.sheet import contact_sheet, in_rows
 
@@ -93,12 +92,12 @@ class Overlay:
                 x, y, z = (float(value) for value in np.median(places, axis=0))
                 self._center = x, y, z
             top = TopView(self._center, _TOP_METERS / _TOP_SIZE, _TOP_SIZE, self._axes)
-            pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, bodies, estimate, front_end))
+            pictures.append(_drawn(Canvas(_grid(top), top), recorded, bodies, estimate, front_end))
         picture = in_rows(pictures, columns=self._columns)
         caption(picture, self._when(index, estimate.stamp), estimate)
         return picture
 
-    def _canvases(self, recorded: RecordedFrame) -> Iterator[OverlayCanvas]:
+    def _canvases(self, recorded: RecordedFrame) -> Iterator[Canvas]:
         """The canvas of each camera."""
         current = {item.sensor: item for item in _pictured(recorded)}
         for sensor, first in self._panels.items():
@@ -107,7 +106,7 @@ class Overlay:
             resized = cv2.resize(observed, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
             item = current.get(sensor, first)
             view = CameraView(item.camera, item.root_from_sensor, scale)
-            yield OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
+            yield Canvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
 
     def _when(self, index: int, stamp: float) -> str:
         """Number of a frame, and its time since the first one."""
@@ -140,7 +139,7 @@ def _pictured(recorded: RecordedFrame) -> Sequence[Pictured]:
 
 
 def _drawn(
-    canvas: OverlayCanvas,
+    canvas: Canvas,
     recorded: RecordedFrame,
     bodies: Mapping[int, Body],
     estimate: Estimate | PeopleEstimate,

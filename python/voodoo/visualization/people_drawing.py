@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import cv2
 import numpy as np
 
+from voodoo.drawing.ink import PAPER, FloatArray, Picture, person_color
 from voodoo.model.body import Body
 from voodoo.model.projection import View
 from voodoo.people import PeopleEstimate, Person
 from voodoo.visualization.body_drawing import draw_body
-from voodoo.visualization.ink import PAPER, FloatArray, Picture, person_color
 
 _ABOVE_M = 0.2
 """Height of the number above the head [m]."""

@@ -18,6 +18,9 @@ import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.children import children
+from voodoo.drawing.body_geometry import bands, limb_colors
+from voodoo.drawing.ink import person_color
+from voodoo.drawing.rerun_log import Log, entity
 from voodoo.errors import VoodooError, installed
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
@@ -26,9 +29,6 @@ from voodoo.model.rotations import quaternions
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.sensors.adapters import Memory, adapters_of
-from voodoo.visualization.body_geometry import bands, limb_colors
-from voodoo.visualization.ink import person_color
-from voodoo.visualization.rerun_log import StepLog, entity
 from voodoo.visualization.rerun_server import Server
 from voodoo.whole import appearing_whole, check_disk
 
@@ -179,7 +179,7 @@ class Viewer:
                 self._log_rays(front_end, estimate)
             self._log_plots(estimate)
         memory = Memory() if front_end is None else front_end.memory
-        log = StepLog(self._rr, self._stream, posed, body, _MOST_POINTS, self._whole)
+        log = Log(self._rr, self._stream, posed, body, _MOST_POINTS, self._whole)
         for item in () if recorded is None else recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.log(item, log, memory)

@@ -4,10 +4,11 @@ One adapter a file; `register` makes a new one known, see examples/uwb_tag.py. A
 adapter for each.
 """
 
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
 from voodoo.sensors.adapters.color import ColorAdapter
 from voodoo.sensors.adapters.depth import DepthAdapter
-from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.adapters.keypoints import KeypointsAdapter
 from voodoo.sensors.adapters.markers import MarkersAdapter
 from voodoo.sensors.adapters.points import PointsAdapter, ScanAdapter

@@ -14,9 +14,10 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import DepthImage
 from voodoo.people import Followed
-from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import RangeNoise
 from voodoo.sensors.pixels import FloatArray

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
+from voodoo.drawing.canvas import Canvas
 from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas
 from voodoo.sensors.pinhole import Pinhole
 from voodoo.sensors.silhouettes.regions import LIKELY
 from voodoo.tracker import Tracker

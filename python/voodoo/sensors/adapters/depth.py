@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
+from voodoo.drawing.rerun_log import Log, every, grown
 from voodoo.measurements import DepthImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Log, every, grown
 
 
 class DepthAdapter(Adapter[DepthImage]):

@@ -7,10 +7,11 @@ from typing import Any
 import numpy.typing as npt
 
 from voodoo._core import Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import LaserScan, PointCloud
 from voodoo.model.projection import transform
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas, Log
 
 SCAN, CLOUD = (90, 230, 90), (225, 225, 120)
 """Colors in overlays, BGR."""
