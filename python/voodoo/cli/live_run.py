@@ -17,8 +17,6 @@ import numpy as np
 from voodoo._core import Estimate
 from voodoo.cli.common import print_message
 from voodoo.cli.signals import deferred
-from voodoo.config import Config
-from voodoo.detectors import AnyDetector
 from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import cdr, description, instant
 from voodoo.export.spool import Spool
@@ -34,12 +32,10 @@ from voodoo.live.stream import Live
 from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
-from voodoo.names import HumanModel
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.start import Beginning, start_people, start_tracker, starts_of
-from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.networks import KeypointNetwork
-from voodoo.sensors.settings import Box, FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
@@ -65,25 +61,18 @@ _SWITCH_S = 5e-4
 
 @dataclass(frozen=True)
 class Wishes:
-    """Settings of the command line."""
+    """Settings of the command line: largest number of persons, options of start_tracker and of FrontEndSettings, outputs."""
 
-    beginning: Beginning | None
-    body: Path | None
-    height: float | None
-    model: HumanModel | None
-    config: Config
-    several: bool
     limit: int | None
-    kinds: tuple[str, ...] | None
-    depth_filter: DepthFilter | None
-    boxes: tuple[Box, ...]
-    detector: AnyDetector = "shipped"
-    targets: tuple[Path, ...] = ()
-    record: Path | None = None
-    to: tuple[str, ...] = ()
-    view: bool = False
-    serve: str | None = None
-    publish: bool = False
+    beginning: Beginning | None
+    start: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    targets: Sequence[Path]
+    record: Path | None
+    to: Sequence[str]
+    view: bool
+    serve: str | None
+    publish: bool
 
 
 @dataclass
@@ -167,20 +156,10 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
 
 def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     first = FirstFrame(live, frame)
-    settings = replace(
-        FrontEndSettings.of(first, use=wishes.kinds), depth_filter=wishes.depth_filter, exclude=wishes.boxes
-    )
-    how: dict[str, Any] = {
-        "body": None if wishes.body is None else Body.load(wishes.body),
-        "height": wishes.height,
-        "model": wishes.model,
-        "config": wishes.config,
-        "use": wishes.kinds,
-        "detector": wishes.detector,
-    }
-    if wishes.several:
-        return Follower(people=lambda: start_people(first, limit=wishes.limit, **how), settings=settings)
-    tracker = start_tracker(first, init=wishes.beginning, **how)
+    settings = replace(FrontEndSettings.of(first, use=wishes.start["use"]), **wishes.settings)
+    if wishes.limit != 1:
+        return Follower(people=lambda: start_people(first, limit=wishes.limit, **wishes.start), settings=settings)
+    tracker = start_tracker(first, init=wishes.beginning, **wishes.start)
     return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
 
 
@@ -190,7 +169,7 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
     if wishes.targets:
-        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
+        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.limit != 1)
         outputs.append(files)
     if wishes.record is not None:
         outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
@@ -200,7 +179,7 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
             viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
-        outputs.append(ShowOutput(viewer, several=wishes.several))
+        outputs.append(ShowOutput(viewer, several=wishes.limit != 1))
         if viewer.address:
             print_message(f"look at {viewer.address} in a browser")
     return outputs, files

@@ -19,17 +19,15 @@ if TYPE_CHECKING:
 ANY = "any"
 
 
-def limit_of(word: str) -> tuple[bool, int | None]:
-    """Parse "any" or a number from 1: whether several persons are tracked, and the largest number (None: any).
+def limit_of(word: str) -> int | None:
+    """Parse the largest number of persons, from 1, or "any": None.
 
     Raises:
         VoodooError: another word.
     """
-    if word == ANY:
-        return True, None
-    if not word.isdecimal() or int(word) < 1:
+    if word != ANY and (not word.isdecimal() or int(word) < 1):
         raise VoodooError(f"people: expected any or a whole number from 1, found {word!r}")
-    return int(word) > 1, int(word)
+    return None if word == ANY else int(word)
 
 
 def no_starts(init: str | None) -> Automatic:
