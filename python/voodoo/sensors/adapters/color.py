@@ -51,11 +51,8 @@ class ColorAdapter(Adapter[ColorImage]):
 
     kind = "color"
     measurement = ColorImage
+    measured = "image"
     colored = True
-
-    def content(self, item: ColorImage) -> npt.NDArray[Any]:
-        """The image."""
-        return item.image
 
     def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
         """As a picture with its own stamp; the first one of a camera after pictures of the empty scene, if there are some."""

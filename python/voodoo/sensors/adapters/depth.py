@@ -18,12 +18,9 @@ class DepthAdapter(Adapter[DepthImage]):
 
     kind = "depth"
     measurement = DepthImage
+    measured = "image"
     panel = 0
     while_searching = True
-
-    def content(self, item: DepthImage) -> npt.NDArray[Any]:
-        """The image."""
-        return item.image
 
     def add(self, frame: Frame, item: DepthImage, context: Context) -> None:
         """As a depth image, weighted for the distance of the body."""

@@ -22,11 +22,8 @@ class PointsAdapter(Adapter[PointCloud]):
 
     kind = "points"
     measurement = PointCloud
+    measured = "points"
     while_searching = True
-
-    def content(self, item: PointCloud) -> npt.NDArray[Any]:
-        """The points."""
-        return item.points
 
     def add(self, frame: Frame, item: PointCloud, context: Context) -> None:
         """As points, those on the body moved to the frame's time."""
@@ -49,11 +46,8 @@ class ScanAdapter(Adapter[LaserScan]):
 
     kind = "scan"
     measurement = LaserScan
+    measured = "ranges"
     while_searching = True
-
-    def content(self, item: LaserScan) -> npt.NDArray[Any]:
-        """The ranges."""
-        return item.ranges
 
     def add(self, frame: Frame, item: LaserScan, context: Context) -> None:
         """As points, those on the body moved to the frame's time."""

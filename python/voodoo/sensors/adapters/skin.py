@@ -23,13 +23,10 @@ class SkinAdapter(Adapter[ColorImage]):
 
     kind = "skin"
     measurement = ColorImage
+    measured = "image"
     colored = True
     recorded_as = "color"
     panel = 1
-
-    def content(self, item: ColorImage) -> npt.NDArray[Any]:
-        """The image."""
-        return item.image
 
     def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
         """As rays, moved from the picture's time to the frame's."""
