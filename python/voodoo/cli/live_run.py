@@ -169,7 +169,7 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
     if wishes.targets:
-        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.limit != 1)
+        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame)
         outputs.append(files)
     if wishes.record is not None:
         outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
@@ -179,14 +179,14 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
             viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
-        outputs.append(ShowOutput(viewer, several=wishes.limit != 1))
+        outputs.append(ShowOutput(viewer))
         if viewer.address:
             print_message(f"look at {viewer.address} in a browser")
     return outputs, files
 
 
-def _estimate_of(step: Step, *, several: bool) -> Estimate | PeopleEstimate:
-    return step.people if several else step.estimates[ONE]
+def _estimate_of(step: Step) -> Estimate | PeopleEstimate:
+    return step.people if step.front_end is None else step.estimates[ONE]
 
 
 class FileOutput(Output):
@@ -199,17 +199,16 @@ class FileOutput(Output):
     name = "files"
     waiting = 256
 
-    def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str], several: bool) -> None:
+    def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str]) -> None:
         """Make the folder of the poses."""
         self._spool = Spool(paths, root_frame=root_frame, together=_TOGETHER)
-        self._several = several
         self._turn: Turn | None = None
         self.written: list[Path] = []
 
     def publish(self, step: Step) -> None:
         """See Output."""
         self._turn = step.turn
-        self._spool.add(_estimate_of(step, several=self._several), step.bodies)
+        self._spool.add(_estimate_of(step), step.bodies)
 
     def close(self) -> None:
         """Write the files.
@@ -227,14 +226,14 @@ class ShowOutput(Output):
 
     name = "view"
 
-    def __init__(self, viewer: Viewer, *, several: bool) -> None:
-        """Store the arguments."""
-        self.viewer, self._several = viewer, several
+    def __init__(self, viewer: Viewer) -> None:
+        """Store the viewer."""
+        self.viewer = viewer
 
     def publish(self, step: Step) -> None:
         """See Output."""
         how: dict[str, Any] = {"recorded": step.frame, "front_end": step.front_end, "seconds": step.seconds}
-        self.viewer.log(_estimate_of(step, several=self._several), step.bodies, **how)
+        self.viewer.log(_estimate_of(step), step.bodies, **how)
 
     def close(self) -> None:
         """See Output."""

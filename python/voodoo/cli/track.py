@@ -129,7 +129,6 @@ def track_command(
         detector_of,
         kinds_of,
         opened,
-        pictured,
         refuse_unused,
         run,
         spool_of,
@@ -141,7 +140,7 @@ def track_command(
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
-    from voodoo.pipeline.run import track
+    from voodoo.pipeline.run import TrackedFrame, track
     from voodoo.pipeline.start import AUTO, beginning_of, start_people, start_tracker, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
@@ -215,11 +214,15 @@ def track_command(
             else:
                 tracker = start_tracker(source, init=beginning, **start)
             starts = starts_of(beginning, source)
-            how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+            steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
             refusals: Counter[str] = Counter()
-            how |= pictured(spool.add, refused=lambda words: refusals.update([words]))
+
+            def take(step: TrackedFrame[Any]) -> None:
+                refusals.update([tracker.refusal] if tracker.refusal else [])
+                spool.add(step.estimate, step.front_end.bodies)
+
             with deferred():
-                done = run(source, **how)
+                done = run(source, steps, take=take, **how)
                 sample = spool.sample()
                 turn = turn_of(source, sample, targets, upright=upright)
                 files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
