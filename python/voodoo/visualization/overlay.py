@@ -25,8 +25,7 @@ from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.adapters.points import SCAN
 from voodoo.sensors.adapters.skin import SKIN
-from voodoo.visualization.body_drawing import draw_body
-from voodoo.visualization.people_drawing import draw_people
+from voodoo.visualization.body_drawing import draw_body, draw_people
 from voodoo.visualization.sheet import contact_sheet, in_rows
 
 __all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
