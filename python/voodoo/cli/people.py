@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,15 +52,6 @@ def refuse_several(**options: object) -> None:
     for name, value in options.items():
         if value:
             raise VoodooError(f"{name.replace('_', '-')}: expected none with --people any or N, it is for one person")
-
-
-def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Mapping[str, Any]) -> PeopleScore:
-    """Evaluate a result file of one recording."""
-    from voodoo.evaluation.people_evaluate import evaluate_result
-
-    if len(paths) != 1:
-        raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-    return evaluate_result(paths[0], result, loader=loader, options=options)
 
 
 def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
