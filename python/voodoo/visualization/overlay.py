@@ -26,9 +26,7 @@ from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.adapters.points import SCAN
 from voodoo.sensors.adapters.skin import SKIN
 from voodoo.visualization.body_drawing import draw_body, draw_people
-from voodoo.visualization.sheet import contact_sheet, in_rows
-
-__all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
+from voodoo.visualization.sheet import in_rows
 
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
 _AHEAD_FRAMES, _MOST_PANELS = 5, 4
