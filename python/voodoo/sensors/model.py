@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 
-Numbers = TypeVar("Numbers", float, npt.NDArray[np.float64])
+N = TypeVar("N", float, npt.NDArray[np.float64])
 PAPER_WEIGHTS: dict[str, float] = {"point": 1.0, "face": 30.0, "hand": 20.0}
 """Weights of K06 section V: a 3-D point, the ray of the face tracker, the ray of a hand tracker."""
 
@@ -115,7 +115,7 @@ class RangeNoise:
         if self.constant == self.linear == self.quadratic == 0.0:
             raise MeasurementError("range noise: expected one coefficient above zero, found none")
 
-    def sigma(self, z: Numbers) -> Numbers:
+    def sigma(self, z: N) -> N:
         """Standard deviation [m] at range z [m]."""
         return self.constant + self.linear * z + self.quadratic * z * z
 
