@@ -88,12 +88,10 @@ def entered(
     words: Sequence[str],
     calibrations: Sequence[Path],
     *,
-    rate: float,
-    loop: bool,
-    root_frame: str | None,
     options: Mapping[str, Any],
-    several: bool = False,
-    network: KeypointNetwork | None = None,
+    several: bool,
+    network: KeypointNetwork | None,
+    **how: Any,  # noqa: ANN401 - of source_of
 ) -> Live:
     """The sources of the command line.
 
@@ -102,13 +100,16 @@ def entered(
     """
     if len(calibrations) > len(words):
         raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
-    given = {"frame": root_frame, "rate": None if rate == 1.0 else rate, "loop": loop or None, **options}
+    given = {
+        "frame": how["root_frame"],
+        "rate": None if how["rate"] == 1.0 else how["rate"],
+        "loop": how["loop"] or None,
+    }
+    given |= options
     refuse_unused(words, {name: value for name, value in given.items() if value is not None})
     places = [*calibrations, *[None] * (len(words) - len(calibrations))]
     sources = [
-        source_of(
-            word, rate=rate, loop=loop, root_frame=root_frame, options=options_for(word, options), calibration=place
-        )
+        source_of(word, options=options_for(word, options), calibration=place, **how)
         for word, place in zip(words, places, strict=True)
     ]
     return Live(sources, on_message=print_message, eager=not several, network=network)

@@ -25,7 +25,6 @@ from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
 from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.run import TrackedFrame
-from voodoo.pipeline.start import Beginning
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
@@ -83,11 +82,6 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
     except ValueError:
         raise VoodooError(f"depth-range: expected NEAR,FAR in meters, found {words!r}") from None
     return DepthFilter(nearest=nearest, farthest=farthest)
-
-
-def bare_for(init: Beginning | None) -> dict[str, Any]:
-    """The option of `open_recording` that ignores files beside the recording if another start is given or searched for."""
-    return {} if init is None else {"bare": True}
 
 
 def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> None:

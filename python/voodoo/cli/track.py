@@ -122,7 +122,6 @@ def track_command(
     from voodoo.cli.closing import closing_doubts, closing_lines
     from voodoo.cli.people import limit_of, no_starts, refuse_several
     from voodoo.cli.running import (
-        bare_for,
         boxes_of,
         config_of,
         depth_filter_of,
@@ -157,6 +156,7 @@ def track_command(
         limit = limit_of(people)
         several = limit != 1
         beginning = no_starts(init) if several else beginning_of(init)
+        bare = beginning is not None
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         numbers, others = numbers_of(option), with_ or ()
         about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": kinds}
@@ -168,7 +168,7 @@ def track_command(
         asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         folders, network = keypoint_words(keypoints or (), layout)
         source = join(
-            opened(recording, asked.pop("loader", loader), frame, left_out=left_out, **asked, **bare_for(beginning)),
+            opened(recording, asked.pop("loader", loader), frame, left_out=left_out, bare=bare, **asked),
             keypoints=folders,
             network=network,
             layout=layout,
@@ -177,7 +177,7 @@ def track_command(
             markers=markers,
             numbers=numbers,
             left_out=left_out,
-            **bare_for(beginning),
+            bare=bare,
         )
         for words in source.assumed:
             print_message(words)

@@ -166,9 +166,9 @@ class FrontEnd(Generic[E]):
             if any(adapter.kind in use for adapter in adapters_of(item)) or (clothes and _is_colored(item))
         ]
         self._take_given(stamp, used)
-        persons = self._contexts(stamp, alive)
+        persons = self._contexts(stamp)
         frame = Frame(stamp=stamp)
-        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, alive, self._single)
+        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, self._single)
         scene.add_scene(frame)
         own = {number: frame if alone else Frame(stamp=stamp) for number in persons}
         spare: list[Any] = []
@@ -202,7 +202,7 @@ class FrontEnd(Generic[E]):
         detected = self._detect(frame, spare)
         return frame, {number: own[number] for number in sorted(filled)}, detected
 
-    def _contexts(self, stamp: float, alive: Sequence[Any]) -> dict[int, Context]:
+    def _contexts(self, stamp: float) -> dict[int, Context]:
         """What the adapters may read about every person who is tracked."""
         bodies: dict[int, Tracker | Followed] = dict.fromkeys(self._persons, self._single)
         if isinstance(self.tracker, People):
@@ -212,20 +212,15 @@ class FrontEnd(Generic[E]):
             if number not in self._persons:
                 self._persons[number] = self._new(trusted_start=False)
             others = [other for other in bodies.values() if other is not body and isinstance(other, Followed)]
-            everybody[number] = self._context(stamp, alive, body, self._persons[number], others)
+            everybody[number] = self._context(stamp, body, self._persons[number], others)
         return everybody
 
     def _context(
-        self,
-        stamp: float,
-        alive: Sequence[Any],
-        tracker: Tracker | Followed,
-        person: _Person | None = None,
-        others: Sequence[Followed] = (),
+        self, stamp: float, tracker: Tracker | Followed, person: _Person | None = None, others: Sequence[Followed] = ()
     ) -> Context:
         return Context(
             stamp=stamp,
-            measurements=alive,
+            measurements=self._alive,
             predicted=tracker.predict(stamp) if person else {},
             settings=self.settings,
             tracker=tracker,

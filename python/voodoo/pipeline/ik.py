@@ -153,7 +153,11 @@ def follow(
             if regions is not None and targets:
                 # The first frame is the one whose posture is known.
                 plain = tracker.estimate if first else solve(chain, targets, start=near, options=options)
-                images = _cut_out(regions, colors, plain.world_from_limb)
+                found = zip(regions.of(colors, plain.world_from_limb), colors, strict=True)
+                images = [
+                    Silhouette(mask, camera=lens, world_from_camera=item.root_from_sensor)
+                    for (mask, lens), item in found
+                ]
             if warm:
                 posture = follower.step(targets, images=images)
             else:
@@ -205,14 +209,6 @@ def _silhouettes(
             continue
         found.append(Silhouette(mask, camera=item.camera, world_from_camera=item.root_from_sensor))
     return found
-
-
-def _cut_out(
-    regions: RegionSilhouettes, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
-) -> list[Silhouette]:
-    """Silhouettes of all images by color, near a posture."""
-    found = zip(regions.of(pictures, world_from_limb), pictures, strict=True)
-    return [Silhouette(mask, camera=camera, world_from_camera=item.root_from_sensor) for (mask, camera), item in found]
 
 
 def _scenes(

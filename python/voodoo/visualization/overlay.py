@@ -82,15 +82,26 @@ class Overlay:
             front_end: provides the rays and skin regions of the frame.
         """
         bodies = bodies if isinstance(bodies, Mapping) else {ONE: bodies}
-        pictures = [_drawn(canvas, recorded, bodies, estimate, front_end) for canvas in self._canvases(recorded)]
-        if not pictures:
+        canvases = list(self._canvases(recorded))
+        if not canvases:
             places = [place for one in everybody(estimate) for place in one.estimate.joints.values()]
             if places:
                 x, y, z = (float(value) for value in np.median(places, axis=0))
                 self._center = x, y, z
             top = TopView(self._center, _TOP_METERS / _TOP_SIZE, _TOP_SIZE, self._axes)
-            pictures.append(_drawn(Canvas(_grid(top), top), recorded, bodies, estimate, front_end))
-        picture = in_rows(pictures, columns=self._columns)
+            canvases.append(Canvas(_grid(top), top))
+        memory, rays = (Memory(), ()) if front_end is None else (front_end.memory, front_end.rays)
+        for canvas in canvases:
+            if isinstance(estimate, PeopleEstimate):
+                draw_people(canvas.picture, estimate, bodies, canvas.view)
+            else:
+                draw_body(canvas.picture, bodies[ONE], estimate, canvas.view)
+                for item in recorded.measurements:
+                    for adapter in adapters_of(item):
+                        adapter.draw(item, canvas, memory)
+                canvas.rays(rays, estimate)
+            canvas.finish()
+        picture = in_rows([canvas.picture for canvas in canvases], columns=self._columns)
         caption(picture, self._when(index, estimate.stamp), estimate)
         return picture
 
@@ -133,27 +144,6 @@ class Overlay:
 
 def _pictured(recorded: RecordedFrame) -> Sequence[Pictured]:
     return [item for item in recorded.measurements if adapter_of(item).panel is not None]  # type: ignore[misc]
-
-
-def _drawn(
-    canvas: Canvas,
-    recorded: RecordedFrame,
-    bodies: Mapping[int, Body],
-    estimate: Estimate | PeopleEstimate,
-    front_end: FrontEnd[Any] | None,
-) -> Picture:
-    if isinstance(estimate, PeopleEstimate):
-        draw_people(canvas.picture, estimate, bodies, canvas.view)
-    else:
-        draw_body(canvas.picture, bodies[ONE], estimate, canvas.view)
-        memory = Memory() if front_end is None else front_end.memory
-        for item in recorded.measurements:
-            for adapter in adapters_of(item):
-                adapter.draw(item, canvas, memory)
-        if front_end is not None:
-            canvas.rays(front_end.rays, estimate)
-    canvas.finish()
-    return canvas.picture
 
 
 def caption(picture: Picture, text: str, estimate: Estimate | PeopleEstimate) -> None:
