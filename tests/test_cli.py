@@ -30,9 +30,9 @@ def run(monkeypatch, tmp_path):
     tracker = install(monkeypatch)
     monkeypatch.chdir(tmp_path)
 
-    def opened(path, loader=None, **options):
-        call.left_out = options.pop("left_out", None)
-        call.options = options
+    def opened(path, loader=None, *, left_out=None, bare=False, **options):
+        call.left_out = left_out
+        call.options = options | ({"bare": True} if bare else {})
         if call.recording is None:
             raise RecordingError(f"{path}: expected a recording, found\nno such file")
         return call.recording
@@ -387,7 +387,7 @@ def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path
     (tmp_path / "people" / "Calib_x.toml").touch()
     opened = []
 
-    def other(path, left_out, **options):
+    def other(path, left_out, bare, **options):
         opened.append((path.name, options))
         return FakeRecording(frames=12)
 
