@@ -12,6 +12,7 @@ from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo.cli import running
 from voodoo.cli.common import NO_POSE
+from voodoo.drawing.ink import LEFT, RIGHT
 from voodoo.errors import RecordingError
 from voodoo.evaluation import evaluate as evaluate_module
 from voodoo.export.track import Track
@@ -21,7 +22,6 @@ from voodoo.pipeline.start import Init, start_tracker
 from voodoo.sensors.adapters.skin import SKIN
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.visualization.ink import LEFT, RIGHT
 
 
 @pytest.fixture
@@ -30,9 +30,9 @@ def run(monkeypatch, tmp_path):
     tracker = install(monkeypatch)
     monkeypatch.chdir(tmp_path)
 
-    def opened(path, loader=None, **options):
-        call.left_out = options.pop("left_out", None)
-        call.options = options
+    def opened(path, loader=None, *, left_out=None, bare=False, **options):
+        call.left_out = left_out
+        call.options = options | ({"bare": True} if bare else {})
         if call.recording is None:
             raise RecordingError(f"{path}: expected a recording, found\nno such file")
         return call.recording
@@ -387,7 +387,7 @@ def test_a_number_goes_to_the_recording_that_knows_it(run, monkeypatch, tmp_path
     (tmp_path / "people" / "Calib_x.toml").touch()
     opened = []
 
-    def other(path, left_out, **options):
+    def other(path, left_out, bare, **options):
         opened.append((path.name, options))
         return FakeRecording(frames=12)
 

@@ -7,7 +7,7 @@ import color_scene
 import voodoo
 from color_scene import CAMERA, RATE, pictures, pose, sequence
 from voodoo.measurements import ColorImage
-from voodoo.pipeline.ik import Positions, follow
+from voodoo.pipeline.ik import follow, known_positions
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording
 from voodoo.sensors.silhouettes.regions import RegionSilhouettes
@@ -92,7 +92,7 @@ def test_without_a_pose_or_with_a_wrong_picture_nothing_is_cut_out():
 
 def test_inverse_kinematics_takes_silhouettes_by_region(tmp_path):
     recording = open_recording(color_scene.write_videos(tmp_path / "films", FRAMES, background=False), loader="videos")
-    positions, known = Positions.of(recording), ["l_shoulder", "r_shoulder", "l_hip", "r_hip"]
+    positions, known = known_positions(recording), ["l_shoulder", "r_shoulder", "l_hip", "r_hip"]
     errors = {}
     for kind in ("none", "regions"):
         tracker = start_tracker(recording, model="full")

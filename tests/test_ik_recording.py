@@ -18,9 +18,10 @@ from commands import refused
 from voodoo import ik
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
-from voodoo.pipeline.ik import KNOWN, Positions
+from voodoo.pipeline.ik import KNOWN, known_positions
 from voodoo.pipeline.ik import follow as follow_frames
 from voodoo.pipeline.start import start_tracker
+from voodoo.recordings.recording import Reference
 from voodoo.recordings.sample import sample_path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -69,7 +70,7 @@ def follow(*args, **kwargs):
 
 def test_follow_reaches_what_is_known_and_reports_the_rest(some):
     tracker = start_tracker(some)
-    track, errors = follow(some, tracker, Positions.of(some), pictures="depth")
+    track, errors = follow(some, tracker, known_positions(some), pictures="depth")
     assert len(track) == 12 and set(track.status) <= {"tracking", "degraded"}
     assert set(errors) == set(some.reference.names) - set(KNOWN)
     assert np.nanmean(errors["l_elbow"]) < 0.08
@@ -87,9 +88,9 @@ def test_follow_reaches_what_is_known_and_reports_the_rest(some):
 def test_wrists_stand_in_for_hands_that_nobody_measured(some):
     reference = some.reference
     kept = [i for i, name in enumerate(reference.names) if name not in ("l_hand", "r_hand", "head_center")]
-    positions = Positions(
-        reference.stamps, tuple(reference.names[i] for i in kept), np.ascontiguousarray(reference.positions[:, kept])
-    )
+    names = tuple(reference.names[i] for i in kept)
+    values = np.ascontiguousarray(reference.positions[:, kept])
+    positions = Reference(reference.stamps, names, values, exact=False)
     _, errors = follow(some, start_tracker(some), positions, pictures="none")
     assert not {"l_wrist", "r_wrist", "skullbase"} & set(errors) and {"l_elbow", "r_elbow"} <= set(errors)
     # What is asked for is what is known.
@@ -101,8 +102,8 @@ def test_wrists_stand_in_for_hands_that_nobody_measured(some):
 
 def test_what_nothing_reports_goes_back_to_the_mean_unless_reported_otherwise(recording):
     some = Some(recording, 40)
-    drawn, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
-    left, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", rest=False)
+    drawn, _ = follow(some, start_tracker(some), known_positions(some), pictures="none")
+    left, _ = follow(some, start_tracker(some), known_positions(some), pictures="none", rest=False)
     # Targets come first: to be drawn costs them nothing.
     assert (drawn.residual <= left.residual + 1e-4).all()
     joints = slice(6, None)
@@ -112,19 +113,18 @@ def test_what_nothing_reports_goes_back_to_the_mean_unless_reported_otherwise(re
 
 def test_pictures_change_the_posture_and_nothing_known(some):
     tracker = start_tracker(some)
-    plain, _ = follow(some, tracker, Positions.of(some), pictures="none")
-    depth, _ = follow(some, start_tracker(some), Positions.of(some), pictures="depth")
+    plain, _ = follow(some, tracker, known_positions(some), pictures="none")
+    depth, _ = follow(some, start_tracker(some), known_positions(some), pictures="depth")
     assert not np.allclose(plain.angles, depth.angles, atol=1e-3)
     assert (depth.residual <= plain.residual + 0.005).all()
 
 
 def test_a_frame_without_known_sites_is_degraded_and_stays(some):
-    positions = Positions.of(some)
-    values = positions.values.copy()
+    positions = known_positions(some)
+    values = positions.positions.copy()
     values[5] = np.nan
-    track, errors = follow(
-        some, start_tracker(some), Positions(positions.stamps, positions.names, values), pictures="none"
-    )
+    known = Reference(positions.stamps, positions.names, values, exact=False)
+    track, errors = follow(some, start_tracker(some), known, pictures="none")
     assert track.status[5] == "degraded"
     assert np.array_equal(track.angles[5], track.angles[4])
     assert np.isnan(errors["l_elbow"][5]) and np.isfinite(errors["l_elbow"][4])
@@ -133,9 +133,9 @@ def test_a_frame_without_known_sites_is_degraded_and_stays(some):
 def test_every_frame_alone_forgets_the_one_before(some):
     later = Some(some, 12)
     later.frames = later.frames[6:]
-    alone, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none", warm=False)
-    only, _ = follow(later, start_tracker(some), Positions.of(some), pictures="none", warm=False)
-    warm, _ = follow(some, start_tracker(some), Positions.of(some), pictures="none")
+    alone, _ = follow(some, start_tracker(some), known_positions(some), pictures="none", warm=False)
+    only, _ = follow(later, start_tracker(some), known_positions(some), pictures="none", warm=False)
+    warm, _ = follow(some, start_tracker(some), known_positions(some), pictures="none")
     assert np.array_equal(alone.angles[6:], only.angles)
     assert not np.allclose(alone.angles[6:], warm.angles[6:], atol=1e-6)
 
@@ -155,7 +155,7 @@ def test_what_cannot_be_followed(some, change, words):
         for frame in depth_only.frames
     ]
     with pytest.raises(voodoo.VoodooError, match=words):
-        follow(depth_only, start_tracker(some), Positions.of(some), **change)
+        follow(depth_only, start_tracker(some), known_positions(some), **change)
 
 
 def test_no_frames_and_no_reference(some, monkeypatch, tmp_path):
@@ -165,7 +165,7 @@ def test_no_frames_and_no_reference(some, monkeypatch, tmp_path):
     bare = Some(some, 1)
     bare.reference = None
     with pytest.raises(voodoo.VoodooError, match="no reference"):
-        Positions.of(bare)
+        known_positions(bare)
 
 
 def test_command_line(tmp_path, recording):
@@ -235,7 +235,7 @@ def test_command_line_refuses_bad_input(tmp_path):
 
 
 def test_sites_that_nobody_knows_are_refused_by_name(some):
-    how = {"positions": Positions.of(some), "pictures": "none"}
+    how = {"positions": known_positions(some), "pictures": "none"}
     with pytest.raises(VoodooError, match=r"sites: expected some of .*l_wrist.*, found nose, l_wirst$"):
         follow(some, start_tracker(some), sites=("l_wrist", "nose", "l_wirst"), **how)
 
@@ -262,7 +262,7 @@ def test_nothing_is_kept_of_a_frame(recording):
     many = Some(recording, 0)
     many.frames, used = frames, []
     tracemalloc.start()
-    for number, _ in enumerate(follow_frames(many, start, Positions.of(recording), pictures="none")):
+    for number, _ in enumerate(follow_frames(many, start, known_positions(recording), pictures="none")):
         if number in (90, 269):
             gc.collect()
             used.append(tracemalloc.get_traced_memory()[0])

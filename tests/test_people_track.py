@@ -15,6 +15,7 @@ from made_up import places_in, two_people
 from synthetic.people import COLOR, MadeUpRecording
 from voodoo.cli import app
 from voodoo.cli.common import NO_POSE
+from voodoo.drawing.ink import person_color
 from voodoo.errors import VoodooError
 from voodoo.evaluation.people_evaluate import judge
 from voodoo.export.files import save
@@ -26,7 +27,6 @@ from voodoo.pipeline.run import track
 from voodoo.recordings import SensorInfo
 from voodoo.sensors.adapters import Adapter, register, unregister
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.visualization.ink import person_color
 from voodoo.visualization.overlay import Overlay
 
 
@@ -210,7 +210,7 @@ def test_the_overlay_shows_everybody_in_a_color_of_their_own():
     people = voodoo.People()
     *_, last = track(two_people(), people)
     bodies = {person.id: people.body(person.id) for person in last.estimate}
-    picture = Overlay(two_people()).draw_people(last.recorded, last.estimate, bodies, index=last.index)
+    picture = Overlay(two_people()).draw(last.recorded, bodies, last.estimate, index=last.index)
     assert sorted(bodies) == [1, 2]
     for one in bodies:
         assert (np.abs(picture.astype(int) - person_color(one)).max(axis=2) < 40).sum() > 300

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import voodoo
 from made_up import two_people
+from voodoo.drawing.body_geometry import bands, nearest_limb
+from voodoo.drawing.rerun_log import rounded_millimeters
 from voodoo.errors import VoodooError
 from voodoo.model.limb_mesh import limb_mesh
 from voodoo.people import PeopleEstimate
@@ -20,8 +22,6 @@ from voodoo.pipeline.run import track
 from voodoo.recordings import open_recording, sample_path
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization import rerun_viewer as view
-from voodoo.visualization.body_geometry import bands, nearest_limb
-from voodoo.visualization.rerun_log import rounded_millimeters
 from voodoo.visualization.rerun_viewer import Viewer
 
 
@@ -137,8 +137,8 @@ def test_everybody_has_a_body_of_their_own_and_is_cleared_when_they_go(tmp_path)
     path = tmp_path / "people.rrd"
     with Viewer(save=path) as viewer:
         for step in steps[-2:]:
-            viewer.log_people(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
-        viewer.log_people(PeopleEstimate(9.0, ()), bodies)
+            viewer.log(step.estimate, bodies, recorded=step.recorded, seconds=step.seconds)
+        viewer.log(PeopleEstimate(9.0, ()), bodies)
     command = Path(sys.executable).with_name("rerun")
     displayed = subprocess.run([command, "rrd", "print", path], capture_output=True, text=True, check=True).stdout
     rows = re.findall(r"with (\d+) rows .* - (/world/people\S*) - .*\[(\S+?)[\] ]", displayed)

@@ -15,13 +15,13 @@ import cv2
 import numpy as np
 
 import voodoo
+from voodoo.drawing.canvas import Picture
 from voodoo.evaluation import metrics
 from voodoo.model.projection import CameraView
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, RecordedFrame, Recording, RecordingInfo, Reference
 from voodoo.recordings.loaders import guess_loader, options_of
-from voodoo.visualization.canvas import Picture
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.sheet import contact_sheet
 

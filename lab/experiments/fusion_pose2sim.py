@@ -22,7 +22,7 @@ import voodoo
 from voodoo.evaluation.metrics import JOINTS
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.recordings import KeypointImage, RecordedFrame, Recording, open_recording
-from voodoo.sensors.keypoints import nearest_person, site_pixels
+from voodoo.sensors.keypoints.sites import nearest_person, site_pixels
 from voodoo.sensors.pixels import in_sensor, world_rays
 from voodoo.sensors.settings import FrontEndSettings
 

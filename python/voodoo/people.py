@@ -16,7 +16,10 @@ from voodoo.detectors.base import AnyDetector
 from voodoo.errors import BodyError, ConfigError, MeasurementError, of_kind, one_thread
 from voodoo.model.body import Body, checked_joints
 
-__all__ = ["Followed", "People", "PeopleEstimate", "Person"]
+__all__ = ["ONE", "Followed", "People", "PeopleEstimate", "Person", "everybody"]
+
+ONE = 1
+"""Number of the person whom a `Tracker` follows."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,13 @@ class PeopleEstimate:
     def __len__(self) -> int:
         """Number of persons."""
         return len(self.persons)
+
+
+def everybody(estimate: Estimate | PeopleEstimate) -> PeopleEstimate:
+    """All persons of an estimate; that of a `Tracker` is of person ONE, also if nobody was found."""
+    if isinstance(estimate, PeopleEstimate):
+        return estimate
+    return PeopleEstimate(estimate.stamp, (Person(ONE, estimate),))
 
 
 @one_thread

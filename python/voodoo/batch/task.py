@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -23,11 +23,10 @@ from voodoo.evaluation.evaluate import compare
 from voodoo.export.people import PeopleTrack
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.names import HumanModel
-from voodoo.people import People, PeopleEstimate
+from voodoo.people import PeopleEstimate, everybody
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
-from voodoo.pipeline.start import AUTO, start_tracker
+from voodoo.pipeline.start import AUTO, start_people, start_tracker
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
@@ -182,25 +181,22 @@ def _tracks(
     job: Job, recording: Recording, settings: FrontEndSettings, config: Config, left_out: LeftOut | None
 ) -> Iterator[Mapping[int, Track]]:
     """The tracks of all persons, part by part."""
-    model = cast(HumanModel | None, job.settings.model)
-    if job.settings.people == 1:
-        init = AUTO if job.settings.init == AUTO else None
-        tracker = start_tracker(recording, init=init, model=model, config=config, use=job.settings.use)
-        steps = track(recording, tracker, settings=settings, left_out=left_out)
-        for part in _parts((step.estimate for step in steps), job.limit_s):
-            yield {1: Track.of(part, body=tracker.body)}
-        return
-    body = None if model is None else Body.human(model=model)
-    people = People(body, config=config, limit=job.settings.people)
+    chosen = job.settings
     bodies: dict[int, Body] = {}
+    tracker: Any
+    how: dict[str, Any] = {"model": chosen.model, "config": config, "use": chosen.use}
+    if chosen.people == 1:
+        tracker = start_tracker(recording, init=AUTO if chosen.init == AUTO else None, **how)
+    else:
+        tracker = start_people(recording, limit=chosen.people, **how)
 
     def estimates() -> Iterator[PeopleEstimate]:
-        for step in track(recording, people, settings=settings):
-            bodies.update({person.id: people.body(person.id) for person in step.estimate})
-            yield step.estimate
+        for step in track(recording, tracker, settings=settings, left_out=left_out):
+            bodies.update(step.front_end.bodies)
+            yield everybody(step.estimate)
 
-    for several in _parts(estimates(), job.limit_s):
-        yield PeopleTrack.of(several, bodies=bodies).tracks
+    for part in _parts(estimates(), job.limit_s):
+        yield PeopleTrack.of(part, bodies=bodies).tracks
 
 
 def _parts(items: Iterable[T], limit_s: float | None) -> Iterator[list[T]]:

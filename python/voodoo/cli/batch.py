@@ -86,7 +86,6 @@ def batch_command(
     with clear_errors(), reporting(as_json) as told:
         if init not in (None, AUTO):
             raise typer.BadParameter(f"--init: expected auto, found {init!r}")
-        _, limit = limit_of(people)
         chosen, plain = config_of(config), Config()
         settings = Settings(
             use=kinds_of(use),
@@ -94,7 +93,7 @@ def batch_command(
             model=model,
             loader=loader,
             options=loader_words(topic, option, frame=frame, layout=layout),
-            people=limit,
+            people=limit_of(people),
             strict=strict,
             config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},
             version=__version__,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -23,7 +23,7 @@ def demo_command(
     import numpy as np
 
     from voodoo._core import Estimate
-    from voodoo.cli.running import opened, pictured, run
+    from voodoo.cli.running import opened, run
     from voodoo.evaluation.evaluate import compare
     from voodoo.export.track import Track
     from voodoo.pipeline.run import track
@@ -37,9 +37,10 @@ def demo_command(
         source = opened(sample_path(), None, None)
         tracker = start_tracker(source, init=AUTO)
         estimates: list[Estimate] = []
-        how = pictured(tracker, lambda estimate, _: estimates.append(estimate))
         steps = track(source, tracker)
-        seconds, sheet, interrupted, _, failures = run(source, steps, overlay=out / "overlay.mp4", sheet=6, **how)
+        how: dict[str, Any] = {"overlay": out / "overlay.mp4", "sheet": 6}
+        done = run(source, steps, take=lambda step: estimates.append(step.estimate), **how)
+        seconds, sheet, interrupted, _, failures = done
         if interrupted:
             raise typer.Exit(INTERRUPTED)
         result = Track.of(estimates, body=tracker.body)

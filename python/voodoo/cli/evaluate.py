@@ -76,11 +76,11 @@ def eval_command(
 
     voodoo eval two_walk/ --result theirs.csv
     """
-    from voodoo.cli.people import judged, refuse_failures, show_people
+    from voodoo.cli.people import refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.figure import new_figure
-    from voodoo.evaluation.people_evaluate import evaluate_all_people, has_people
+    from voodoo.evaluation.people_evaluate import evaluate_all_people, evaluate_result, has_people
     from voodoo.evaluation.report import brief, write_reports
     from voodoo.evaluation.search import find_recordings
     from voodoo.evaluation.summary import summarize
@@ -97,7 +97,9 @@ def eval_command(
         if out is not None:
             check_outputs([out], paths)
         if result is not None:
-            show_people([judged(paths, result, loader, words)], out, report=report)
+            if len(paths) != 1:
+                raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
+            show_people([evaluate_result(paths[0], result, loader=loader, options=words)], out, report=report)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)

@@ -80,10 +80,10 @@ def ik_command(
     """
     from voodoo.cli.running import opened, run, spool_of, turn_of
     from voodoo.export.files import upright_words
-    from voodoo.export.spool import ONE
     from voodoo.export.track import Track
     from voodoo.model.body import Body
-    from voodoo.pipeline.ik import Positions, Solved, follow
+    from voodoo.people import ONE
+    from voodoo.pipeline.ik import Solved, follow, known_positions
     from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
 
     with clear_errors():
@@ -92,7 +92,7 @@ def ik_command(
         source = opened(recording, loader, frame, **loader_words(topic, option, layout=layout))
         files, keeping = spool_of(source, out, context, suffix="_ik.csv")
         with keeping as spool:
-            positions = Positions.of(source, None if targets is None else Track.load(targets))
+            positions = known_positions(source, None if targets is None else Track.load(targets))
             tracker = start_tracker(
                 source,
                 init=beginning,

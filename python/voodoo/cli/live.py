@@ -111,6 +111,7 @@ def live_command(
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
     from voodoo.export.files import STDOUT, check_target
+    from voodoo.model.body import Body
     from voodoo.pipeline.inputs import keypoint_words
     from voodoo.pipeline.start import beginning_of
 
@@ -122,24 +123,24 @@ def live_command(
 
             print_text("\n".join(listing() or ["nothing is published on this network"]))
             return
-        several, limit = limit_of(people)
+        limit = limit_of(people)
         for target in out or ():
             check_target(target)
         wishes = Wishes(
-            beginning=no_starts(init) if several else beginning_of(init),
-            body=body,
-            height=height,
-            model=model,
-            config=config_of(config),
-            several=several,
             limit=limit,
-            kinds=kinds_of(use),
-            depth_filter=depth_filter_of(depth_range),
-            boxes=boxes_of(exclude),
-            detector=detector_of(detector),
-            targets=tuple(out or ()),
+            beginning=beginning_of(init) if limit == 1 else no_starts(init),
+            start={
+                "body": None if body is None else Body.load(body),
+                "height": height,
+                "model": model,
+                "config": config_of(config),
+                "use": kinds_of(use),
+                "detector": detector_of(detector),
+            },
+            settings={"depth_filter": depth_filter_of(depth_range), "exclude": boxes_of(exclude)},
+            targets=out or (),
             record=record,
-            to=tuple(to or ()),
+            to=to or (),
             view=view,
             serve=serve,
             publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,
@@ -151,7 +152,7 @@ def live_command(
         if loader is not None:
             words["loader"] = loader
         how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": frame, "options": words}
-        source = entered(sources, calibration or (), several=several, network=network, **how)
+        source = entered(sources, calibration or (), several=limit != 1, network=network, **how)
         recover_before([*wishes.targets, *([record] if record is not None else [])])
         done = run(source, wishes, duration=duration, report=report)
         for path in done.written:

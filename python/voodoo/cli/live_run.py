@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from voodoo._core import Estimate
 from voodoo.cli.common import print_message
 from voodoo.cli.signals import deferred
-from voodoo.config import Config
-from voodoo.detectors import AnyDetector
 from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import cdr, description, instant
 from voodoo.export.spool import Spool
@@ -33,12 +32,10 @@ from voodoo.live.stream import Live
 from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
-from voodoo.names import HumanModel
-from voodoo.pipeline.front_end import ONE
+from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.start import Beginning, start_people, start_tracker, starts_of
-from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.networks import KeypointNetwork
-from voodoo.sensors.settings import Box, FrontEndSettings
+from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
@@ -64,25 +61,18 @@ _SWITCH_S = 5e-4
 
 @dataclass(frozen=True)
 class Wishes:
-    """Settings of the command line."""
+    """Settings of the command line: largest number of persons, options of start_tracker and of FrontEndSettings, outputs."""
 
-    beginning: Beginning | None
-    body: Path | None
-    height: float | None
-    model: HumanModel | None
-    config: Config
-    several: bool
     limit: int | None
-    kinds: tuple[str, ...] | None
-    depth_filter: DepthFilter | None
-    boxes: tuple[Box, ...]
-    detector: AnyDetector = "shipped"
-    targets: tuple[Path, ...] = ()
-    record: Path | None = None
-    to: tuple[str, ...] = ()
-    view: bool = False
-    serve: str | None = None
-    publish: bool = False
+    beginning: Beginning | None
+    start: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    targets: Sequence[Path]
+    record: Path | None
+    to: Sequence[str]
+    view: bool
+    serve: str | None
+    publish: bool
 
 
 @dataclass
@@ -98,12 +88,10 @@ def entered(
     words: Sequence[str],
     calibrations: Sequence[Path],
     *,
-    rate: float,
-    loop: bool,
-    root_frame: str | None,
     options: Mapping[str, Any],
-    several: bool = False,
-    network: KeypointNetwork | None = None,
+    several: bool,
+    network: KeypointNetwork | None,
+    **how: Any,  # noqa: ANN401 - of source_of
 ) -> Live:
     """The sources of the command line.
 
@@ -112,13 +100,16 @@ def entered(
     """
     if len(calibrations) > len(words):
         raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
-    given = {"frame": root_frame, "rate": None if rate == 1.0 else rate, "loop": loop or None, **options}
+    given = {
+        "frame": how["root_frame"],
+        "rate": None if how["rate"] == 1.0 else how["rate"],
+        "loop": how["loop"] or None,
+    }
+    given |= options
     refuse_unused(words, {name: value for name, value in given.items() if value is not None})
     places = [*calibrations, *[None] * (len(words) - len(calibrations))]
     sources = [
-        source_of(
-            word, rate=rate, loop=loop, root_frame=root_frame, options=options_for(word, options), calibration=place
-        )
+        source_of(word, options=options_for(word, options), calibration=place, **how)
         for word, place in zip(words, places, strict=True)
     ]
     return Live(sources, on_message=print_message, eager=not several, network=network)
@@ -166,20 +157,10 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
 
 def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
     first = FirstFrame(live, frame)
-    settings = replace(
-        FrontEndSettings.of(first, use=wishes.kinds), depth_filter=wishes.depth_filter, exclude=wishes.boxes
-    )
-    how: dict[str, Any] = {
-        "body": None if wishes.body is None else Body.load(wishes.body),
-        "height": wishes.height,
-        "model": wishes.model,
-        "config": wishes.config,
-        "use": wishes.kinds,
-        "detector": wishes.detector,
-    }
-    if wishes.several:
-        return Follower(people=lambda: start_people(first, limit=wishes.limit, **how), settings=settings)
-    tracker = start_tracker(first, init=wishes.beginning, **how)
+    settings = replace(FrontEndSettings.of(first, use=wishes.start["use"]), **wishes.settings)
+    if wishes.limit != 1:
+        return Follower(people=lambda: start_people(first, limit=wishes.limit, **wishes.start), settings=settings)
+    tracker = start_tracker(first, init=wishes.beginning, **wishes.start)
     return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
 
 
@@ -189,7 +170,7 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
     if wishes.targets:
-        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame, several=wishes.several)
+        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame)
         outputs.append(files)
     if wishes.record is not None:
         outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
@@ -199,10 +180,14 @@ def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | Non
             viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
-        outputs.append(ShowOutput(viewer, several=wishes.several))
+        outputs.append(ShowOutput(viewer))
         if viewer.address:
             print_message(f"look at {viewer.address} in a browser")
     return outputs, files
+
+
+def _estimate_of(step: Step) -> Estimate | PeopleEstimate:
+    return step.people if step.front_end is None else step.estimates[ONE]
 
 
 class FileOutput(Output):
@@ -215,17 +200,16 @@ class FileOutput(Output):
     name = "files"
     waiting = 256
 
-    def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str], several: bool) -> None:
+    def __init__(self, paths: Sequence[Path], *, root_frame: Callable[[], str]) -> None:
         """Make the folder of the poses."""
         self._spool = Spool(paths, root_frame=root_frame, together=_TOGETHER)
-        self._several = several
         self._turn: Turn | None = None
         self.written: list[Path] = []
 
     def publish(self, step: Step) -> None:
         """See Output."""
         self._turn = step.turn
-        self._spool.add(step.people if self._several else step.estimates[ONE], step.bodies)
+        self._spool.add(_estimate_of(step), step.bodies)
 
     def close(self) -> None:
         """Write the files.
@@ -243,18 +227,14 @@ class ShowOutput(Output):
 
     name = "view"
 
-    def __init__(self, viewer: Viewer, *, several: bool) -> None:
-        """Store the arguments."""
-        self.viewer, self._several = viewer, several
+    def __init__(self, viewer: Viewer) -> None:
+        """Store the viewer."""
+        self.viewer = viewer
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        if self._several:
-            self.viewer.log_people(step.people, step.bodies, recorded=step.frame, seconds=step.seconds)
-            return
-        self.viewer.log(
-            step.estimates[ONE], step.bodies[ONE], recorded=step.frame, front_end=step.front_end, seconds=step.seconds
-        )
+        how: dict[str, Any] = {"recorded": step.frame, "front_end": step.front_end, "seconds": step.seconds}
+        self.viewer.log(_estimate_of(step), step.bodies, **how)
 
     def close(self) -> None:
         """See Output."""

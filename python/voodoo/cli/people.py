@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,17 +19,15 @@ if TYPE_CHECKING:
 ANY = "any"
 
 
-def limit_of(word: str) -> tuple[bool, int | None]:
-    """Parse "any" or a number from 1: whether several persons are tracked, and the largest number (None: any).
+def limit_of(word: str) -> int | None:
+    """Parse the largest number of persons, from 1, or "any": None.
 
     Raises:
         VoodooError: another word.
     """
-    if word == ANY:
-        return True, None
-    if not word.isdecimal() or int(word) < 1:
+    if word != ANY and (not word.isdecimal() or int(word) < 1):
         raise VoodooError(f"people: expected any or a whole number from 1, found {word!r}")
-    return int(word) > 1, int(word)
+    return None if word == ANY else int(word)
 
 
 def no_starts(init: str | None) -> Automatic:
@@ -54,15 +52,6 @@ def refuse_several(**options: object) -> None:
     for name, value in options.items():
         if value:
             raise VoodooError(f"{name.replace('_', '-')}: expected none with --people any or N, it is for one person")
-
-
-def judged(paths: Sequence[Path], result: Path, loader: str | None, options: Mapping[str, Any]) -> PeopleScore:
-    """Evaluate a result file of one recording."""
-    from voodoo.evaluation.people_evaluate import evaluate_result
-
-    if len(paths) != 1:
-        raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-    return evaluate_result(paths[0], result, loader=loader, options=options)
 
 
 def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import typer
@@ -17,29 +17,25 @@ from voodoo.cli.recover import recover_before
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
 from voodoo.detectors import AnyDetector, OnnxDetector
+from voodoo.drawing.ink import Picture
 from voodoo.errors import NoPoseError, VoodooError
 from voodoo.export.files import check_target, is_table
 from voodoo.export.spool import Spool
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
-from voodoo.model.body import Body
-from voodoo.people import People
 from voodoo.pipeline.floor import seen_floor
-from voodoo.pipeline.front_end import ONE
 from voodoo.pipeline.run import TrackedFrame
-from voodoo.pipeline.start import Beginning
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
-from voodoo.tracker import Tracker
 from voodoo.visualization.image_writer import PictureWriter
-from voodoo.visualization.ink import Picture
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.rerun_viewer import Viewer
 
+Target = TypeVar("Target", PictureWriter, Viewer)
 TOGETHER = 250
 """Frames whose poses a crash costs at most, and that are in memory."""
 
@@ -86,11 +82,6 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
     except ValueError:
         raise VoodooError(f"depth-range: expected NEAR,FAR in meters, found {words!r}") from None
     return DepthFilter(nearest=nearest, farthest=farthest)
-
-
-def bare_for(init: Beginning | None) -> dict[str, Any]:
-    """The option of `open_recording` that ignores files beside the recording if another start is given or searched for."""
-    return {} if init is None else {"bare": True}
 
 
 def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> None:
@@ -198,8 +189,6 @@ def run(
     steps: Iterable[Any],
     *,
     take: Callable[[Any], None],
-    draw: Callable[[Overlay, Any], Picture] | None = None,
-    show: Callable[[Viewer, Any], None] | None = None,
     overlay: Path | None = None,
     save: Path | None = None,
     viewer: Viewer | None = None,
@@ -212,8 +201,6 @@ def run(
         source: the recording.
         steps: its frames, tracked, of one person or several.
         take: keeps the poses of a frame. An OSError, also of the recording, ends the run.
-        draw: a picture of a frame, for `overlay`.
-        show: shows a frame in `viewer`.
         overlay: PictureWriter's path.
         save: file of the viewer.
         viewer: closed at the end.
@@ -232,25 +219,27 @@ def run(
         print_message(writer.note)
     drawing: list[Overlay] = []
 
-    def drawn(draw: Callable[[Overlay, Any], Picture], step: Any) -> None:  # noqa: ANN401 - of one person or several
+    def draw(writer: PictureWriter, step: TrackedFrame[Any]) -> None:
         if not drawing:
             with nullcontext() if left_out is None else left_out.aside():
                 drawing.append(Overlay(source))
-        picture = draw(drawing[0], step)
-        if writer is not None:
-            writer.write(picture)
+        about: dict[str, Any] = {"index": step.index, "front_end": step.front_end}
+        picture = drawing[0].draw(step.recorded, step.front_end.bodies, step.estimate, **about)
+        writer.write(picture)
         if step.index in chosen:
             pictures.append(picture)
+
+    def show(viewer: Viewer, step: TrackedFrame[Any]) -> None:
+        about: dict[str, Any] = {"recorded": step.recorded, "front_end": step.front_end, "seconds": step.seconds}
+        viewer.log(step.estimate, step.front_end.bodies, **about)
 
     with deferred() as ended, viewer or nullcontext(), writer or nullcontext():
         try:
             for step in progressing(steps, source.name, len(source)):
                 seconds.append(step.seconds)
                 take(step)
-                if viewer is not None and show is not None:
-                    _apart(viewer, show, viewer, step)
-                if writer is not None and draw is not None:
-                    _apart(writer, drawn, draw, step)
+                _apart(viewer, show, step)
+                _apart(writer, draw, step)
                 if interrupted := ended.is_set():
                     break
         except KeyboardInterrupt:
@@ -272,52 +261,13 @@ def run(
     return Run(seconds, pictures, interrupted, done, failures)
 
 
-def _apart(output: PictureWriter | Viewer, call: Callable[..., None], *arguments: object) -> None:
-    """Serve an output, unless it has failed."""
-    if output.failure is None:
+def _apart(output: Target | None, serve: Callable[[Target, TrackedFrame[Any]], None], step: TrackedFrame[Any]) -> None:
+    """Serve an output, unless there is none, or it has failed."""
+    if output is not None and output.failure is None:
         try:
-            call(*arguments)
+            serve(output, step)
         except Exception as error:
             output.failure = error
-
-
-def pictured(
-    tracker: Tracker | People,
-    keep: Callable[[Any, Mapping[int, Body]], None],
-    *,
-    refused: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
-    """How `run` keeps, draws and shows the frames.
-
-    Args:
-        tracker: which makes the estimates.
-        keep: takes an estimate, and the bodies of the persons by number.
-        refused: takes the reason why somebody who was detected is not tracked.
-    """
-    bodies: dict[int, Body] = {}
-
-    def take(step: TrackedFrame[Any]) -> None:
-        if refused is not None and tracker.refusal:
-            refused(tracker.refusal)
-        if isinstance(tracker, People):
-            bodies.update({person.id: tracker.body(person.id) for person in step.estimate})
-        else:
-            bodies[ONE] = tracker.body
-        keep(step.estimate, bodies)
-
-    def draw(drawing: Overlay, step: TrackedFrame[Any]) -> Picture:
-        if isinstance(tracker, People):
-            return drawing.draw_people(step.recorded, step.estimate, bodies, index=step.index)
-        return drawing.draw(step.recorded, bodies[ONE], step.estimate, index=step.index, front_end=step.front_end)
-
-    def show(viewer: Viewer, step: TrackedFrame[Any]) -> None:
-        how: dict[str, Any] = {"recorded": step.recorded, "seconds": step.seconds}
-        if isinstance(tracker, People):
-            viewer.log_people(step.estimate, bodies, **how)
-        else:
-            viewer.log(step.estimate, bodies[ONE], front_end=step.front_end, **how)
-
-    return {"take": take, "draw": draw, "show": show}
 
 
 def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
     numbers_of,
@@ -18,30 +19,6 @@ from voodoo.cli.common import (
     states,
     topics_of,
     wrote,
-)
-from voodoo.cli.options import (
-    BackgroundOption,
-    BodyOption,
-    ConfigOption,
-    DepthRangeOption,
-    DetectorOption,
-    ExcludeOption,
-    FrameOption,
-    HeightOption,
-    InitOption,
-    KeypointsOption,
-    LayoutOption,
-    LoaderNumberOption,
-    LoaderOption,
-    ModelOption,
-    OutOrNameOption,
-    PeopleOption,
-    RecordingArgument,
-    StrictOption,
-    TopicOption,
-    UprightOption,
-    UseOption,
-    ViewOption,
 )
 from voodoo.cli.signals import INTERRUPTED, deferred
 from voodoo.errors import NoPoseError
@@ -55,16 +32,16 @@ if TYPE_CHECKING:
 
 def track_command(
     context: typer.Context,
-    recording: RecordingArgument,
-    init: InitOption = None,
-    body: BodyOption = None,
-    height: HeightOption = None,
-    model: ModelOption = None,
-    config: ConfigOption = None,
-    detector: DetectorOption = None,
-    people: PeopleOption = "1",
-    out: OutOrNameOption = None,
-    upright: UprightOption = False,
+    recording: options.RecordingArgument,
+    init: options.InitOption = None,
+    body: options.BodyOption = None,
+    height: options.HeightOption = None,
+    model: options.ModelOption = None,
+    config: options.ConfigOption = None,
+    detector: options.DetectorOption = None,
+    people: options.PeopleOption = "1",
+    out: options.OutOrNameOption = None,
+    upright: options.UprightOption = False,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a video.")
     ] = None,
@@ -74,28 +51,28 @@ def track_command(
             "--draw-regions", help="Also draw the color regions of the body and the color edges in --overlay."
         ),
     ] = False,
-    view: ViewOption = False,
+    view: options.ViewOption = False,
     save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write the data of --view to a file.")] = None,
-    use: UseOption = None,
-    depth_range: DepthRangeOption = None,
+    use: options.UseOption = None,
+    depth_range: options.DepthRangeOption = None,
     with_: Annotated[
         list[Path] | None,
         typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
     ] = None,
     offset: Annotated[float, typer.Option(metavar="S", help="Seconds to add to the stamps of --with.")] = 0.0,
-    keypoints: KeypointsOption = None,
-    layout: LayoutOption = None,
+    keypoints: options.KeypointsOption = None,
+    layout: options.LayoutOption = None,
     marker_map: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="TOML that assigns the markers of .trc and .c3d files to sites."),
     ] = None,
-    topic: TopicOption = None,
-    frame: FrameOption = None,
-    loader: LoaderOption = None,
-    option: LoaderNumberOption = None,
-    exclude: ExcludeOption = None,
-    background: BackgroundOption = None,
-    strict: StrictOption = False,
+    topic: options.TopicOption = None,
+    frame: options.FrameOption = None,
+    loader: options.LoaderOption = None,
+    option: options.LoaderNumberOption = None,
+    exclude: options.ExcludeOption = None,
+    background: options.BackgroundOption = None,
+    strict: options.StrictOption = False,
 ) -> None:
     """Find a person in a recording, track them, and write one row per frame.
 
@@ -145,14 +122,12 @@ def track_command(
     from voodoo.cli.closing import closing_doubts, closing_lines
     from voodoo.cli.people import limit_of, no_starts, refuse_several
     from voodoo.cli.running import (
-        bare_for,
         boxes_of,
         config_of,
         depth_filter_of,
         detector_of,
         kinds_of,
         opened,
-        pictured,
         refuse_unused,
         run,
         spool_of,
@@ -164,7 +139,7 @@ def track_command(
     from voodoo.export.upright import lying_words
     from voodoo.model.body import Body
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
-    from voodoo.pipeline.run import track
+    from voodoo.pipeline.run import TrackedFrame, track
     from voodoo.pipeline.start import AUTO, beginning_of, start_people, start_tracker, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
@@ -178,22 +153,22 @@ def track_command(
             raise typer.BadParameter("--offset is for the stamps of --with, give both")
         kinds, left_out = kinds_of(use), None if strict else LeftOut()
         depth_filter, boxes = depth_filter_of(depth_range), boxes_of(exclude)
-        several, limit = limit_of(people)
+        limit = limit_of(people)
+        several = limit != 1
         beginning = no_starts(init) if several else beginning_of(init)
+        bare = beginning is not None
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         numbers, others = numbers_of(option), with_ or ()
         about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": kinds}
-        options = topics_of(topic) | loader_options(recording, loader, **about)
+        asked = topics_of(topic) | loader_options(recording, loader, **about)
         if background is not None:
-            options["background"] = background
+            asked["background"] = background
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
         taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
-        options |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
+        asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         folders, network = keypoint_words(keypoints or (), layout)
         source = join(
-            opened(
-                recording, options.pop("loader", loader), frame, left_out=left_out, **options, **bare_for(beginning)
-            ),
+            opened(recording, asked.pop("loader", loader), frame, left_out=left_out, bare=bare, **asked),
             keypoints=folders,
             network=network,
             layout=layout,
@@ -202,7 +177,7 @@ def track_command(
             markers=markers,
             numbers=numbers,
             left_out=left_out,
-            **bare_for(beginning),
+            bare=bare,
         )
         for words in source.assumed:
             print_message(words)
@@ -239,11 +214,15 @@ def track_command(
             else:
                 tracker = start_tracker(source, init=beginning, **start)
             starts = starts_of(beginning, source)
-            how["steps"] = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+            steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
             refusals: Counter[str] = Counter()
-            how |= pictured(tracker, spool.add, refused=lambda words: refusals.update([words]))
+
+            def take(step: TrackedFrame[Any]) -> None:
+                refusals.update([tracker.refusal] if tracker.refusal else [])
+                spool.add(step.estimate, step.front_end.bodies)
+
             with deferred():
-                done = run(source, **how)
+                done = run(source, steps, take=take, **how)
                 sample = spool.sample()
                 turn = turn_of(source, sample, targets, upright=upright)
                 files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)

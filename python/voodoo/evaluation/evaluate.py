@@ -10,10 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -84,18 +83,8 @@ def evaluate(
         truth = _truth_at(recording, estimate.stamp)
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         observed = witness(frame.recorded, tracker, estimate, truth, selection)
-        measured = called_measured(estimate)
-        steps.append(
-            _Step(
-                float(estimate.stamp),
-                str(estimate.status),
-                frame.seconds,
-                joints,
-                measured,
-                observed,
-                sigma_of(estimate),
-            )
-        )
+        known = joints, called_measured(estimate), sigma_of(estimate)
+        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, observed, *known))
     if not steps:
         raise RecordingError(f"{path}: expected at least one frame, found none")
     return _score(recording, path, selection, steps)
@@ -220,25 +209,22 @@ def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
     return dict(zip(reference.names, positions, strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
+class _Step(NamedTuple):
     """Data kept from a frame; the images of a whole recording would fill the memory."""
 
     stamp: float
     status: str
     seconds: float
+    witness: FrameWitness
     joints: FloatArray
     measured: BoolArray
-    witness: FrameWitness
     sigma: FloatArray
 
 
 def _score(recording: Recording, path: Path, selection: Selection, steps: Sequence[_Step]) -> tuple[Score, FrameTable]:
-    stamps = np.array([step.stamp for step in steps])
-    status = tuple(step.status for step in steps)
-    seconds = np.array([step.seconds for step in steps])
-    positions = np.array([step.joints for step in steps])
-    overlaps = np.array([step.witness.iou for step in steps])
+    stamp, status, time, seen, joints, known, spread = zip(*steps, strict=True)
+    stamps, seconds, positions, measured, sigma = map(np.array, (stamp, time, joints, known, spread))
+    overlaps, within = (np.array([getattr(one, name) for one in seen]) for name in ("iou", "within"))
     whole = _reference_positions(recording, stamps)
     exact = None if recording.reference is None else recording.reference.exact
     reference = metrics.without_contradictions(whole) if exact is False else whole
@@ -255,9 +241,8 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
     without = metrics.without_offsets(positions, compared)
     class_without, _ = metrics.tracking_class(np.where(missed, NOWHERE_M, without), stamps, limit=limit)
     still = metrics.standing_still(reference, stamps)
-    distances = np.concatenate([step.witness.distances for step in steps])
-    about_joints = np.concatenate([step.witness.about_joints for step in steps])
-    measured = np.array([step.measured for step in steps])
+    distances = np.concatenate([one.distances for one in seen])
+    about_joints = np.concatenate([one.about_joints for one in seen])
     angle_error, angle_spread = metrics.angle_error(positions, compared)
     first_wait, first_error = _first_pose(stamps, status, whole, errors0)
     far, near = (limb_ends(errors, far=which) for which in (True, False))
@@ -304,8 +289,6 @@ def _score(recording: Recording, path: Path, selection: Selection, steps: Sequen
         if exact is False
         else np.nan,
     )
-    within = np.array([step.witness.within for step in steps])
-    sigma = np.array([step.sigma for step in steps])
     deviations = None if exact is None else Deviations(positions - compared, sigma, measured)
     return score, FrameTable(stamps, status, errors, lost, within, overlaps, seconds, deviations)
 

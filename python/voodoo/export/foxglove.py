@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from voodoo.errors import VoodooError
+from voodoo.errors import installed
 from voodoo.export.human_frames import human_frames, placed_names
 from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.template import STAMP_NS, Template
@@ -35,15 +35,10 @@ def library(wanted: object) -> ModuleType:
     Raises:
         VoodooError: it is not installed; `wanted` needs it.
     """
-    try:
-        import foxglove
-        import foxglove.channels
-        import foxglove.messages
-    except ImportError:
-        raise VoodooError(
-            f"{wanted}: expected foxglove-sdk, found none; pip install 'voodoo-tracker[foxglove]'"
-        ) from None
-    return foxglove
+    missing = f"{wanted}: expected foxglove-sdk, found none; pip install 'voodoo-tracker[foxglove]'"
+    for part in ("channels", "messages"):
+        installed(f"foxglove.{part}", missing)
+    return installed("foxglove", missing)
 
 
 class Channels:

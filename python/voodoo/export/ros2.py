@@ -118,11 +118,33 @@ def write_people_bag(
         VoodooError: as `write_bag`.
         OSError: the bag cannot be written.
     """
+    path = Path(path)
     for name in people:
         if not name.isidentifier():
             raise VoodooError(f"person: expected a name, found {name!r}")
     humans = [_Human(track, body, name, root_frame, turn) for name, (track, body) in people.items()]
-    _write(path, humans, markers=markers)
+    if path.exists():
+        raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
+    kinds = {"/tf": TF, TRACKED: IDS}
+    first: dict[str, Any] = {}
+    frames: list[tuple[float, int, int]] = []
+    there: dict[float, list[str]] = {}
+    for number, human in enumerate(humans):
+        kinds |= human.kinds(markers) | {f"/human_description_{human.person}": STRING}
+        first |= description(human.body, human.person)
+        frames += [(float(stamp), number, index) for index, stamp in enumerate(human.track.stamps)]
+    frames.sort()
+    for stamp, number, index in frames:
+        there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])
+    with appearing_whole(path) as place, Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
+        for stamp, number, index in frames:
+            messages = first | humans[number].messages(index, markers=markers)
+            if stamp in there:
+                messages |= tracked(stamp, there.pop(stamp), root_frame=humans[number].root)
+            first = {}
+            for name, message in messages.items():
+                writer.write(connect[name], round(stamp * 1e9), cdr(message))
 
 
 class _Human:
@@ -227,37 +249,6 @@ def pose_message(nanoseconds: int, root: str, row: Sequence[float], covariance: 
             covariance=np.asarray(covariance, dtype=np.float64).ravel(),
         ),
     )
-
-
-def _write(path: str | Path, humans: Sequence[_Human], *, markers: bool) -> None:
-    path = Path(path)
-    if path.exists():
-        raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    kinds = {"/tf": TF, TRACKED: IDS}
-    for human in humans:
-        kinds |= human.kinds(markers) | {f"/human_description_{human.person}": STRING}
-    frames = sorted(
-        (float(stamp), number, index)
-        for number, human in enumerate(humans)
-        for index, stamp in enumerate(human.track.stamps)
-    )
-    with appearing_whole(path) as place, Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        there: dict[float, list[str]] = {}
-        for stamp, number, index in frames:
-            there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])
-        connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
-        first = (
-            {}
-            if not frames
-            else {name: text for one in humans for name, text in description(one.body, one.person).items()}
-        )
-        for stamp, number, index in frames:
-            messages = first | humans[number].messages(index, markers=markers)
-            if stamp in there:
-                messages |= tracked(stamp, there.pop(stamp), root_frame=humans[number].root)
-            first = {}
-            for name, message in messages.items():
-                writer.write(connect[name], round(stamp * 1e9), STORE.serialize_cdr(message, message.__msgtype__))
 
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401

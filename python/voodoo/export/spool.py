@@ -29,13 +29,11 @@ from voodoo.export.upright import SUFFIX as ROOT_SUFFIX
 from voodoo.export.upright import UNTURNED, Turn, by_axes, by_feet, turned
 from voodoo.model.body import Body
 from voodoo.names import SEARCHING
-from voodoo.people import PeopleEstimate, Person
+from voodoo.people import ONE, PeopleEstimate, everybody
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, naming, removed
 
-ONE = 1
-"""Number of the person if only one is tracked."""
 _BODIES_S = 10.0
 """Time between two copies of the bodies, which take long to write [s]."""
 _SAMPLED = 3
@@ -97,8 +95,7 @@ class Spool:
             OSError: they cannot be put on the disk; they are in memory then.
         """
         self._numbered = isinstance(estimate, PeopleEstimate)
-        if not isinstance(estimate, PeopleEstimate | Track):
-            estimate = PeopleEstimate(estimate.stamp, (Person(ONE, estimate),))
+        estimate = estimate if isinstance(estimate, Track) else everybody(estimate)
         self._waiting.append(estimate)
         self._bodies.update(bodies)
         self.frames += 1

@@ -3,27 +3,16 @@
 docs/how-to/inverse-kinematics.md explains the method; the solver is in the compiled core.
 """
 
-from voodoo.ik.chain import Chain
-from voodoo.ik.image import Silhouette, signed_distance
-from voodoo.ik.options import Options
-from voodoo.ik.posture import Posture, Postures
-from voodoo.ik.rest import Rest
-from voodoo.ik.solve import Follower, solve, solve_many
-from voodoo.ik.targets import Target, Targets
-from voodoo.ik.values import Bone
-
-__all__ = [
-    "Bone",
-    "Chain",
-    "Follower",
-    "Options",
-    "Posture",
-    "Postures",
-    "Rest",
-    "Silhouette",
-    "Target",
-    "Targets",
-    "signed_distance",
-    "solve",
-    "solve_many",
-]
+from voodoo.ik.chain import Chain as Chain
+from voodoo.ik.image import Silhouette as Silhouette
+from voodoo.ik.image import signed_distance as signed_distance
+from voodoo.ik.options import Options as Options
+from voodoo.ik.posture import Posture as Posture
+from voodoo.ik.posture import Postures as Postures
+from voodoo.ik.rest import Rest as Rest
+from voodoo.ik.solve import Follower as Follower
+from voodoo.ik.solve import solve as solve
+from voodoo.ik.solve import solve_many as solve_many
+from voodoo.ik.targets import Target as Target
+from voodoo.ik.targets import Targets as Targets
+from voodoo.ik.values import Bone as Bone

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, Generic, TypeVar, cast, overload
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from voodoo._core import Estimate, Frame
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.names import INPUTS, SEARCHING
-from voodoo.people import Followed, People, PeopleEstimate
+from voodoo.people import ONE, Followed, People, PeopleEstimate, everybody
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.starts.base import FoundStart, StartFrame
@@ -35,9 +35,14 @@ from voodoo.tracker import Tracker
 __all__ = ["INPUTS", "LEVEL_FRAMES", "ONE", "FrontEnd", "FrontEndSettings", "nobody", "paired"]
 
 E = TypeVar("E", Estimate, PeopleEstimate)
+E_co = TypeVar("E_co", Estimate, PeopleEstimate, covariant=True)
 
-ONE = 1
-"""Number of the person if a `Tracker` follows one."""
+
+class Steps(Protocol[E_co]):
+    """A `Tracker` or `People`, by what it estimates."""
+
+    def step(self, frame: Frame, /) -> E_co:
+        """Estimate the time of the frame."""
 
 
 @dataclass
@@ -67,27 +72,11 @@ class FrontEnd(Generic[E]):
         rays: rays of the last frame, with their trust.
     """
 
-    @overload
     def __init__(
-        self: FrontEnd[Estimate],
-        tracker: Tracker,
-        *,
-        settings: FrontEndSettings | None = None,
-        starts: Starts | None = None,
-    ) -> None: ...
-    @overload
-    def __init__(
-        self: FrontEnd[PeopleEstimate],
-        tracker: People,
-        *,
-        settings: FrontEndSettings | None = None,
-        starts: Starts | None = None,
-    ) -> None: ...
-    def __init__(
-        self, tracker: Tracker | People, *, settings: FrontEndSettings | None = None, starts: Starts | None = None
+        self, tracker: Steps[E], *, settings: FrontEndSettings | None = None, starts: Starts | None = None
     ) -> None:
         """Start from the current state of the tracker."""
-        self.tracker = tracker
+        self.tracker = cast(Tracker | People, tracker)
         self.settings = settings or FrontEndSettings()
         self.memory = Memory()
         self.rays: list[SiteRay] = []
@@ -97,15 +86,22 @@ class FrontEnd(Generic[E]):
         self._alive: Sequence[Any] = ()
         self._persons: dict[int, _Person] = {}
         self._lost = False
-        if not isinstance(tracker, People) and tracker.estimate.joints:
+        # Adapters of the scene query the tracked person; of several there is no single one.
+        self._single = Tracker(self.tracker.prototype) if isinstance(self.tracker, People) else self.tracker
+        if self._single.estimate.joints:
             self._persons[ONE] = self._new(trusted_start=True)
-        # Adapters of the scene query the tracked person; among several there is no single one.
-        self._nobody = Tracker(Body.human()) if isinstance(tracker, People) else tracker
 
     @property
     def posed(self) -> bool:
         """Whether anybody is tracked."""
         return bool(self._persons)
+
+    @property
+    def bodies(self) -> dict[int, Body]:
+        """Number -> body, with current sizes, of the persons of the last frame; until the next one."""
+        if isinstance(self.tracker, People):
+            return {person.id: self.tracker.body(person.id) for person in self.tracker.estimate}
+        return {ONE: self.tracker.body}
 
     @property
     def frozen(self) -> tuple[str, ...]:
@@ -170,9 +166,9 @@ class FrontEnd(Generic[E]):
             if any(adapter.kind in use for adapter in adapters_of(item)) or (clothes and _is_colored(item))
         ]
         self._take_given(stamp, used)
-        persons = self._contexts(stamp, alive)
+        persons = self._contexts(stamp)
         frame = Frame(stamp=stamp)
-        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, alive, self._nobody)
+        scene = next(iter(persons.values())) if alone and persons else self._context(stamp, self._single)
         scene.add_scene(frame)
         own = {number: frame if alone else Frame(stamp=stamp) for number in persons}
         spare: list[Any] = []
@@ -206,32 +202,25 @@ class FrontEnd(Generic[E]):
         detected = self._detect(frame, spare)
         return frame, {number: own[number] for number in sorted(filled)}, detected
 
-    def _contexts(self, stamp: float, alive: Sequence[Any]) -> dict[int, Context]:
+    def _contexts(self, stamp: float) -> dict[int, Context]:
         """What the adapters may read about every person who is tracked."""
-        bodies: dict[int, Tracker | Followed] = {}
+        bodies: dict[int, Tracker | Followed] = dict.fromkeys(self._persons, self._single)
         if isinstance(self.tracker, People):
             bodies = {number: Followed(self.tracker, number) for number in self.tracker.numbers}
-        elif self._persons:
-            bodies = {ONE: self.tracker}
         everybody = {}
         for number, body in bodies.items():
             if number not in self._persons:
                 self._persons[number] = self._new(trusted_start=False)
             others = [other for other in bodies.values() if other is not body and isinstance(other, Followed)]
-            everybody[number] = self._context(stamp, alive, body, self._persons[number], others)
+            everybody[number] = self._context(stamp, body, self._persons[number], others)
         return everybody
 
     def _context(
-        self,
-        stamp: float,
-        alive: Sequence[Any],
-        tracker: Tracker | Followed,
-        person: _Person | None = None,
-        others: Sequence[Followed] = (),
+        self, stamp: float, tracker: Tracker | Followed, person: _Person | None = None, others: Sequence[Followed] = ()
     ) -> Context:
         return Context(
             stamp=stamp,
-            measurements=alive,
+            measurements=self._alive,
             predicted=tracker.predict(stamp) if person else {},
             settings=self.settings,
             tracker=tracker,
@@ -262,10 +251,9 @@ class FrontEnd(Generic[E]):
         if not (spare or found):
             return False
         alone = not isinstance(self.tracker, People)
-        body = self.tracker.prototype if isinstance(self.tracker, People) else self.tracker.body
         for finder in self._starts.finders:
             if not found and not finder.given:
-                found = finder.find(StartFrame(frame.stamp, spare, body, self.settings))
+                found = finder.find(StartFrame(frame.stamp, spare, self._single.body, self.settings))
         # A single person is there; of several detections the best one is followed.
         for one in found[:1] if alone else found:
             weight = self.settings.model.weight(float(np.median(list(one.sigma.values()))))
@@ -275,15 +263,12 @@ class FrontEnd(Generic[E]):
 
     def _learn(self, estimate: Estimate | PeopleEstimate, *, trusted_start: bool) -> None:
         """Update what is kept of the persons who are there, and forget the others."""
-        if isinstance(estimate, PeopleEstimate):
-            there = {person.id: person.estimate for person in estimate}
-        else:
-            status = str(estimate.status)
-            there, self._lost = {ONE: estimate} if status != SEARCHING else {}, status == "lost"
-            if self._persons and not there:
-                # The next person moves and looks different.
-                for adapter in all_adapters():
-                    adapter.forget(self.memory)
+        there = {person.id: person.estimate for person in everybody(estimate) if person.status != SEARCHING}
+        self._lost = any(found.status == "lost" for found in there.values())
+        if self._persons and not there:
+            # The next person moves and looks different.
+            for adapter in all_adapters():
+                adapter.forget(self.memory)
         self.found = self.found if there else None
         self.rays = self.rays if there else []
         self._persons = {number: person for number, person in self._persons.items() if number in there}

@@ -31,7 +31,7 @@ class FrozenSensors:
         measurements: Sequence[Measurement],
         *,
         use: Sequence[str],
-        idle: Callable[[Measurement], bool] | None = None,
+        idle: Callable[[Measurement], bool],
     ) -> list[Measurement]:
         """The measurements whose sensor is not frozen.
 
@@ -41,8 +41,8 @@ class FrozenSensors:
         """
         repeats: list[Measurement] = []
         changes = False
-        for item in measurements if idle is None else sorted(measurements, key=idle):
-            if idle is not None and idle(item) and not repeats:
+        for item in sorted(measurements, key=idle):
+            if idle(item) and not repeats:
                 continue
             content = _content(item, use)
             if content is None:

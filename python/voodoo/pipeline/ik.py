@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -18,7 +17,7 @@ from voodoo.ik.options import Options
 from voodoo.ik.posture import Posture
 from voodoo.ik.solve import Follower, solve
 from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
-from voodoo.recordings.recording import Recording
+from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
 from voodoo.sensors.silhouettes.color import StillBackground
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth
@@ -38,44 +37,27 @@ _LEARN = 41
 _REACHED_M = 0.05
 
 
-@dataclass(frozen=True, eq=False)
-class Positions:
-    """Positions (F, J, 3) [m] of J sites at F stamps [s], in the recording's root frame; NaN = missing."""
+def known_positions(recording: Recording, result: Track | None = None) -> Reference:
+    """Positions of sites from a result, or the recording's reference.
 
-    stamps: FloatArray
-    names: tuple[str, ...]
-    values: FloatArray
-
-    @classmethod
-    def of(cls, recording: Recording, result: Track | None = None) -> Positions:
-        """Positions from a result, or from the recording's reference.
-
-        Raises:
-            VoodooError: the recording has no reference and no result was given, or the result covers another time span.
-        """
-        if result is not None:
-            about = recording.info()
-            low, high = about.start_stamp - _SAME_TIME_S, about.start_stamp + about.duration + _SAME_TIME_S
-            if not ((result.stamps >= low) & (result.stamps <= high)).any():
-                found = f"{result.stamps.min():.3f} to {result.stamps.max():.3f} s" if len(result) else "none"
-                raise VoodooError(
-                    f"targets: expected stamps between {low:.3f} and {high:.3f} s as in {recording.name}, found {found}"
-                )
-            return cls(result.stamps, result.joint_names, result.joints)
-        if recording.reference is None:
+    Raises:
+        VoodooError: the recording has no reference and no result was given, or the result covers another time span.
+    """
+    if result is not None:
+        about = recording.info()
+        low, high = about.start_stamp - _SAME_TIME_S, about.start_stamp + about.duration + _SAME_TIME_S
+        if not ((result.stamps >= low) & (result.stamps <= high)).any():
+            found = f"{result.stamps.min():.3f} to {result.stamps.max():.3f} s" if len(result) else "none"
             raise VoodooError(
-                f"{recording.name}: expected positions of known sites, found no reference in the recording; "
-                "give a result of voodoo track"
+                f"targets: expected stamps between {low:.3f} and {high:.3f} s as in {recording.name}, found {found}"
             )
-        return cls(recording.reference.stamps, recording.reference.names, recording.reference.positions)
-
-    def at(self, stamp: float, sites: Sequence[str]) -> dict[str, FloatArray]:
-        """Sites with a known position within 20 ms of a time; empty if there is none."""
-        index = int(np.argmin(np.abs(self.stamps - stamp)))
-        if abs(self.stamps[index] - stamp) > _SAME_TIME_S:
-            return {}
-        row = {name: self.values[index, self.names.index(name)] for name in sites if name in self.names}
-        return {name: position for name, position in row.items() if np.isfinite(position).all()}
+        return Reference(result.stamps, result.joint_names, result.joints, exact=False)
+    if recording.reference is None:
+        raise VoodooError(
+            f"{recording.name}: expected positions of known sites, found no reference in the recording; "
+            "give a result of voodoo track"
+        )
+    return recording.reference
 
 
 class Solved(NamedTuple):
@@ -89,7 +71,7 @@ class Solved(NamedTuple):
 def follow(
     recording: Recording,
     tracker: Tracker,
-    positions: Positions,
+    positions: Reference,
     *,
     sites: Sequence[str] | None = None,
     pictures: Pictures = "depth",
@@ -146,14 +128,18 @@ def follow(
         first, seen = True, False
         for recorded in recording:
             began = time.perf_counter()
-            targets = positions.at(recorded.stamp, known)
+            targets = positions.at(recorded.stamp, known, within=_SAME_TIME_S)
             observed = {**last, **targets} if warm else targets
             images = _silhouettes(recorded, observed, scenes, level=level) if targets else []
             colors = [item for item in recorded.measurements if isinstance(item, ColorImage)] if regions else []
             if regions is not None and targets:
                 # The first frame is the one whose posture is known.
                 plain = tracker.estimate if first else solve(chain, targets, start=near, options=options)
-                images = _cut_out(regions, colors, plain.world_from_limb)
+                found = zip(regions.of(colors, plain.world_from_limb), colors, strict=True)
+                images = [
+                    Silhouette(mask, camera=lens, world_from_camera=item.root_from_sensor)
+                    for (mask, lens), item in found
+                ]
             if warm:
                 posture = follower.step(targets, images=images)
             else:
@@ -162,7 +148,7 @@ def follow(
             first, seen = False, seen or posture.images > 0
             if regions is not None and targets:
                 regions.learn(colors, posture.world_from_limb)
-            truth = positions.at(recorded.stamp, others)
+            truth = positions.at(recorded.stamp, others, within=_SAME_TIME_S)
             errors = {name: float(np.linalg.norm(posture.joints[name] - place)) for name, place in truth.items()}
             yield Solved(_track(recorded.stamp, posture), errors, time.perf_counter() - began)
         if regions is not None and not seen:
@@ -207,16 +193,8 @@ def _silhouettes(
     return found
 
 
-def _cut_out(
-    regions: RegionSilhouettes, pictures: Sequence[ColorImage], world_from_limb: Mapping[str, npt.ArrayLike]
-) -> list[Silhouette]:
-    """Silhouettes of all images by color, near a posture."""
-    found = zip(regions.of(pictures, world_from_limb), pictures, strict=True)
-    return [Silhouette(mask, camera=camera, world_from_camera=item.root_from_sensor) for (mask, camera), item in found]
-
-
 def _scenes(
-    recording: Recording, positions: Positions, known: Sequence[str], pictures: Pictures
+    recording: Recording, positions: Reference, known: Sequence[str], pictures: Pictures
 ) -> dict[str, StillScene | StillBackground]:
     """Background image of each camera, from images spread over the recording; cameras are assumed to be static."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
@@ -229,7 +207,9 @@ def _scenes(
             if pictures == "depth" and isinstance(item, DepthImage):
                 depths.setdefault(item.sensor, []).append(item)
             elif pictures == "color" and isinstance(item, ColorImage):
-                there = surroundings(positions.at(recorded.stamp, known), item.camera, item.root_from_sensor)
+                there = surroundings(
+                    positions.at(recorded.stamp, known, within=_SAME_TIME_S), item.camera, item.root_from_sensor
+                )
                 colors.setdefault(item.sensor, []).append((item.image, there))
     if not depths and not colors:
         raise VoodooError(f"{recording.name}: expected {pictures} pictures, found none; --pictures says where to look")

@@ -88,8 +88,12 @@ def join(
     if keypoints:
         recording = WithKeypoints(recording, keypoints, layout=layout, left_out=left_out)
     if others:
-        how: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers}
-        opened = [_open(path, recording, bare=bare, left_out=left_out, **how) for path in others]
+        opened = []
+        for path in others:
+            options = loader_options(path, None, markers=markers, layout=layout, numbers=numbers)
+            if path.exists() and guess_loader(path) in ("ros1", "ros2"):
+                options["root_frame"] = recording.root_frame
+            opened.append(open_recording(path, bare=bare, left_out=left_out, **options))
         recording = Joined(recording, opened, offset=offset)
     return recording if network is None else Detected(recording, network, left_out=left_out)
 
@@ -127,21 +131,3 @@ def pictures_alone(path: Path, loader: str | None, use: Sequence[str] | None) ->
     if name in ("ros1", "ros2"):
         return {"use": ("color",)}
     return {"loader": "videos"} if loader is None and name == "pose2sim" and picture_sources(path) else {}
-
-
-def _open(
-    path: Path,
-    first: Recording,
-    *,
-    markers: MarkerMap | None,
-    layout: str | None,
-    numbers: Mapping[str, float] | None,
-    bare: bool,
-    left_out: LeftOut | None,
-) -> Recording:
-    options = loader_options(path, None, markers=markers, layout=layout, numbers=numbers)
-    if path.exists() and guess_loader(path) in ("ros1", "ros2"):
-        options["root_frame"] = first.root_frame
-    if bare:
-        options["bare"] = True
-    return open_recording(path, left_out=left_out, **options)

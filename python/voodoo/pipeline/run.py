@@ -5,20 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, overload
+from typing import Generic
 
-from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.measurements import ColorImage, Measurement, RecordedFrame
-from voodoo.people import People, PeopleEstimate
-from voodoo.pipeline.front_end import E, FrontEnd
+from voodoo.people import People
+from voodoo.pipeline.front_end import E, FrontEnd, Steps
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.start import Init, check_findable, start_tracker
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.tracker import Tracker
 
 __all__ = ["Init", "TrackedFrame", "decodable", "start_tracker", "track"]
 
@@ -55,32 +53,14 @@ class TrackedFrame(Generic[E]):
     front_end: FrontEnd[E]
 
 
-@overload
 def track(
     recording: Recording,
-    tracker: Tracker,
+    tracker: Steps[E],
     *,
     settings: FrontEndSettings | None = None,
     starts: Starts | None = None,
     left_out: LeftOut | None = None,
-) -> Iterator[TrackedFrame[Estimate]]: ...
-@overload
-def track(
-    recording: Recording,
-    tracker: People,
-    *,
-    settings: FrontEndSettings | None = None,
-    starts: Starts | None = None,
-    left_out: LeftOut | None = None,
-) -> Iterator[TrackedFrame[PeopleEstimate]]: ...
-def track(
-    recording: Recording,
-    tracker: Any,
-    *,
-    settings: FrontEndSettings | None = None,
-    starts: Starts | None = None,
-    left_out: LeftOut | None = None,
-) -> Iterator[TrackedFrame[Any]]:
+) -> Iterator[TrackedFrame[E]]:
     """Step the tracker through a recording, by the front end that every command uses.
 
     Between two yields `tracker` holds the model of the frame yielded last.
@@ -98,7 +78,7 @@ def track(
     settings = settings or FrontEndSettings.of(recording)
     if isinstance(tracker, People):
         check_findable(recording, tracker, settings.use)
-    front_end: FrontEnd[Any] = FrontEnd(tracker, settings=settings, starts=starts)
+    front_end = FrontEnd(tracker, settings=settings, starts=starts)
     for index, recorded in enumerate(paired(recording)):
         began = time.perf_counter()
         try:

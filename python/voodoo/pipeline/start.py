@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import ConfigDict, Field, FiniteFloat
 
@@ -172,32 +172,34 @@ def start_tracker(
 def start_people(
     recording: Recording,
     *,
-    body: Body | None = None,
-    height: float | None = None,
-    model: HumanModel | None = None,
-    config: Config | None = None,
-    markers: MarkerMap | None = None,
-    use: Sequence[str] | None = None,
-    detector: AnyDetector = "shipped",
     limit: int | None = None,
+    use: Sequence[str] | None = None,
+    config: Config | None = None,
+    detector: AnyDetector = "shipped",
+    **body: Any,  # noqa: ANN401 - of start_tracker
 ) -> People:
     """A tracker of the persons in a recording, who are found as they come.
 
     Args:
-        body, height, model, config, markers, use, detector: see `start_tracker`.
         limit: largest number of persons, see `People`.
+        use, config, detector: see `start_tracker`.
+        **body: body, height, model, markers: see `start_tracker`.
 
     Raises:
         VoodooError: see `start_tracker`.
     """
-    body = _body(body, height=height, model=model, markers=markers, legs=False)
-    people = People(body, config=config, detector=detector, limit=limit)
+    people = People(_body(**body), config=config, detector=detector, limit=limit)
     check_findable(recording, people, use)
     return people
 
 
 def _body(
-    body: Body | None, *, height: float | None, model: HumanModel | None, markers: MarkerMap | None, legs: bool
+    body: Body | None = None,
+    *,
+    height: float | None = None,
+    model: HumanModel | None = None,
+    markers: MarkerMap | None = None,
+    legs: bool = False,
 ) -> Body:
     """The body to track; by default a human, or two legs."""
     if body is not None and height is not None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
+from voodoo.model.projection import transform
 from voodoo.recordings.joint_table import read_positions
 from voodoo.stored import MOST_BYTES
 
@@ -92,6 +93,5 @@ def _by_person(
     positions = np.full((len(stamps), len(persons), len(names), 3), np.nan)
     positions[frame, column] = table[:, 3:].reshape(len(table), len(names), 3)
     for index, stamp in enumerate(stamps):
-        root_from_base = root_from_truth(float(stamp))
-        positions[index] = positions[index] @ root_from_base[:3, :3].T + root_from_base[:3, 3]
+        positions[index] = transform(root_from_truth(float(stamp)), positions[index])
     return PeopleTruth(stamps, persons, in_view, names, positions)

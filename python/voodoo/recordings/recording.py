@@ -52,6 +52,14 @@ class Reference:
                 joints[name] = (x, y, z)
         return Start(joints=joints)
 
+    def at(self, stamp: float, names: Sequence[str], *, within: float) -> dict[str, FloatArray]:
+        """The known positions (3,) of some joints nearest to a time, if they are within so many seconds; else none."""
+        index = int(np.argmin(np.abs(self.stamps - stamp)))
+        if abs(self.stamps[index] - stamp) > within:
+            return {}
+        row = {name: self.positions[index, self.names.index(name)] for name in names if name in self.names}
+        return {name: position for name, position in row.items() if np.isfinite(position).all()}
+
     def __repr__(self) -> str:
         """One line with the counts."""
         kind = "exact" if self.exact else "estimated"

@@ -126,7 +126,8 @@ class TopicFinder:
         if kind == "depth":
             names = self._depth_candidates(names)
         elif kind == "color":
-            names = self._color_candidates(names)
+            usable = self._pictures(names, channels=3)
+            names = [name for name in usable if "color" in name.lower() or "rgb" in name.lower()] or usable
         # image_transport publishes the same image several times; the raw one is used
         bases = {base_topic(name): name for name in sorted(names, key=len, reverse=True)}
         if len(bases) > 1:
@@ -196,11 +197,6 @@ class TopicFinder:
             elif COLOR_CHANNELS.get(message.encoding, 0) >= channels:
                 usable.append(name)
         return usable
-
-    def _color_candidates(self, names: list[str]) -> list[str]:
-        usable = self._pictures(names, channels=3)
-        named = [name for name in usable if "color" in name.lower() or "rgb" in name.lower()]
-        return named or usable
 
     def _same_as_depth(self, source: TopicSource, sources: list[TopicSource]) -> bool:
         """Whether a cloud has the same data as a depth image, which would then have twice its weight."""

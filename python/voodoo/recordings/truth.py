@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, FiniteFloat
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
 from voodoo.model.joint import valid
+from voodoo.model.projection import transform
 from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.recording import Reference, Start
 from voodoo.stored import MOST_METADATA, read_stored_text
@@ -59,8 +60,7 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
         raise RecordingError(f"{path}: expected rising stamps and finite positions, found others")
     positions = table[:, 1:].reshape(len(table), len(names), 3)
     for index, stamp in enumerate(stamps):
-        root_from_base = root_from_truth(float(stamp))
-        positions[index] = positions[index] @ root_from_base[:3, :3].T + root_from_base[:3, 3]
+        positions[index] = transform(root_from_truth(float(stamp)), positions[index])
     return Reference(stamps, names, positions, exact=True)
 
 

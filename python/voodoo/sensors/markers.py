@@ -11,24 +11,7 @@ from voodoo._core import Body as _CoreBody
 from voodoo._core import Frame
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.model.body import Body, checked_joints
-from voodoo.recordings.marker_trajectories import (
-    Z_UP_FROM_Y_UP,
-    MarkerTrajectories,
-    read_c3d,
-    read_markers,
-    read_trc,
-)
-
-__all__ = [
-    "Z_UP_FROM_Y_UP",
-    "MarkerTrajectories",
-    "add_markers",
-    "body_with_markers",
-    "marker_offset",
-    "read_c3d",
-    "read_markers",
-    "read_trc",
-]
+from voodoo.recordings.marker_trajectories import MarkerTrajectories
 
 
 def body_with_markers(body: Body, markers: Mapping[str, tuple[str, Sequence[float]]]) -> Body:

@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import overload
+from typing import TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 
+N = TypeVar("N", float, npt.NDArray[np.float64])
 PAPER_WEIGHTS: dict[str, float] = {"point": 1.0, "face": 30.0, "hand": 20.0}
 """Weights of K06 section V: a 3-D point, the ray of the face tracker, the ray of a hand tracker."""
 
@@ -114,11 +115,7 @@ class RangeNoise:
         if self.constant == self.linear == self.quadratic == 0.0:
             raise MeasurementError("range noise: expected one coefficient above zero, found none")
 
-    @overload
-    def sigma(self, z: float) -> float: ...
-    @overload
-    def sigma(self, z: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
-    def sigma(self, z: float | npt.NDArray[np.float64]) -> float | npt.NDArray[np.float64]:
+    def sigma(self, z: N) -> N:
         """Standard deviation [m] at range z [m]."""
         return self.constant + self.linear * z + self.quadratic * z * z
 

@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 import cv2
 import numpy as np
 
+from voodoo.drawing.ink import Picture
 from voodoo.errors import VoodooError
-from voodoo.visualization.ink import Picture
 
 NOT_IN_BROWSERS = "is MPEG-4, which browsers do not play: H.264 needs pip install 'voodoo-tracker[film]'"
 # A picture of 1840x720 takes 8 ms and 39 kB as H.264 and 31 ms as VP9; "veryfast" H.264 24 ms and 18 kB; MPEG-4 11 ms and 72 kB.

@@ -10,9 +10,9 @@ from types import TracebackType
 
 import cv2
 
+from voodoo.drawing.ink import Picture
 from voodoo.errors import VoodooError, utf8_name
 from voodoo.visualization.film import NOT_IN_BROWSERS, Film, codec_for_browsers, film
-from voodoo.visualization.ink import Picture
 from voodoo.whole import appearing_whole, check_disk
 
 _LEAST_FREE = 2**16

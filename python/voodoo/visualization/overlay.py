@@ -4,32 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
+from voodoo.drawing.canvas import Canvas, Pictured, same_place
+from voodoo.drawing.ink import INK, LEFT, MIDDLE, PAPER, RIGHT, SUBPIXEL, Color, Picture, person_color, point
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView
 from voodoo.model.standing import is_optical
 from voodoo.names import SEARCHING
-from voodoo.people import PeopleEstimate
+from voodoo.people import ONE, PeopleEstimate, everybody
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
-from voodoo.sensors.adapters.drawing import Pictured
 from voodoo.sensors.adapters.points import SCAN
 from voodoo.sensors.adapters.skin import SKIN
-from voodoo.visualization.body_drawing import draw_body
-from voodoo.visualization.canvas import OverlayCanvas, same_place
-from voodoo.visualization.ink import INK, LEFT, MIDDLE, PAPER, RIGHT, SUBPIXEL, Color, Picture, person_color, point
-from voodoo.visualization.people_drawing import draw_people
-from voodoo.visualization.sheet import contact_sheet, in_rows
-
-__all__ = ["Overlay", "Picture", "caption", "contact_sheet", "draw_body"]
+from voodoo.visualization.body_drawing import draw_body, draw_people
+from voodoo.visualization.sheet import in_rows
 
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
 _AHEAD_FRAMES, _MOST_PANELS = 5, 4
@@ -67,54 +64,48 @@ class Overlay:
     def draw(
         self,
         recorded: RecordedFrame,
-        body: Body,
-        estimate: Estimate,
+        bodies: Body | Mapping[int, Body],
+        estimate: Estimate | PeopleEstimate,
         *,
         index: int,
-        front_end: FrontEnd[Estimate] | None = None,
+        front_end: FrontEnd[Any] | None = None,
     ) -> Picture:
         """Draw one frame over the image of each camera, side by side or two by two; without images, as a view from above.
 
+        Several persons have a separate color and number each, and are drawn without the measurements.
+
         Args:
             recorded: the measurements.
-            body: with the sizes it had in this frame.
-            estimate: the pose.
+            bodies: with the sizes they had in this frame: that of a single person, or number -> body.
+            estimate: the poses.
             index: number of the frame, from 0, for the caption.
             front_end: provides the rays and skin regions of the frame.
         """
-        pictures = [_drawn(canvas, recorded, body, estimate, front_end) for canvas in self._canvases(recorded)]
-        if not pictures:
-            if estimate.joints:
-                x, y, z = (float(value) for value in np.median(list(estimate.joints.values()), axis=0))
+        bodies = bodies if isinstance(bodies, Mapping) else {ONE: bodies}
+        canvases = list(self._canvases(recorded))
+        if not canvases:
+            places = [place for one in everybody(estimate) for place in one.estimate.joints.values()]
+            if places:
+                x, y, z = (float(value) for value in np.median(places, axis=0))
                 self._center = x, y, z
             top = TopView(self._center, _TOP_METERS / _TOP_SIZE, _TOP_SIZE, self._axes)
-            pictures.append(_drawn(OverlayCanvas(_grid(top), top), recorded, body, estimate, front_end))
-        picture = in_rows(pictures, columns=self._columns)
+            canvases.append(Canvas(_grid(top), top))
+        memory, rays = (Memory(), ()) if front_end is None else (front_end.memory, front_end.rays)
+        for canvas in canvases:
+            if isinstance(estimate, PeopleEstimate):
+                draw_people(canvas.picture, estimate, bodies, canvas.view)
+            else:
+                draw_body(canvas.picture, bodies[ONE], estimate, canvas.view)
+                for item in recorded.measurements:
+                    for adapter in adapters_of(item):
+                        adapter.draw(item, canvas, memory)
+                canvas.rays(rays, estimate)
+            canvas.finish()
+        picture = in_rows([canvas.picture for canvas in canvases], columns=self._columns)
         caption(picture, self._when(index, estimate.stamp), estimate)
         return picture
 
-    def draw_people(
-        self, recorded: RecordedFrame, estimate: PeopleEstimate, bodies: Mapping[int, Body], *, index: int
-    ) -> Picture:
-        """Draw all persons in a frame, each with a separate color and number.
-
-        Args:
-            recorded: the measurements; a camera image is needed.
-            estimate: the persons.
-            bodies: of all persons, with their sizes in this frame.
-            index: number of the frame, from 0, for the caption.
-        """
-        pictures = []
-        for canvas in self._canvases(recorded):
-            draw_people(canvas.picture, estimate, bodies, canvas.view)
-            canvas.finish()
-            pictures.append(canvas.picture)
-        picture = in_rows(pictures, columns=self._columns)
-        captions = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
-        write_parts(picture, [(self._when(index, estimate.stamp), INK), *captions])
-        return picture
-
-    def _canvases(self, recorded: RecordedFrame) -> Iterator[OverlayCanvas]:
+    def _canvases(self, recorded: RecordedFrame) -> Iterator[Canvas]:
         """The canvas of each camera."""
         current = {item.sensor: item for item in _pictured(recorded)}
         for sensor, first in self._panels.items():
@@ -123,7 +114,7 @@ class Overlay:
             resized = cv2.resize(observed, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
             item = current.get(sensor, first)
             view = CameraView(item.camera, item.root_from_sensor, scale)
-            yield OverlayCanvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
+            yield Canvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
 
     def _when(self, index: int, stamp: float) -> str:
         """Number of a frame, and its time since the first one."""
@@ -155,27 +146,15 @@ def _pictured(recorded: RecordedFrame) -> Sequence[Pictured]:
     return [item for item in recorded.measurements if adapter_of(item).panel is not None]  # type: ignore[misc]
 
 
-def _drawn(
-    canvas: OverlayCanvas, recorded: RecordedFrame, body: Body, estimate: Estimate, front_end: FrontEnd[Estimate] | None
-) -> Picture:
-    draw_body(canvas.picture, body, estimate, canvas.view)
-    memory = Memory() if front_end is None else front_end.memory
-    for item in recorded.measurements:
-        for adapter in adapters_of(item):
-            adapter.draw(item, canvas, memory)
-    if front_end is not None:
-        canvas.rays(front_end.rays, estimate)
-    canvas.finish()
-    return canvas.picture
-
-
-def caption(picture: Picture, text: str, estimate: Estimate) -> None:
-    """Write frame number, status and, if there is one, residual into the top left corner."""
-    status = str(estimate.status)
-    parts = [(text, INK), (status, _STATUS.get(status, INK))]
-    if np.isfinite(estimate.residual):
-        parts.append((f"{1e3 * estimate.residual:.0f} mm", INK))
-    write_parts(picture, parts)
+def caption(picture: Picture, text: str, estimate: Estimate | PeopleEstimate) -> None:
+    """Write frame number, status and, if there is one, residual into the top left corner; of several the status of each."""
+    if isinstance(estimate, PeopleEstimate):
+        parts = [(f"{person.id} {person.status}", person_color(person.id)) for person in estimate]
+    else:
+        parts = [(estimate.status, _STATUS.get(estimate.status, INK))]
+        if np.isfinite(estimate.residual):
+            parts.append((f"{1e3 * estimate.residual:.0f} mm", INK))
+    write_parts(picture, [(text, INK), *parts])
 
 
 def legend(width: int) -> Picture:

@@ -18,17 +18,17 @@ import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.children import children
+from voodoo.drawing.body_geometry import bands, limb_colors
+from voodoo.drawing.ink import person_color
+from voodoo.drawing.rerun_log import Log, entity
 from voodoo.errors import VoodooError, installed
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.limb_mesh import limb_mesh
 from voodoo.model.rotations import quaternions
-from voodoo.people import PeopleEstimate
+from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.sensors.adapters import Memory, adapters_of
-from voodoo.visualization.body_geometry import bands, limb_colors
-from voodoo.visualization.ink import person_color
-from voodoo.visualization.rerun_log import StepLog, entity
 from voodoo.visualization.rerun_server import Server
 from voodoo.whole import appearing_whole, check_disk
 
@@ -148,59 +148,46 @@ class Viewer:
 
     def log(
         self,
-        estimate: Estimate,
-        body: Body,
+        estimate: Estimate | PeopleEstimate,
+        bodies: Body | Mapping[int, Body],
         *,
         recorded: RecordedFrame | None = None,
-        front_end: FrontEnd[Estimate] | None = None,
+        front_end: FrontEnd[Any] | None = None,
         seconds: float | None = None,
     ) -> None:
-        """Show one step.
+        """Show one step. Several persons are `world/people/<id>/...`, each with a separate color and number.
 
         Args:
             estimate: of the step.
-            body: with its current sizes (`Tracker.body`).
+            bodies: with current sizes: that of a single person (`Tracker.body`), or number -> body.
             recorded: the measurements.
             front_end: provides the rays and skin candidates of the step.
             seconds: time the step took.
         """
+        bodies = bodies if isinstance(bodies, Mapping) else {ONE: bodies}
         self._set_time(estimate.stamp)
-        colors = limb_colors(body)
-        self._log_classes(body, colors)
-        self._log_body("world/body", estimate, body, colors)
+        if isinstance(estimate, PeopleEstimate):
+            self._log_people(estimate, bodies)
+            # Images and points are not assigned to persons.
+            posed, body = nobody(estimate.stamp), Body.human()
+        else:
+            posed, body = estimate, bodies[ONE]
+            colors = limb_colors(body)
+            self._log_classes(body, colors)
+            self._log_body("world/body", estimate, body, colors)
+            if front_end is not None:
+                self._log_rays(front_end, estimate)
+            self._log_plots(estimate)
         memory = Memory() if front_end is None else front_end.memory
-        log = StepLog(self._rr, self._stream, estimate, body, _MOST_POINTS, self._whole)
+        log = Log(self._rr, self._stream, posed, body, _MOST_POINTS, self._whole)
         for item in () if recorded is None else recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.log(item, log, memory)
-        if front_end is not None:
-            self._log_rays(front_end, estimate)
-        self._log_plots(estimate, seconds)
+        if seconds is not None:
+            self._stream.log("plots/step_ms", self._rr.Scalars(1e3 * seconds))
 
-    def log_people(
-        self,
-        estimate: PeopleEstimate,
-        bodies: Mapping[int, Body],
-        *,
-        recorded: RecordedFrame | None = None,
-        seconds: float | None = None,
-    ) -> None:
-        """Show a step of several persons: `world/people/<id>/...`, each with a separate color and number.
-
-        Args:
-            estimate: the persons.
-            bodies: their bodies, with current sizes.
-            recorded: the measurements.
-            seconds: time the step took.
-        """
+    def _log_people(self, estimate: PeopleEstimate, bodies: Mapping[int, Body]) -> None:
         rr = self._rr
-        self._set_time(estimate.stamp)
-        if recorded is not None:
-            # Images and points are not assigned to persons.
-            log = StepLog(rr, self._stream, nobody(estimate.stamp), Body.human(), _MOST_POINTS, self._whole)
-            for item in recorded.measurements:
-                for adapter in adapters_of(item):
-                    adapter.log(item, log, Memory())
         there = {person.id for person in estimate if person.estimate.joints}
         for gone in self._people - there:
             self._clear(f"world/people/{gone}")
@@ -216,8 +203,6 @@ class Viewer:
                 self._stream.log(f"{path}/number", rr.Points3D([head], labels=words, colors=[color], radii=0.02))
             self._stream.log(f"plots/status/{person.id}", rr.TextLog(str(person.status)))
         self._stream.log("plots/people", rr.Scalars(float(len(there))))
-        if seconds is not None:
-            self._stream.log("plots/step_ms", rr.Scalars(1e3 * seconds))
 
     def _set_time(self, stamp: float) -> None:
         # Stamps of a robot are Unix times, those of other recordings start at zero.
@@ -285,7 +270,7 @@ class Viewer:
             ),
         )
 
-    def _log_rays(self, front_end: FrontEnd[Estimate], estimate: Estimate) -> None:
+    def _log_rays(self, front_end: FrontEnd[Any], estimate: Estimate) -> None:
         strips, colors, labels = [], [], []
         for ray in front_end.rays:
             reach = float((estimate.joints[ray.site] - ray.origin) @ ray.direction)
@@ -296,10 +281,8 @@ class Viewer:
             "world/rays", self._rr.LineStrips3D(strips, radii=0.004, colors=colors, labels=labels, show_labels=False)
         )
 
-    def _log_plots(self, estimate: Estimate, seconds: float | None) -> None:
+    def _log_plots(self, estimate: Estimate) -> None:
         values: dict[str, float] = {"residual_mm": 1e3 * estimate.residual, "steps": float(estimate.steps)}
-        if seconds is not None:
-            values["step_ms"] = 1e3 * seconds
         for source, (given, matched, residual) in estimate.sources.items():
             values[f"sources/{entity(source)}/given"] = float(given)
             values[f"sources/{entity(source)}/matched"] = float(matched)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.visualization.ink import INK, Picture
+from voodoo.drawing.ink import INK, Picture
 
 
 def side_by_side(pictures: Sequence[Picture]) -> Picture:

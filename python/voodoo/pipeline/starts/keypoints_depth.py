@@ -32,6 +32,7 @@ _AROUND = 2.5
 
 _Person: TypeAlias = dict[str, tuple[FloatArray, float]]
 """Site -> position (3,) and standard deviation [m]."""
+_Points: TypeAlias = tuple[FloatArray, FloatArray]
 
 
 class KeypointsDepthStart(StartFinder):
@@ -59,18 +60,18 @@ def _people(item: KeypointImage, depths: Sequence[DepthImage], frame: StartFrame
     if not near or not item.people:
         return
     depth = min(near, key=lambda each: (abs(each.stamp - item.stamp), each.camera != item.camera))
-    pixels, z = _points_in_view(depth, item)
+    surface = _points_in_view(depth, item)
     for rows in item.people:
         sites, _ = site_pixels(rows, layout=item.layout, min_confidence=frame.settings.min_confidence)
         sites = [site for site in sites if site.site in frame.body.site_names]
         if len(sites) >= _LEAST_SITES:
-            person = _placed(sites, item, pixels, z, frame, coarse=item.camera.fx / depth.camera.fx)
+            person = _placed(sites, item, surface, frame, coarse=item.camera.fx / depth.camera.fx)
             kept = in_proportion(without_impossible({name: place for name, (place, _) in person.items()}))
             if len(kept) >= _LEAST_SITES and fixes_pose(kept, frame.body):
                 yield {name: person[name] for name in kept}
 
 
-def _points_in_view(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray, FloatArray]:
+def _points_in_view(depth: DepthImage, item: KeypointImage) -> _Points:
     """Pixels (N, 2) of the points of a depth image in the image of the keypoints, and their depths there (N,) [m]."""
     points, _ = depth_points(depth)
     local = in_sensor(item.root_from_sensor, points)
@@ -79,20 +80,14 @@ def _points_in_view(depth: DepthImage, item: KeypointImage) -> tuple[FloatArray,
 
 
 def _placed(
-    sites: Sequence[SitePixel],
-    item: KeypointImage,
-    pixels: FloatArray,
-    z: FloatArray,
-    frame: StartFrame,
-    *,
-    coarse: float,
+    sites: Sequence[SitePixel], item: KeypointImage, points: _Points, frame: StartFrame, *, coarse: float
 ) -> _Person:
     """The sites that have a surface behind their keypoint."""
     origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in sites])
     focal = math.sqrt(item.camera.fx * item.camera.fy)
     placed: _Person = {}
     for site, direction in zip(sites, directions, strict=True):
-        depth = _core.nearest_surface(pixels, z, pixel=site.pixel, radius=_AROUND * max(coarse, 1.0))
+        depth = _core.nearest_surface(*points, pixel=site.pixel, radius=_AROUND * max(coarse, 1.0))
         if depth is None or not np.isfinite(direction).all():
             continue
         surface = depth / float(direction @ item.root_from_sensor[:3, 2])

@@ -14,9 +14,10 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import DepthImage
 from voodoo.people import Followed
-from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import RangeNoise
 from voodoo.sensors.pixels import FloatArray
@@ -154,6 +155,7 @@ class Adapter(ABC, Generic[M]):
     Attributes:
         kind: the input it serves, as in `voodoo track --use`.
         measurement: class of the measurements; each has `sensor` and `stamp`.
+        measured: their attribute with the measured array, by which a frozen sensor is told; "": they may repeat themselves.
         recorded_as: what recordings call such a sensor (`SensorInfo.kind`); "": as `kind`.
         panel: sort key of its images in an overlay; None: it has no image.
         panel_of_its_own: False: no panel if another camera's image shows the same view.
@@ -163,6 +165,7 @@ class Adapter(ABC, Generic[M]):
 
     kind: ClassVar[str]
     measurement: type[M]
+    measured: ClassVar[str] = ""
     recorded_as: ClassVar[str] = ""
     panel: ClassVar[int | None] = None
     panel_of_its_own: ClassVar[bool] = True
@@ -171,7 +174,7 @@ class Adapter(ABC, Generic[M]):
 
     def content(self, item: M) -> npt.NDArray[Any] | None:
         """Returns the measured data, to detect a frozen sensor by missing noise; None: it may legitimately repeat itself."""
-        return None
+        return getattr(item, self.measured) if self.measured else None
 
     @abstractmethod
     def add(self, frame: Frame, item: M, context: Context) -> None:

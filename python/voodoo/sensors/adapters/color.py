@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
+from voodoo.drawing.canvas import Canvas
 from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas
 from voodoo.sensors.pinhole import Pinhole
 from voodoo.sensors.silhouettes.regions import LIKELY
 from voodoo.tracker import Tracker
@@ -51,11 +51,8 @@ class ColorAdapter(Adapter[ColorImage]):
 
     kind = "color"
     measurement = ColorImage
+    measured = "image"
     colored = True
-
-    def content(self, item: ColorImage) -> npt.NDArray[Any]:
-        """The image."""
-        return item.image
 
     def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
         """As a picture with its own stamp; the first one of a camera after pictures of the empty scene, if there are some."""

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
+from voodoo.drawing.rerun_log import Log, every, grown
 from voodoo.measurements import DepthImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Log, every, grown
 
 
 class DepthAdapter(Adapter[DepthImage]):
@@ -18,12 +18,9 @@ class DepthAdapter(Adapter[DepthImage]):
 
     kind = "depth"
     measurement = DepthImage
+    measured = "image"
     panel = 0
     while_searching = True
-
-    def content(self, item: DepthImage) -> npt.NDArray[Any]:
-        """The image."""
-        return item.image
 
     def add(self, frame: Frame, item: DepthImage, context: Context) -> None:
         """As a depth image, weighted for the distance of the body."""

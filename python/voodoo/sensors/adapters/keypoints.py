@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from voodoo._core import Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import DepthImage, KeypointImage
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.keypoints.people import assign_keypoints
 from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
 from voodoo.sensors.keypoints.sites import nearest_person

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from voodoo._core import Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import MarkerSet
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas, Log
 
 MARKER = (60, 60, 255)
 """Color in overlays, BGR."""

@@ -7,10 +7,11 @@ from typing import Any
 import numpy.typing as npt
 
 from voodoo._core import Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import LaserScan, PointCloud
 from voodoo.model.projection import transform
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas, Log
 
 SCAN, CLOUD = (90, 230, 90), (225, 225, 120)
 """Colors in overlays, BGR."""
@@ -21,11 +22,8 @@ class PointsAdapter(Adapter[PointCloud]):
 
     kind = "points"
     measurement = PointCloud
+    measured = "points"
     while_searching = True
-
-    def content(self, item: PointCloud) -> npt.NDArray[Any]:
-        """The points."""
-        return item.points
 
     def add(self, frame: Frame, item: PointCloud, context: Context) -> None:
         """As points, those on the body moved to the frame's time."""
@@ -48,11 +46,8 @@ class ScanAdapter(Adapter[LaserScan]):
 
     kind = "scan"
     measurement = LaserScan
+    measured = "ranges"
     while_searching = True
-
-    def content(self, item: LaserScan) -> npt.NDArray[Any]:
-        """The ranges."""
-        return item.ranges
 
     def add(self, frame: Frame, item: LaserScan, context: Context) -> None:
         """As points, those on the body moved to the frame's time."""

@@ -8,9 +8,10 @@ from typing import Any
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
+from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
-from voodoo.sensors.adapters.drawing import Canvas, Log
 from voodoo.sensors.skin.tracker import SkinTracker
 
 SKIN = (80, 255, 255)
@@ -22,13 +23,10 @@ class SkinAdapter(Adapter[ColorImage]):
 
     kind = "skin"
     measurement = ColorImage
+    measured = "image"
     colored = True
     recorded_as = "color"
     panel = 1
-
-    def content(self, item: ColorImage) -> npt.NDArray[Any]:
-        """The image."""
-        return item.image
 
     def add(self, frame: Frame, item: ColorImage, context: Context) -> None:
         """As rays, moved from the picture's time to the frame's."""

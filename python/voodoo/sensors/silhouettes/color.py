@@ -1,5 +1,4 @@
-"""Silhouettes from static color cameras by background subtraction: `Silhouettes` learns while it runs, `StillBackground` from
-pictures that are there beforehand, even if the person never leaves the place."""
+"""Silhouettes from static color cameras: differences from the background, even if the person never leaves the place."""
 
 from __future__ import annotations
 
@@ -17,50 +16,6 @@ ByteImage: TypeAlias = npt.NDArray[np.uint8]
 
 _SMOOTH_PX = 1.5
 _INPAINT_PX = 5
-
-
-class Silhouettes:
-    """Segments the moving foreground of one static camera.
-
-    A mixture of Gaussians for each pixel (Zivkovic 2004, OpenCV's MOG2) learns the background. Shadows do not count as
-    foreground, specks are removed and holes closed. A person who stands still for `seconds` starts to become background,
-    unless `learn` is False.
-
-    Args:
-        rate_hz: pictures a second.
-        seconds: memory of the background [s].
-        smallest: regions of less area are specks [px].
-
-    Raises:
-        MeasurementError: a number that is not above zero.
-    """
-
-    def __init__(self, *, rate_hz: float = 30.0, seconds: float = 20.0, smallest: int = 100) -> None:
-        """Start without a background."""
-        if not (rate_hz > 0.0 and seconds > 0.0 and smallest > 0):
-            raise MeasurementError(
-                f"silhouettes: expected numbers > 0, found rate {rate_hz!r}, seconds {seconds!r}, smallest {smallest!r}"
-            )
-        self._model = cv2.createBackgroundSubtractorMOG2(
-            history=max(round(rate_hz * seconds), 2), varThreshold=25.0, detectShadows=True
-        )
-        self._smallest = smallest
-        self._shape: tuple[int, ...] | None = None
-
-    def apply(self, image: ByteImage, *, learn: bool = True) -> Mask:
-        """(H, W): True where something stands in front of the background.
-
-        Args:
-            image: (H, W, 3) BGR uint8.
-            learn: update the background with the image; False once the person is there and the background is known.
-
-        Raises:
-            MeasurementError: another type, or another size than before.
-        """
-        _check(image, self._shape)
-        self._shape = image.shape
-        moving = (np.asarray(self._model.apply(image, learningRate=-1.0 if learn else 0.0)) == 255).astype(np.uint8)
-        return _large(np.asarray(cv2.medianBlur(moving, 5), dtype=np.uint8), self._smallest)
 
 
 class StillBackground:
@@ -130,13 +85,15 @@ class StillBackground:
         # The chroma threshold is low and smoothing spreads vivid colors by a pixel, so the mask is eroded.
         colorful = np.linalg.norm(_colors(smooth) - self._colors, axis=2) > self._chroma
         differs |= cv2.erode(colorful.astype(np.uint8), np.ones((3, 3), dtype=np.uint8)) != 0
-        return _large(differs.astype(np.uint8), self._smallest)
+        ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+        closed = cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_CLOSE, ellipse)
+        return without_specks(np.asarray(closed != 0, dtype=bool), smallest=self._smallest)
 
 
-def _check(image: ByteImage, shape: tuple[int, ...] | None) -> None:
+def _check(image: ByteImage, shape: tuple[int, ...]) -> None:
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
         raise MeasurementError(f"image: expected (H, W, 3) uint8, found {image.dtype} of {image.shape}")
-    if shape is not None and image.shape != shape:
+    if image.shape != shape:
         raise MeasurementError(f"image: expected {shape} as before, found {image.shape}")
 
 
@@ -147,9 +104,3 @@ def _smooth(picture: ByteImage) -> ByteImage:
 def _colors(picture: ByteImage) -> npt.NDArray[np.float32]:
     """(H, W, 2): a* and b* of CIE 1976, without the lightness."""
     return cv2.cvtColor(picture.astype(np.float32) / np.float32(255.0), cv2.COLOR_BGR2LAB)[..., 1:]
-
-
-def _large(mask: ByteImage, smallest: int) -> Mask:
-    """Closes small gaps of a mask and removes specks."""
-    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
-    return without_specks(np.asarray(closed != 0, dtype=bool), smallest=smallest)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
+from voodoo.drawing.body_geometry import limb_colors, nearest_limb
+from voodoo.drawing.canvas import Pictured
 from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.model.projection import CameraView, limb_silhouette
-from voodoo.sensors.adapters.drawing import Pictured, every, grown
-from voodoo.visualization.body_geometry import limb_colors, nearest_limb
 
+Pixel = TypeVar("Pixel", bound=np.generic)
 _BODY_POINTS = 400
 """Number of points of a depth image that are shown on the body, enough to recognize their limbs."""
 _BACKGROUND = (90, 90, 90)
@@ -33,8 +34,8 @@ if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # few distinct depths compress better wi
 
 
 @dataclass(frozen=True, eq=False)
-class StepLog:
-    """See `voodoo.sensors.adapters.Log`.
+class Log:
+    """One step in Rerun, to which adapters log.
 
     Args:
         rr: the module `rerun`.
@@ -54,19 +55,19 @@ class StepLog:
 
     @property
     def limbs(self) -> int:
-        """Number of limbs of the body."""
+        """How many limbs the body has."""
         return len(self.body.limbs)
 
     def send(self, path: str, *archetypes: Any) -> None:  # noqa: ANN401 - Rerun's own
-        """See Log."""
+        """Log archetypes of Rerun at a path."""
         self.stream.log(path, *archetypes)
 
     def entity(self, sensor: str) -> str:
-        """See Log."""
+        """A sensor's name as part of a path."""
         return entity(sensor)
 
     def camera(self, item: Pictured) -> str:
-        """See Log."""
+        """Log pose and calibration of a camera; returns the path of its image."""
         rr, path, pose = self.rr, f"world/cameras/{entity(item.sensor)}", item.root_from_sensor
         camera = item.camera
         self.send(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
@@ -82,7 +83,7 @@ class StepLog:
         return path
 
     def silhouettes(self, path: str, item: Pictured) -> None:
-        """See Log."""
+        """Log the silhouettes of the limbs in the camera's image at a path."""
         silhouettes, colors = [], []
         for limb in self.body.limbs if self.estimate.joints else ():
             view = CameraView(item.camera, item.root_from_sensor)
@@ -94,7 +95,7 @@ class StepLog:
         self.send(f"{path}/picture/model", self.rr.LineStrips2D(silhouettes, radii=0.5, colors=colors))
 
     def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:
-        """See Log."""
+        """Log a depth image (H, W), compressed: to a quarter of a percent, and in a file not more pixels than `most_points`."""
         rr = self.rr
         step = 1 if self.whole else every(image.size, self.most_points)
         millimeters = grown(rounded_millimeters(image[::step, ::step], meters_per_unit), step, image.shape)
@@ -108,7 +109,8 @@ class StepLog:
     def body_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True
     ) -> npt.NDArray[np.intp]:
-        """See Log."""
+        """Log points (N, 3) of a sensor at `pose` (4, 4), colored by limb, those on none only with `background`; the limb of
+        each (N,), `limbs`: none."""
         world = np.asarray(points, dtype=np.float64) @ pose[:3, :3].T + pose[:3, 3]
         colors = np.array([*limb_colors(self.body).values(), _BACKGROUND], dtype=np.uint8)
         limbs = nearest_limb(world, self.estimate, self.body)
@@ -119,6 +121,16 @@ class StepLog:
         positions = world[displayed].astype(np.float32)
         self.send(path, self.rr.Points3D(positions, radii=0.006, colors=colors[limbs[displayed]]))
         return limbs
+
+
+def every(pixels: int, most: int) -> int:
+    """Returns the subsampling step of rows and columns that reduces an image to approximately `most` pixels."""
+    return math.ceil(math.sqrt(pixels / most))
+
+
+def grown(image: npt.NDArray[Pixel], step: int, shape: tuple[int, ...]) -> npt.NDArray[Pixel]:
+    """Enlarges a subsampled image (every `step`-th row and column) to `shape` (H, W) by repeating its pixels."""
+    return image.repeat(step, axis=0).repeat(step, axis=1)[: shape[0], : shape[1]]
 
 
 def rounded_millimeters(image: npt.NDArray[Any], meters_per_unit: float) -> npt.NDArray[np.uint16]:

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo._core import Estimate
+from voodoo._core import Estimate, SiteRay
+from voodoo.drawing.ink import RAY, SUBPIXEL, Color, FloatArray, Picture, point
+from voodoo.measurements import ColorImage, DepthImage, KeypointImage
 from voodoo.model.projection import View
-from voodoo.sensors.adapters.drawing import Pictured
-from voodoo.sensors.rays import SiteRay
-from voodoo.visualization.ink import RAY, SUBPIXEL, Color, FloatArray, Picture, point
 
+Pictured: TypeAlias = DepthImage | ColorImage | KeypointImage
+"""Measurements of a camera."""
 _RAY_HALF_M = 0.20
 
 
 @dataclass(frozen=True, eq=False)
-class OverlayCanvas:
-    """See `voodoo.sensors.adapters.Canvas`.
+class Canvas:
+    """The picture of one camera, or a view from above, into which adapters draw.
 
     Objects in space are drawn immediately; image features (rings, regions) are drawn by `finish`, so that rays do not cover
     them.
@@ -42,7 +44,7 @@ class OverlayCanvas:
     )
 
     def dots(self, points_root: FloatArray, *, color: Color, radius: int) -> None:
-        """See Canvas."""
+        """Points (N, 3) [m] of the root frame as dots; colors are BGR, radii pixels."""
         pixels, _ = self.view.project(points_root)
         height, width = self.picture.shape[:2]
         with np.errstate(invalid="ignore"):
@@ -51,7 +53,7 @@ class OverlayCanvas:
             cv2.circle(self.picture, point(pixel), radius << SUBPIXEL, color, -1, cv2.LINE_AA, SUBPIXEL)
 
     def rings(self, item: Pictured, pixels: FloatArray, strengths: FloatArray, *, color: Color) -> None:
-        """See Canvas."""
+        """Rings about pixels (N, 2) of a camera, fainter with less strength (N,), if this is its picture."""
         if self.camera is not None and same_place(item, self.camera):
             self._rings.append((pixels, strengths, color))
 
@@ -64,7 +66,7 @@ class OverlayCanvas:
         names: Mapping[str, tuple[float, float]],
         color: Color,
     ) -> None:
-        """See Canvas."""
+        """Outlines of a mask (H, W), dots at pixels, and names beside others, if this is the sensor's own picture."""
         if self.camera is not None and item.sensor == self.camera.sensor:
             places = np.array(marks, dtype=np.float64).reshape(-1, 2)
             self._regions[item.sensor] = (mask, places, {name: np.array(pixel) for name, pixel in names.items()}, color)

@@ -1,0 +1,1 @@
+"""What measurements are drawn into: the pictures of an overlay, and Rerun."""
