@@ -34,6 +34,7 @@ impl Term for Penetration<'_> {
         }
     }
 
+    /// Twice the negative log-likelihood that `sigma` gives: so fitted to right and wrong poses of rendered people.
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
         let sphere = |limb: usize| body.limbs()[limb].shape.sphere(&poses[limb]);
         let (own, mut squares) = (sphere(limb), 0.0);
@@ -42,7 +43,7 @@ impl Term for Penetration<'_> {
                 each_overlap(body, poses, [limb, other], |_, _, depth| squares += (depth / self.sigma).powi(2));
             }
         }
-        (0.5 * squares).min(LARGEST_COST)
+        squares.min(LARGEST_COST)
     }
 }
 
@@ -109,7 +110,7 @@ mod tests {
                 for other in (0..inside.len()).filter(|other| body.are_apart(limb, *other)) {
                     let shape = &body.limbs()[other].shape;
                     let distance = shape.closest_point(inside[other].inverse_transform_point(place)).signed_distance;
-                    expected += 0.5 * (distance.min(0.0) / 0.03).powi(2);
+                    expected += (distance.min(0.0) / 0.03).powi(2);
                 }
             }
         }
