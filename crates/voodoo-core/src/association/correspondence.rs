@@ -26,6 +26,8 @@ pub(crate) struct LimbMatches {
 pub(crate) struct SitePair {
     /// The limb that carries the site.
     pub limb: usize,
+    /// The site in the limb's frame.
+    pub local: Vec3,
     /// The site.
     pub x: Vec3,
     /// The target.

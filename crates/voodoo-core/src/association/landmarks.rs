@@ -21,14 +21,15 @@ impl Correspondences {
         self.sites.clear();
         let place = |site: usize| {
             let site = &body.sites()[site];
-            (site.limb, poses[site.limb] * site.position)
+            (site.limb, site.position, poses[site.limb] * site.position)
         };
         for relation in frame.positions {
-            let (limb, x) = place(relation.site);
+            let (limb, local, x) = place(relation.site);
             let p = relation.position - origin;
             let weight = relation.weight * beyond(relation.bias, (x - p).length());
             self.sites.push(SitePair {
                 limb,
+                local,
                 x,
                 p,
                 weight,
@@ -40,7 +41,7 @@ impl Correspondences {
             });
         }
         for relation in frame.rays {
-            let (limb, x) = place(relation.site);
+            let (limb, local, x) = place(relation.site);
             let start = relation.origin - origin;
             let direction = relation.direction.normalize();
             // A site behind the sensor is pulled towards the sensor, not towards the mirror image of the ray.
@@ -50,6 +51,7 @@ impl Correspondences {
             let weight = relation.weight * beyond(relation.bias, (x - p).length());
             self.sites.push(SitePair {
                 limb,
+                local,
                 x,
                 p,
                 weight,

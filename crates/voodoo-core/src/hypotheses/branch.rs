@@ -5,12 +5,12 @@
 //! between the two, the one that explains the images clearly better is used for both. Otherwise, their distance is a measure of
 //! uncertainty.
 
-use super::landmark_cost::APART;
+use super::objective::MARGIN;
 use super::refined::{REFINE, Refined};
-use super::score::GAIN;
 use crate::config::Config;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::{Pose, Vec3, shifted};
+use crate::terms::APART;
 
 /// Maximum number of cameras with a second branch. More cameras leave little of the body unobserved.
 const FEW_CAMERAS: usize = 2;
@@ -93,13 +93,13 @@ impl Branch {
             chain.place_between(body, &mut self.tried, self.poses[chain.lower].translation, chain.end(&self.poses));
             let cost = refined.refine(context, fit, &self.tried);
             steps += REFINE;
-            if cost.total < now.total - GAIN {
+            if cost < now - MARGIN {
                 poses.clone_from(&refined.poses);
                 predicted.clone_from(&self.tried);
                 continue;
             }
             fit.swap_matches(&mut refined.matched);
-            if cost.total > now.total + GAIN {
+            if cost > now + MARGIN {
                 chain.place_between(body, &mut self.poses, poses[chain.lower].translation, chain.end(poses));
             }
         }
@@ -157,7 +157,7 @@ mod tests {
             fit.match_last(context, first);
             let (mut poses, mut predicted) = (first.to_vec(), first.to_vec());
             let mut refined = Refined::default();
-            refined.patch_cost = 1.0;
+            refined.clutter = 1.0;
             let steps = branch.compare(context, &mut refined, &mut fit, &mut poses, &mut predicted);
             let arm = &model.extremities[first_arm(&model)];
             assert_eq!(poses == first, predicted == first, "poses and prediction change together");

@@ -1,6 +1,6 @@
 //! History of each arm and leg over frames.
 
-use super::score::GAIN;
+use super::objective::MARGIN;
 use crate::math::Vec3;
 
 /// Time in which the unexplained patches of a refused test lose half of their weight, seconds.
@@ -23,7 +23,7 @@ impl History {
     /// Returns whether to test alternatives: enough is unexplained, and twice what was refused. To be called in every frame.
     pub(super) fn observe(&mut self, unexplained: f64, elapsed: f64) -> bool {
         self.refused *= (-elapsed / HALF_LIFE).exp2();
-        self.unexplained = if unexplained < GAIN { 0.0 } else { unexplained };
+        self.unexplained = if unexplained < MARGIN { 0.0 } else { unexplained };
         self.unexplained > 2.0 * self.refused
     }
 
@@ -50,16 +50,16 @@ mod tests {
     #[test]
     fn what_was_refused_is_tested_again_when_twice_as_much_is_unexplained_or_after_its_half_life() {
         let mut history = History::default();
-        assert!(!history.observe(GAIN - 1.0, 0.03) && history.is_clear());
-        assert!(history.observe(GAIN, 0.03) && !history.is_clear());
+        assert!(!history.observe(MARGIN - 1.0, 0.03) && history.is_clear());
+        assert!(history.observe(MARGIN, 0.03) && !history.is_clear());
         history.refuse();
-        assert!(!history.observe(GAIN, 0.03), "nothing has changed");
-        assert!(history.observe(2.0 * GAIN, 0.03), "more is unexplained");
+        assert!(!history.observe(MARGIN, 0.03), "nothing has changed");
+        assert!(history.observe(2.0 * MARGIN, 0.03), "more is unexplained");
         history.refuse();
-        let tested = (0..10).position(|_| history.observe(2.0 * GAIN, 0.25 * HALF_LIFE + 1e-6));
+        let tested = (0..10).position(|_| history.observe(2.0 * MARGIN, 0.25 * HALF_LIFE + 1e-6));
         assert_eq!(tested, Some(3), "a half-life has passed");
         history.refuse();
         history.reconsider();
-        assert!(history.observe(GAIN, 0.0));
+        assert!(history.observe(MARGIN, 0.0));
     }
 }

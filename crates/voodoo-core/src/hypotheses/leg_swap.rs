@@ -4,8 +4,8 @@
 //! The sizes may have adapted to the wrong legs before they are corrected. Legs that have a similar cost when swapped are
 //! therefore tracked in parallel for some frames.
 
+use super::objective::REVERSAL_MARGIN;
 use super::refined::{REFINE, Refined};
-use super::score::{Cost, SURE_GAIN};
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
@@ -25,7 +25,7 @@ pub(super) struct LegSwap {
     /// tracked.
     followed: Vec<Pose>,
     age: usize,
-    /// Decrease of cost by the swap, accumulated over these frames, patches.
+    /// Decrease of cost by the swap, accumulated over these frames, nats.
     gained: f64,
     frames: usize,
 }
@@ -60,7 +60,7 @@ impl LegSwap {
         let (origin, now) = (context.observation.origin(), refined.cost(context, fit, poses));
         self.swap_legs(&context.model.body, [&chains[one], &chains[other]], poses, origin);
         // A swap of correct legs explains clearly less of the images, even before it is refined.
-        if !self.is_ongoing() && refined.cost(context, fit, &self.poses).evidence > (1.0 - HOPELESS) * now.evidence {
+        if !self.is_ongoing() && refined.cost(context, fit, &self.poses) > (1.0 - HOPELESS) * now {
             return 0;
         }
         let cost = refined.refine(context, fit, &self.poses);
@@ -99,12 +99,12 @@ impl LegSwap {
     }
 
     /// Accumulates the evidence of a frame. Returns whether to accept the swap.
-    fn accumulate(&mut self, now: Cost, swapped: Cost) -> bool {
+    fn accumulate(&mut self, now: f64, swapped: f64) -> bool {
         // No frame contributes more than half of the required gain, because a single frame may be disturbed.
-        self.gained = (self.gained + (now.total - swapped.total).min(0.5 * SURE_GAIN)).max(0.0);
+        self.gained = (self.gained + (now - swapped).min(0.5 * REVERSAL_MARGIN)).max(0.0);
         self.age += 1;
-        let close = swapped.evidence < now.evidence + SURE_GAIN;
-        let taken = close && self.gained > SURE_GAIN;
+        let close = swapped < now + REVERSAL_MARGIN;
+        let taken = close && self.gained > REVERSAL_MARGIN;
         if taken || !close || self.age > RETRY_PERIOD {
             (self.age, self.gained) = (0, 0.0);
         }
@@ -126,10 +126,6 @@ mod tests {
     use super::*;
     use crate::testing::standing;
 
-    fn cost(explained: f64) -> Cost {
-        Cost { evidence: -explained, total: -explained }
-    }
-
     #[test]
     fn each_leg_ends_where_the_other_one_did_and_no_other_limb_moves() {
         let (model, poses) = standing();
@@ -148,7 +144,7 @@ mod tests {
 
     #[test]
     fn the_swap_is_accepted_after_several_better_frames_and_dropped_otherwise() {
-        let (now, better, far) = (cost(2000.0), cost(2090.0), cost(1500.0));
+        let (now, better, far) = (-240.0, -250.8, -180.0);
         let mut leg_swap = LegSwap::default();
         let decisions: Vec<bool> = (0..4).map(|_| leg_swap.accumulate(now, better)).collect();
         assert_eq!(decisions, [false, false, true, false], "no frame contributes more than half");

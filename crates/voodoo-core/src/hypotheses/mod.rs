@@ -3,24 +3,25 @@
 
 mod branch;
 mod history;
-mod landmark_cost;
 mod leg_swap;
+mod objective;
 mod proposals;
 mod refined;
 mod rough;
-mod score;
+mod rough_points;
 mod unexplained;
 
-pub(crate) use landmark_cost::{APART, body_landmark_cost};
+pub(crate) use objective::{MARGIN, Objective, REVERSAL_MARGIN};
 pub(crate) use proposals::SWIVELS;
 pub(crate) use refined::REFINE;
-pub(crate) use score::{GAIN, ROUGH_SAMPLE, SURE_GAIN, explain, limit_strain, overall_cost};
+pub(crate) use rough_points::{ROUGH_SAMPLE, explain};
 
 use crate::association::correspondence::RegionSupport;
 use crate::body::{Body, Model};
 use crate::detect::Detected;
 use crate::fit::{Context, Fit, Motion};
 use crate::math::Pose;
+use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
 use history::History;
@@ -93,7 +94,7 @@ impl Hypotheses {
         let now = context.observation.frame().stamp;
         let elapsed = now - self.stamp.replace(now).unwrap_or(now);
         self.unexplained.collect(context, fit.matched(poses));
-        self.refined.patch_cost = self.unexplained.patch_cost;
+        self.refined.clutter = self.unexplained.clutter;
         let mut steps = 0;
         let pictures = context.pictures_alone();
         if pictures && context.moves_unknown() {
@@ -185,7 +186,7 @@ impl Hypotheses {
         }
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), chain.stretched_length(), near);
-        let unexplained = self.unexplained.patch_cost * near.total();
+        let unexplained = PATCH * self.unexplained.clutter * near.total();
         self.history[at.index].observe(unexplained, elapsed)
     }
 
@@ -203,7 +204,7 @@ impl Hypotheses {
         }
     }
 
-    /// Refines the proposals until one explains the frame better. Returns the number of ICP steps, and whether the pose has changed.
+    /// Refines the proposals and accepts those that explain the frame better. Returns the number of ICP steps, and whether the pose has changed.
     fn try_proposals(
         &mut self,
         context: Context,
@@ -214,15 +215,16 @@ impl Hypotheses {
         if self.pool.found().next().is_none() {
             return (0, false);
         }
-        let (mut steps, current) = (0, self.refined.cost(context, fit, poses));
+        let (mut steps, mut improved, mut current) = (0, false, self.refined.cost(context, fit, poses));
         for proposal in self.pool.found() {
             let (taken, better) = self.refined.replace(context, fit, poses, predicted, current, &proposal.poses);
             steps += taken;
             if better {
-                return (steps, true);
+                improved = true;
+                current = self.refined.cost(context, fit, poses);
             }
         }
-        (steps, false)
+        (steps, improved)
     }
 }
 
@@ -269,7 +271,10 @@ mod tests {
         let (truth, end) = raised(&model, &poses, 0.2);
         let found = improved(&[&truth, &truth, &poses]);
         let steps: Vec<usize> = found.iter().map(|(_, steps)| *steps).collect();
-        assert_eq!(steps, [2 * REFINE, 0, 2 * REFINE], "an arm that explains its points is not tested");
+        assert!(
+            steps[1] == 0 && [0, 2].iter().all(|index| (2 * REFINE..=4 * REFINE).contains(&steps[*index])),
+            "{steps:?}"
+        );
         for (found, _) in &found[..2] {
             assert!(farthest(found, &truth) < 0.01, "{}", farthest(found, &truth));
         }
@@ -284,7 +289,7 @@ mod tests {
         let (pixels, config) = (before_wall(&model.body, &poses), without_background());
         with_context(&pixels, &config, &model, &poses, |context| {
             let (mut fit, mut refined) = (Fit::new(&config).unwrap(), Refined::default());
-            refined.patch_cost = 1.0;
+            refined.clutter = 1.0;
             fit.match_last(context, &poses);
             let before = format!("{:?}", fit.correspondences());
             let current = refined.cost(context, &fit, &poses);
@@ -311,7 +316,7 @@ mod tests {
             |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
         assert_eq!(legs, 2);
         // One arm is not measured, and the frame contradicts the other.
-        hypotheses.history[arm + 1].observe(GAIN, 0.1);
+        hypotheses.history[arm + 1].observe(MARGIN, 0.1);
         hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
         assert_eq!(known(&hypotheses), 2, "only the legs are confirmed");
         hypotheses.history[arm + 1].observe(0.0, 0.1);

@@ -1,6 +1,6 @@
 //! Refinement of hypotheses by ICP, and comparison of their cost with that of the current pose.
 
-use super::score::{Cost, SURE_GAIN, overall_cost};
+use super::objective::{MARGIN, Objective, REVERSAL_MARGIN, colors};
 use crate::association::correspondence::Correspondences;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
@@ -26,8 +26,8 @@ pub(super) struct Refined {
     pub(super) matched: Correspondences,
     /// Label images of the whole body.
     pub(super) backdrop: Backdrop,
-    /// Cost of an unexplained patch in this frame.
-    pub(super) patch_cost: f64,
+    /// Cost of an unexplained patch in this frame, in those of a usual frame.
+    pub(super) clutter: f64,
     /// A hypothesis after its ICP steps, while the current pose has as many.
     tried: Vec<Pose>,
 }
@@ -52,24 +52,24 @@ impl Refined {
         fit: &mut Fit,
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
-        current: Cost,
+        current: f64,
         hypothesis: &[Pose],
     ) -> (usize, bool) {
         // With color images alone, the cost of intermediate steps is not informative.
-        let most = if context.pictures_alone() { f64::INFINITY } else { current.total };
+        let most = if context.pictures_alone() { f64::INFINITY } else { current };
         let (steps, cost) = self.refine_up_to(context, fit, hypothesis, most);
         fit.swap_matches(&mut self.matched);
-        if steps < REFINE || !cost.is_better_than(&current) || !is_another(context, &self.poses, poses) {
+        if steps < REFINE || cost >= current - MARGIN || !is_another(context, &self.poses, poses) {
             return (steps, false);
         }
         std::mem::swap(&mut self.poses, &mut self.tried);
         let settled = self.refine(context, fit, poses);
-        if cost.is_better_than(&settled) && is_another(context, &self.tried, &self.poses) {
+        if cost < settled - MARGIN && is_another(context, &self.tried, &self.poses) {
             predicted.clear();
             predicted.extend_from_slice(hypothesis);
             poses.clone_from(&self.tried);
             fit.match_last(context, poses);
-        } else if settled.is_better_than(&current) && is_another(context, &self.poses, poses) {
+        } else if settled < current - MARGIN && is_another(context, &self.poses, poses) {
             predicted.clone_from(poses);
             poses.clone_from(&self.poses);
         } else {
@@ -81,12 +81,12 @@ impl Refined {
 
     /// Refines a hypothesis together with the whole body and returns its cost. Afterwards, `fit` holds its correspondences and
     /// `matched` the previous ones.
-    pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> Cost {
+    pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> f64 {
         self.refine_up_to(context, fit, hypothesis, f64::INFINITY).1
     }
 
     /// Like [`Self::refine`], but stops early when the cost exceeds `most`. Returns the number of ICP steps and the cost.
-    fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, Cost) {
+    fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, f64) {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
@@ -103,12 +103,12 @@ impl Refined {
             // Halfway, only a much higher cost stops the refinement.
             let worst = match step {
                 GIVE_UP_AFTER => most,
-                _ if 2 * step == REFINE => most + SURE_GAIN,
+                _ if 2 * step == REFINE => most + REVERSAL_MARGIN,
                 _ => f64::INFINITY,
             };
             if worst.is_finite() {
                 let cost = self.own_cost(context, fit);
-                if cost.total > worst {
+                if cost > worst {
                     return (step, cost);
                 }
             }
@@ -119,7 +119,7 @@ impl Refined {
     }
 
     /// Cost of `self.poses`.
-    fn own_cost(&mut self, context: Context, fit: &Fit) -> Cost {
+    fn own_cost(&mut self, context: Context, fit: &Fit) -> f64 {
         let poses = std::mem::take(&mut self.poses);
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
@@ -143,7 +143,7 @@ impl Refined {
         let steps = fit.run_far(context, predicted, &mut tried);
         let cost = self.cost(context, fit, &tried);
         self.poses = tried;
-        if cost.is_better_than(&before) {
+        if cost < before - MARGIN {
             poses.clone_from(&self.poses);
         } else {
             fit.swap_matches(&mut self.matched);
@@ -151,17 +151,16 @@ impl Refined {
         steps
     }
 
-    /// Cost of matched poses. Where color images are the only observation, it includes how well the poses explain them.
-    pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> Cost {
-        let mut cost = overall_cost(context, fit.matched(poses), self.patch_cost);
-        if context.pictures_alone() {
-            let Context { model, observation, previous, .. } = context;
+    /// Cost of matched poses, nats.
+    pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
+        let Context { model, observation, previous, .. } = context;
+        let pictures = context.pictures_alone();
+        if pictures {
             let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
             fit.regions().draw(observation.frame(), posed, |_| true, &mut self.backdrop);
-            let explained = fit.regions().explained(observation.frame(), posed, &self.backdrop);
-            (cost.evidence, cost.total) = (cost.evidence - explained, cost.total - explained);
         }
-        cost
+        let colors = pictures.then(|| colors(context, fit.regions(), &self.backdrop));
+        Objective::new(context, fit.matched(poses), self.clutter, colors).body()
     }
 }
 

@@ -2,12 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::score::{ROUGH_SAMPLE, bounds, explain, may_explain, rough_cost, strain};
+use super::objective::{Objective, colors};
+use super::rough_points::{ROUGH_SAMPLE, bounds, explain, may_explain, rough_cost};
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Matched};
 use crate::math::{Pose, Vec3, WeightedPoints};
-use crate::regions::{Backdrop, ColorRegions, PixelGain, Posed};
-use crate::visibility::evidence::{Visibility, limb_visibility};
+use crate::regions::{Backdrop, ColorRegions, Posed};
+use crate::terms::Colors;
 
 /// The arm or leg under test, and the current poses of the body.
 #[derive(Clone, Copy, Debug)]
@@ -77,14 +78,14 @@ impl RoughScore {
         regions.draw(frame, posed, |limb| chain.limbs().all(|own| own != limb), &mut self.backdrop);
     }
 
-    /// Pixel gain of some of its limbs at `poses`; zero without color regions.
-    pub(super) fn pixel_gain(&self, at: Extremity, poses: &[Pose], limbs: impl Iterator<Item = usize>) -> PixelGain {
-        let mut gain = PixelGain::default();
-        let Some(regions) = at.regions else { return gain };
-        let Context { model, observation, previous, .. } = at.context;
-        let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
-        limbs.for_each(|limb| gain += regions.pixel_gain(observation.frame(), posed, limb, &self.backdrop));
-        gain
+    /// The color images, with the limbs outside the arm or leg.
+    fn colors<'a>(&'a self, at: Extremity<'a>) -> Option<Colors<'a>> {
+        at.regions.map(|regions| colors(at.context, regions, &self.backdrop))
+    }
+
+    /// Cost of one of its limbs at `poses` but for the points, nats.
+    pub(super) fn limb_cost(&self, at: Extremity, poses: &[Pose], limb: usize) -> f64 {
+        Objective::new(at.context, at.matched, 1.0, self.colors(at)).limb(poses, limb)
     }
 
     /// Sets the sample: unexplained points nearby, and the points that are matched to the arm or leg.
@@ -112,28 +113,19 @@ impl RoughScore {
         }
     }
 
-    /// Rough cost of the arm or leg at `poses`, in unexplained patches. The evaluation stops when the cost reaches `least`,
-    /// because the remaining terms are not negative.
+    /// Rough cost of the arm or leg at `poses`, nats. The evaluation stops when the points alone cost `least`.
     pub(super) fn cost(&mut self, at: Extremity, poses: &[Pose], least: f64) -> f64 {
         let Self { sample, others, nearest, distances, .. } = self;
-        let (context, chain) = (at.context, at.chain());
-        let body = &context.model.body;
+        let (chain, body) = (at.chain(), &at.context.model.body);
         nearest.clone_from(others);
         chain.limbs().for_each(|limb| explain(body, limb, poses, &sample.points, nearest, distances));
         let points = rough_cost(nearest, &sample.weights);
-        if at.regions.is_some() {
-            // The gain from colors is the only term that lowers the cost, so there is no early stop.
-            return strain(context, at.matched, chain, poses) - self.pixel_gain(at, poses, chain.limbs()).gained;
-        }
-        if points >= least {
+        // Only colors lower the cost.
+        if at.regions.is_none() && points >= least {
             return points;
         }
-        let mut visible = Visibility::default();
-        chain
-            .limbs()
-            .for_each(|limb| visible += limb_visibility(context.observation.views, &body.limbs()[limb], &poses[limb]));
-        let evidence = points + visible.cost();
-        if evidence >= least { evidence } else { evidence + strain(context, at.matched, chain, poses) }
+        let objective = Objective::new(at.context, at.matched, 1.0, self.colors(at));
+        points + chain.limbs().map(|limb| objective.limb(poses, limb)).sum::<f64>()
     }
 }
 

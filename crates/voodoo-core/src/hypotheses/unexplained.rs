@@ -2,7 +2,7 @@
 
 use crate::fit::{Context, Matched};
 use crate::math::{Vec3, WeightedPoints};
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// Fraction of the points in a frame that a correct pose usually leaves unexplained, and the cost of a patch there, nats: the
 /// logarithm of its probability on the body over that of an unexplained one. It falls where more is unexplained: a frame of
@@ -15,7 +15,7 @@ const USUAL_COST: f64 = 2.0;
 pub(super) struct Unexplained {
     points: WeightedPoints,
     /// Cost of an unexplained patch in this frame, in those of a usual frame.
-    pub(super) patch_cost: f64,
+    pub(super) clutter: f64,
     /// Distance of every candidate to the nearest limb that it is matched to.
     nearest: Vec<f32>,
 }
@@ -24,7 +24,7 @@ impl Unexplained {
     /// Collects the unexplained candidates of a frame.
     pub(super) fn collect(&mut self, context: Context, matched: Matched) {
         let candidates = context.observation.candidates;
-        let Self { points, patch_cost, nearest } = self;
+        let Self { points, clutter, nearest } = self;
         points.clear();
         // Reserved now, so that later steps do not allocate.
         points.reserve(candidates.len());
@@ -45,7 +45,7 @@ impl Unexplained {
         }
         let all: f64 = candidates.weight.iter().map(|weight| f64::from(*weight)).sum();
         let excess = points.total() / (USUAL_CLUTTER * all).max(f64::MIN_POSITIVE);
-        *patch_cost = (1.0 - excess.max(1.0).ln() / USUAL_COST).max(0.0);
+        *clutter = (1.0 - excess.max(1.0).ln() / USUAL_COST).max(0.0);
     }
 
     /// Writes the unexplained points within `reach` meters of a position to `near`.
@@ -85,7 +85,7 @@ mod tests {
     fn a_correct_pose_leaves_few_points_unexplained() {
         let (_, poses) = standing();
         collected(&poses, |unexplained| {
-            assert!(unexplained.points.total() < 5.0 && unexplained.patch_cost == 1.0);
+            assert!(unexplained.points.total() < 5.0 && unexplained.clutter == 1.0);
         });
     }
 

@@ -43,6 +43,8 @@ impl std::ops::AddAssign for PixelGain {
 pub(crate) struct Backdrop {
     planes: Vec<LimbLabels>,
     camera_from_limb: Vec<Pose>,
+    /// Whether each limb is drawn.
+    drawn: Vec<bool>,
 }
 
 impl Backdrop {
@@ -54,13 +56,17 @@ impl Backdrop {
         }
         self.camera_from_limb.clear();
         self.camera_from_limb.reserve(limbs);
+        self.drawn.clear();
+        self.drawn.reserve(limbs);
     }
 }
 
 impl ColorRegions {
     /// Draws the `visible` limbs into the backdrop of each camera.
     pub(crate) fn draw(&self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
-        let Backdrop { planes, camera_from_limb } = backdrop;
+        let Backdrop { planes, camera_from_limb, drawn } = backdrop;
+        drawn.clear();
+        drawn.extend((0..posed.poses.len()).map(&visible));
         planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (picture, labels) in frame.colors.iter().zip(planes) {
             let view = self.viewpoint(frame, picture, posed);
@@ -70,9 +76,14 @@ impl ColorRegions {
         }
     }
 
-    /// What a limb that is not in the backdrop would explain in addition to it.
+    /// What a limb explains in addition to the limbs of the backdrop. Of a limb that is drawn there itself, only the pixels count
+    /// that show it, and nothing is known to be behind it.
     pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> PixelGain {
+        let is_drawn = backdrop.drawn.get(limb).is_some_and(|drawn| *drawn);
         self.sum_over_limb(frame, posed, limb, backdrop, |(label, behind), depth| {
+            if is_drawn {
+                return (usize::from(label) == limb).then_some(NOTHING);
+            }
             (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
         })
     }
@@ -96,15 +107,6 @@ impl ColorRegions {
             }
         }
         self.backdrop = backdrop;
-    }
-
-    /// How well a body explains the images, each pixel counted for the limb visible there; the backdrop contains the whole body.
-    pub(crate) fn explained(&self, frame: &Frame, posed: Posed, backdrop: &Backdrop) -> f64 {
-        let own = |limb: usize| {
-            let nothing_behind = |(label, _): (u16, f64), _| (usize::from(label) == limb).then_some(NOTHING);
-            self.sum_over_limb(frame, posed, limb, backdrop, nothing_behind).gained
-        };
-        (0..posed.poses.len()).map(own).sum()
     }
 
     /// Sums over the sample positions of a limb. `behind` returns what would be visible there without the limb, given the label

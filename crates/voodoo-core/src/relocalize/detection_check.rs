@@ -2,8 +2,8 @@
 
 use crate::body::Body;
 use crate::detect::Detected;
-use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
+use crate::terms::APART;
 
 /// Time for which a track is new, seconds. It is also the interval between detections for a suspect limb.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;

@@ -1,10 +1,9 @@
 //! Tries a body at a new position: after refinement there, it must explain the points no worse than the present pose.
 
-use crate::body::Model;
 use crate::fit::{Context, Fit};
-use crate::hypotheses::{REFINE, ROUGH_SAMPLE, SURE_GAIN, body_landmark_cost, explain, limit_strain, overall_cost};
+use crate::hypotheses::{Objective, REFINE, REVERSAL_MARGIN, ROUGH_SAMPLE, explain};
 use crate::math::{Pose, Vec3, WeightedPoints};
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// Maximum fraction of the points that a body found elsewhere may leave far from it.
 const STRAY: f64 = 0.15;
@@ -31,7 +30,7 @@ impl Trials {
     /// no worse than the present pose does.
     pub(super) fn try_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
         // Depth is nearly symmetric front to back, so a detection may override a slightly better score.
-        self.try_at(context, fit, present, place, SURE_GAIN)
+        self.try_at(context, fit, present, place, REVERSAL_MARGIN)
     }
 
     /// Tries the body at the poses `place`. Returns whether it explains the points there no worse than the present pose does, or
@@ -45,7 +44,7 @@ impl Trials {
         turning: f64,
     ) -> bool {
         fit.match_all(context, present, context.config.max_steps);
-        let present_score = pose_score(context, fit, present);
+        let present_score = Objective::new(context, fit.matched(present), 1.0, None).body();
         self.poses.clear();
         self.poses.extend_from_slice(place);
         self.refine(context, fit);
@@ -54,7 +53,7 @@ impl Trials {
         self.poses = poses;
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
         let allowed = present_score + if turned { turning } else { 0.0 };
-        pose_score(context, fit, &self.poses) < allowed && stray < STRAY
+        Objective::new(context, fit.matched(&self.poses), 1.0, None).body() < allowed && stray < STRAY
     }
 
     /// Returns the fraction of a sample of the candidates that lies far from the body.
@@ -81,17 +80,4 @@ impl Trials {
         }
         fit.match_all(context, poses, context.config.max_steps);
     }
-}
-
-/// Returns the cost of poses: that of hypotheses, plus those of the sites and of the other joints.
-fn pose_score(context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
-    let matched = fit.matched(poses);
-    overall_cost(context, matched, 1.0).total + body_landmark_cost(matched) + other_joints_strain(context.model, poses)
-}
-
-/// Returns the cost of violated limits at joints that are not inside an arm or leg, for example of a foot that points backwards.
-fn other_joints_strain(model: &Model, poses: &[Pose]) -> f64 {
-    let inner = |limb: usize| model.extremities.iter().any(|chain| limb == chain.upper || limb == chain.lower);
-    let others = (1..poses.len()).filter(|limb| !inner(*limb));
-    others.map(|limb| limit_strain(&model.body, poses, limb)).sum()
 }

@@ -3,7 +3,7 @@
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::fit::{Fit, Setting};
-use crate::hypotheses::{GAIN, overall_cost};
+use crate::hypotheses::{MARGIN, Objective};
 use crate::math::Pose;
 use crate::solver::Gate;
 
@@ -27,14 +27,14 @@ pub(super) fn equalize_limb_lengths(setting: Setting, model: &mut Model, poses: 
         let (first, second) = (changed(other, one), changed(one, other));
         let best = if second.cost < first.cost { second } else { first };
         let set = changed(one, one).cost.min(changed(other, other).cost);
-        if best.cost < set - GAIN {
+        if best.cost < set - MARGIN {
             *poses = best.poses;
             model.adopt(best.body);
         }
     }
 }
 
-/// A body, its pose, and its cost in the first frame in unexplained patches.
+/// A body, its pose, and its cost in the first frame, nats.
 struct Changed {
     cost: f64,
     body: Body,
@@ -67,7 +67,7 @@ fn with_lengths_of(
     tried.body.close_joints(&mut set);
     fit.match_points(setting.with_model(&tried), &set, &START_GATE);
     Changed {
-        cost: overall_cost(setting.with_model(&tried), fit.matched(&set), 1.0).evidence,
+        cost: Objective::new(setting.with_model(&tried), fit.matched(&set), 1.0, None).body(),
         body: tried.body,
         poses: set,
     }

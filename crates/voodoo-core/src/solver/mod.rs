@@ -16,7 +16,7 @@ pub(crate) use schedule::{Gate, Reassociation, Schedule, WarmStartInput};
 pub(crate) use spread::Spread;
 pub(crate) use tree::TreeSolver;
 pub(crate) use warm_start::WarmStart;
-pub(crate) use whole_body::{LENGTH_INFORMATION, SITE_SCALE, WholeBody};
+pub(crate) use whole_body::{LENGTH_INFORMATION, OVERLAP_SIGMA, SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
 use crate::body::{Body, Pair};
@@ -27,7 +27,7 @@ use crate::observation::frame::Ground;
 /// Largest rotation of a joint or limb in one step, radians: the linearization is not valid beyond.
 const LARGEST_TURN: f64 = 0.5;
 /// Standard deviation of a violated joint limit, radians: 3 degrees.
-const LIMIT_SIGMA: f64 = 0.05;
+pub(crate) const LIMIT_SIGMA: f64 = 0.05;
 /// Relative damping of the normal matrix: unknowns with almost no measurements stay where they are.
 const DAMPING: f64 = 1e-3;
 

@@ -13,7 +13,7 @@ use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
 
 /// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
-const OVERLAP_SIGMA: f64 = 0.03;
+pub(crate) const OVERLAP_SIGMA: f64 = 0.03;
 /// Scatter of the points about the body at which the still prior has its full gain, in units of `point_sigma`.
 const ROUGH: f64 = 0.35;
 /// From this step on, a remaining deviation from the prediction may be noise; in earlier steps the points are still being

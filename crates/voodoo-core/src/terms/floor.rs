@@ -1,7 +1,7 @@
 //! Keeps the ends of limbs above the ground plane. The constraint is soft, as between limbs: the given or estimated plane may
 //! have a small error.
 
-use super::Term;
+use super::{LARGEST_COST, Term};
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Ground;
@@ -27,5 +27,10 @@ impl Term for Floor {
                 normal.limbs[index].add_row(weight, &-line(end, self.plane.normal), depth);
             }
         }
+    }
+
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let end = poses[limb] * (Vec3::Z * body.limbs()[limb].shape.length());
+        (0.5 * (self.plane.height(end).min(0.0) / self.sigma).powi(2)).min(LARGEST_COST)
     }
 }

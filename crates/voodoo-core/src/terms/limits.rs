@@ -1,9 +1,12 @@
 //! Joint limits, one-sided and soft: each component of the joint's rotation vector stays in its range.
 
-use super::Term;
+use super::{LARGEST_COST, Term};
 use crate::body::{Body, Joint};
 use crate::math::{Pose, Quat, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
+
+/// Standard deviation of the limits between persons, radians: a violation by less tells little about which pose is right.
+const BETWEEN_PERSONS: f64 = 0.2;
 
 /// All joints that have limits.
 #[derive(Debug)]
@@ -34,6 +37,15 @@ impl Term for Limits {
             }
         }
     }
+
+    fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
+        let Some((parent, joint)) = &body.limbs()[limb].parent else { return 0.0 };
+        let Some(limits) = &joint.limits else { return 0.0 };
+        let (_, v) = turn_in_joint(joint, &poses[*parent], &poses[limb]);
+        let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
+        let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / BETWEEN_PERSONS).powi(2)).sum();
+        (0.5 * squares).min(LARGEST_COST)
+    }
 }
 
 /// The joint's axes in the world frame, and the rotation vector of its rotation in the joint frame, radians.
@@ -59,4 +71,28 @@ pub(super) fn inverse_left_jacobian_row(v: Vec3, axis: usize) -> Vec3 {
     // e^T [v]^2 u = e . (v x (v x u)) = u . ((e x v) x v)
     let second = first.cross(v);
     e - 0.5 * first + k * second
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::kinematics::{hinge_axis, place};
+    use crate::testing::{first_arm, standing};
+
+    #[test]
+    fn a_hyperextended_elbow_costs_its_squared_violation_up_to_the_greatest_cost() {
+        let (model, poses) = standing();
+        let elbow = model.extremities[first_arm(&model)].lower;
+        let (parent, joint) = model.body.limbs()[elbow].parent.as_ref().unwrap();
+        let [[least, _], ..] = joint.limits.unwrap();
+        let term = Limits { sigma: 0.05 };
+        assert!(term.cost(&model.body, &poses, elbow) < 1e-9);
+        for (beyond, expected) in [(0.1, 0.125), (0.4, 2.0), (1.2, LARGEST_COST)] {
+            let mut bent = poses.clone();
+            bent[elbow] = place(joint, &poses[*parent], Quat::from_axis_angle(hinge_axis(joint), least - beyond));
+            let cost = term.cost(&model.body, &bent, elbow);
+            assert!((cost - expected).abs() < 1e-6, "{cost} for {beyond}");
+        }
+    }
 }

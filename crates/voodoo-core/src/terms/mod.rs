@@ -2,6 +2,7 @@
 
 mod contour;
 mod floor;
+mod free_space;
 mod limits;
 pub(crate) mod normal_equations;
 mod penetration;
@@ -13,13 +14,14 @@ mod surface;
 
 pub(crate) use contour::Contour;
 pub(crate) use floor::Floor;
+pub(crate) use free_space::FreeSpace;
 pub(crate) use limits::Limits;
 pub(crate) use penetration::Penetration;
 pub(crate) use posture::Posture;
 pub(crate) use prior::Prior;
-pub(crate) use regions::Regions;
-pub(crate) use sites::Sites;
-pub(crate) use surface::Surface;
+pub(crate) use regions::{Colors, Regions};
+pub(crate) use sites::{APART, Sites};
+pub(crate) use surface::{Surface, unexplained};
 
 use crate::association::correspondence::Correspondences;
 use crate::body::Body;
@@ -27,10 +29,25 @@ use crate::config::Config;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
 
+/// Cost of an unexplained patch, nats. Measurements err alike over about a square decimeter, so a patch of 1.44 square centimeters
+/// tells less than one of its own would.
+pub(crate) const PATCH: f64 = 0.12;
+/// Greatest cost of one limb in the terms that are not measurements, nats: such a term may be wrong, too.
+const LARGEST_COST: f64 = 10.0;
+
 /// One term of the cost function.
+///
+/// The solver linearizes a term at poses that differ by millimeters. Poses that differ by centimeters are compared by its cost,
+/// which is limited, because no model of an error holds far away, and lower than the sum of squares, because nearby measurements
+/// err alike.
 pub(crate) trait Term {
     /// Adds cost, gradient and information at `poses` (working frame).
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations);
+
+    /// Negative log-likelihood of the pose of one limb, nats. Terms that do not tell such poses apart have none.
+    fn cost(&self, _body: &Body, _poses: &[Pose], _limb: usize) -> f64 {
+        0.0
+    }
 }
 
 /// The terms of all measurements: those that the solver fits and from which covariances follow.
@@ -58,7 +75,7 @@ impl<'a> Measurements<'a> {
             surface: Surface { correspondences, information, tangential_weight: config.tangential_weight, scale },
             sites: Sites { correspondences, information, scale: site_scale, biased },
             contour: Contour { pairs: &correspondences.contour, information: edge_information, scale },
-            regions: Regions { pairs: &correspondences.regions },
+            regions: Regions { pairs: &correspondences.regions, colors: None },
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Measured surface points: robust point-to-plane distance with a small point-to-point part (method section 1).
 
-use super::Term;
+use super::{PATCH, Term};
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::body::Body;
 use crate::math::{LANES, Mat3, Pose, widest};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
+use crate::visibility::EXPLAINED;
 
 /// `W = w (n n^T + tangential_weight (I - n n^T))` under the Geman-McClure kernel of the signed distance.
 #[derive(Debug)]
@@ -36,6 +37,18 @@ impl Term for Surface<'_> {
             normal.cost += sums.add_to(block);
         }
     }
+
+    /// The cost of the points matched to a limb less that of unexplained points, at the poses where they were matched.
+    fn cost(&self, _body: &Body, _poses: &[Pose], limb: usize) -> f64 {
+        let matches = &self.correspondences.limbs[limb];
+        let pairs = matches.weight.iter().zip(&matches.surface.signed_distance);
+        pairs.map(|(weight, distance)| f64::from(*weight) * (unexplained(f64::from(*distance)) - PATCH)).sum()
+    }
+}
+
+/// Cost of a point of weight one at this distance from the surface, nats.
+pub(crate) fn unexplained(distance: f64) -> f64 {
+    PATCH * (distance / EXPLAINED).powi(2).min(1.0)
 }
 
 type SurfaceLanes = [f32; LANES];

@@ -126,7 +126,7 @@ impl EdgeFilter {
     ) {
         let normal = &mut self.normal;
         normal.clear(poses.len());
-        Regions { pairs: &correspondences.regions }.add(body, poses, normal);
+        Regions { pairs: &correspondences.regions, colors: None }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
             let support_net =
                 correspondences.region_support.get(limb).map_or(0.0, |support| support.own[0] - support.against[0]);

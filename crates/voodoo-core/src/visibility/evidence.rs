@@ -3,19 +3,12 @@
 //! Points that no limb explains have a cost, and so does visible model surface that violates free space. Either term alone is
 //! insufficient: a limb hidden inside the torso violates nothing, and a limb in empty space leaves few points unexplained.
 
-use crate::association::correspondence::Correspondences;
 use crate::body::Limb;
 use crate::math::Pose;
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::depth_view::DepthViews;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ALONG_LIMB, LIMB_RIM};
-
-/// Distance from the model's surface at which a point counts as unexplained, meters. The surface violates free space where the
-/// background is this far behind it, or a possible body point twice as far.
-pub(crate) const EXPLAINED: f64 = 0.04;
-/// Cost of an occluded patch, in patches: less than one, since occlusion is possible.
-const OCCLUDED_COST: f64 = 0.3;
 
 /// Patches of a limb that face a camera inside its image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,35 +29,10 @@ impl std::ops::AddAssign for Patches {
     }
 }
 
-/// Visibility of a limb, summed over cameras.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Visibility {
-    /// Patches weighted by their area in the image.
-    pub image: Patches,
-    /// Patches weighted as if the limb were viewed from its side, so that pointing along the ray does not reduce the cost of
-    /// occlusion.
-    pub side: Patches,
-}
-
-impl std::ops::AddAssign for Visibility {
-    fn add_assign(&mut self, other: Self) {
-        self.image += other.image;
-        self.side += other.side;
-    }
-}
-
-impl Visibility {
-    /// Returns the cost in unexplained patches: a free-space violation costs as much as an unexplained patch, an occluded patch
-    /// less.
-    pub(crate) fn cost(&self) -> f64 {
-        self.image.free_space + OCCLUDED_COST * self.side.occluded
-    }
-}
-
 /// Returns the patches of a limb's surface that are visible to the cameras, occluded, and in free space.
-pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Visibility {
+pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Patches {
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
-    let mut found = Visibility::default();
+    let mut found = Patches::default();
     for view in views.iter() {
         let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
         for row in surface_rows(shape, &camera_from_limb) {
@@ -72,43 +40,25 @@ pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb:
             let (a, b) = (section.a, section.b);
             // A limb viewed obliquely covers less of the image, and yields fewer points by the same factor.
             let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
-            let whole = 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
+            let patches = aslant * 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
                 / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
             for place in row.places(&view, across) {
-                let sight = place.sight();
-                if sight == PatchVisibility::Unknown {
-                    continue;
+                match place.sight() {
+                    PatchVisibility::Unknown => continue,
+                    PatchVisibility::FreeSpace => found.free_space += patches,
+                    PatchVisibility::Occluded => found.occluded += patches,
+                    PatchVisibility::Consistent => {}
                 }
-                for (counts, patches) in [(&mut found.image, whole * aslant), (&mut found.side, whole)] {
-                    match sight {
-                        PatchVisibility::FreeSpace => counts.free_space += patches,
-                        PatchVisibility::Occluded => counts.occluded += patches,
-                        PatchVisibility::Consistent | PatchVisibility::Unknown => {}
-                    }
-                    counts.front_facing += patches;
-                }
+                found.front_facing += patches;
             }
         }
     }
     found
 }
 
-/// Cost of the points that the pose leaves unexplained: `w min(d^2 / c^2, 1)` of every candidate.
-pub(crate) fn unexplained(correspondences: &Correspondences, total_weight: f64) -> f64 {
-    let mut cost = total_weight;
-    for matches in &correspondences.limbs {
-        for (weight, distance) in matches.weight.iter().zip(&matches.surface.signed_distance) {
-            let ratio = f64::from(*distance) / EXPLAINED;
-            cost -= f64::from(*weight) * (1.0 - ratio * ratio).max(0.0);
-        }
-    }
-    cost
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::association::correspondence::LimbMatches;
     use crate::body::{Body, HumanModel};
     use crate::math::{Quat, Vec3};
     use crate::observation::background::Backgrounds;
@@ -131,7 +81,7 @@ mod tests {
     }
 
     /// What is seen of every limb together.
-    fn visible(pixels: &[u16], body: &Body, poses: &[Pose]) -> Visibility {
+    fn visible(pixels: &[u16], body: &Body, poses: &[Pose]) -> Patches {
         let images = [DepthImage {
             pixels: DepthPixels::U16(pixels),
             camera: pinhole(WIDTH, HEIGHT, INTRINSICS),
@@ -143,7 +93,7 @@ mod tests {
         let frame = Frame { images: &images, ..Frame::empty(0.0) };
         let views =
             DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
-        let mut all = Visibility::default();
+        let mut all = Patches::default();
         body.limbs().iter().zip(poses).for_each(|(limb, pose)| all += limb_visibility(views, limb, pose));
         all
     }
@@ -155,23 +105,20 @@ mod tests {
     }
 
     #[test]
-    fn a_body_where_it_is_visible_costs_little_and_elsewhere_much() {
+    fn a_body_where_it_is_visible_violates_little_free_space_and_elsewhere_much() {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let poses = standing(&body);
         let pixels = shoot(&body, &poses, 4000);
         let right = visible(&pixels, &body, &poses);
-        assert!(
-            right.image.front_facing > 500.0 && right.image.free_space < 0.05 * right.image.front_facing,
-            "{right:?}"
-        );
+        assert!(right.front_facing > 500.0 && right.free_space < 0.05 * right.front_facing, "{right:?}");
         // The farther the lateral offset, the more of the body is where the camera observes the wall.
-        let mut last = right.cost();
+        let mut last = right.free_space;
         for shift in [0.1, 0.2, 0.4] {
             let aside: Vec<Pose> =
                 poses.iter().map(|pose| Pose::from_parts(pose.translation + shift * Vec3::X, pose.rotation)).collect();
-            let cost = visible(&pixels, &body, &aside).cost();
-            assert!(cost > last + 50.0, "{cost} at {shift} m after {last}");
-            last = cost;
+            let past = visible(&pixels, &body, &aside).free_space;
+            assert!(past > last + 50.0, "{past} at {shift} m after {last}");
+            last = past;
         }
     }
 
@@ -181,22 +128,10 @@ mod tests {
         let poses = standing(&body);
         let wall = |millimeters: u16| visible(&vec![millimeters; WIDTH * HEIGHT], &body, &poses);
         let (before, behind, nothing) = (wall(1500), wall(4000), wall(0));
-        assert!(before.image.front_facing > 0.0 && before.image.occluded == before.image.front_facing, "{before:?}");
-        assert!(before.image.free_space == 0.0 && behind.image.occluded == 0.0);
-        assert_eq!(behind.image.free_space, behind.image.front_facing);
-        assert!(before.cost() < behind.cost(), "to be hidden is possible, to be seen through is not");
-        assert_eq!(nothing, Visibility::default(), "no return says nothing");
-    }
-
-    #[test]
-    fn points_cost_what_the_surface_leaves_of_them() {
-        let mut all = Correspondences::default();
-        let mut matches = LimbMatches { weight: vec![2.0, 0.0, 1.0, 3.0], ..LimbMatches::default() };
-        matches.surface.signed_distance = vec![0.0, 0.0, -0.02, 0.5];
-        all.limbs.push(matches);
-        // Five points of weight one are matched to nothing at all: `w min(d^2 / c^2, 1)` one by one.
-        let expected = 5.0 + 2.0 * 0.0 + 1.0 * (0.02_f64 / EXPLAINED).powi(2) + 3.0;
-        assert!((unexplained(&all, 5.0 + 2.0 + 1.0 + 3.0) - expected).abs() < 1e-6);
+        assert!(before.front_facing > 0.0 && before.occluded == before.front_facing, "{before:?}");
+        assert!(before.free_space == 0.0 && behind.occluded == 0.0);
+        assert_eq!(behind.free_space, behind.front_facing);
+        assert_eq!(nothing, Patches::default(), "no return says nothing");
     }
 
     #[test]
@@ -218,7 +153,7 @@ mod tests {
         let at = |angle: f64| {
             let turn = Quat::from_axis_angle(Vec3::Y, angle);
             let middle = turn * Vec3::new(0.0, 0.0, 0.5 * limb.shape.length());
-            limb_visibility(views, limb, &Pose::from_parts(Vec3::new(0.0, 0.0, 2.5) - middle, turn)).image
+            limb_visibility(views, limb, &Pose::from_parts(Vec3::new(0.0, 0.0, 2.5) - middle, turn))
         };
         let across = at(std::f64::consts::FRAC_PI_2);
         assert!(across.front_facing > 50.0 && across.free_space == across.front_facing, "{across:?}");

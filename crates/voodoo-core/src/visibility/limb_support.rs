@@ -10,7 +10,7 @@ use crate::body::two_bone::TwoBone;
 use crate::math::Pose;
 use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::shape::TaperedEllipticCylinder;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};

@@ -24,6 +24,9 @@ pub(crate) const LITTLE: f64 = 0.3;
 /// Minimum number of patches that a fraction refers to, because fractions of fewer patches fluctuate. Without a depth image, a
 /// limb with as many points counts as measured.
 pub(crate) const FEW: f64 = 5.0;
+/// Distance from the model's surface at which a point counts as unexplained, meters. The surface violates free space where the
+/// background is this far behind it, or a possible body point twice as far.
+pub(crate) const EXPLAINED: f64 = 0.04;
 /// Tolerance for the overlap of limb surfaces, meters: they overlap by this much at joints and where they touch. Only greater
 /// depths count as occlusion or as intersection.
 pub(crate) const OVERLAP: f64 = 0.01;

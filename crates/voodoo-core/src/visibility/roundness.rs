@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::math::Pose;
 use crate::observation::depth_view::DepthViews;
 use crate::visibility::ACROSS_LIMB;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 use crate::visibility::surface::surface_rows;
 
 /// Returns how far the observed surface recedes between the middle of limbs and their rims, relative to the model: approximately

@@ -4,7 +4,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
 use crate::shape::{FacingSection, TaperedEllipticCylinder};
 use crate::visibility::ALONG_LIMB;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// What a camera observes at a point on the model's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

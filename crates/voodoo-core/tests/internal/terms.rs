@@ -103,7 +103,7 @@ proptest! {
                 let information = if index % 2 == 0 { Mat3::IDENTITY } else { Mat3::IDENTITY - Mat3::from_cols(d * d.x, d * d.y, d * d.z) };
                 // A ray's target is the closest point on it.
                 let p = if index % 2 == 0 { p } else { p + d * (x - p).dot(d) };
-                SitePair { limb: site.limb, x, p, weight: 1.0, base_weight: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
+                SitePair { limb: site.limb, local: site.position, x, p, weight: 1.0, base_weight: 1.0, bias: 0.0, across: Mat3::IDENTITY, information, source: 0 }
             }).collect();
             let correspondences = Correspondences { sites: pairs, ..Default::default() };
             Sites { correspondences: &correspondences, information: 1.0, scale: 0.5, biased: true }.add(&body, poses, normal);
@@ -141,7 +141,7 @@ proptest! {
                 let information = 1.0 + limb as f64;
                 RegionPair { limb, x, normal, distance: edges[limb] - normal.dot(x), information, source: 0 }
             }).collect();
-            Regions { pairs: &pairs }.add(&body, poses, system);
+            Regions { pairs: &pairs, colors: None }.add(&body, poses, system);
         })?;
     }
 
@@ -180,6 +180,7 @@ proptest! {
             let push = system.limbs[limb].g;
             // What is above feels nothing.
             prop_assert_eq!(height < 0.0, push.norm() > 0.0);
+            prop_assert!((term.cost(&body, &poses, limb) - 0.5 * height.min(0.0).powi(2)).abs() < 1e-12);
         }
     }
 

@@ -6,7 +6,6 @@ use std::f64::consts::{PI, TAU};
 use super::{Pool, Propose, SWIVELS};
 use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
-use crate::hypotheses::score::limit_strain;
 use crate::math::{Pose, Vec3};
 
 /// Search over directions, with working memory.
@@ -56,8 +55,7 @@ impl ColorDirections {
             trial.clear();
             trial.extend_from_slice(poses);
             chain.place_between(body, trial, at.root() + upper, at.root() + 2.0 * upper);
-            let visible = rough.score.pixel_gain(at, trial, [chain.upper].into_iter()).gained;
-            let cost = limit_strain(body, trial, chain.upper) - visible;
+            let cost = rough.score.limb_cost(at, trial, chain.upper);
             let place = kept.partition_point(|(other, _)| *other <= cost);
             if place < SWIVELS {
                 kept.truncate(SWIVELS - 1);

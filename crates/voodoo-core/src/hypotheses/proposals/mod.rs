@@ -12,7 +12,7 @@ pub(super) use detected_end::DetectedEnd;
 pub(super) use last_good_end::LastGoodEnd;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 
-use super::GAIN;
+use super::MARGIN;
 use super::history::History;
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
@@ -45,6 +45,8 @@ pub(super) struct Pool {
     pub(super) least: f64,
     /// Rough cost of the current configuration.
     pub(super) current: f64,
+    /// It is stretched through unexplained points.
+    pub(super) stretched: Proposal,
     /// The end is at its detected position.
     pub(super) detected: Proposal,
     /// The whole body has the detected poses.
@@ -65,17 +67,17 @@ impl Pool {
         for proposal in self.slots() {
             proposal.found = false;
         }
-        (self.least, self.current) = (current - GAIN, current);
+        (self.least, self.current) = (current - MARGIN, current);
     }
 
     /// The proposals found, in the order in which they are refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { last_good, points, detected, body, .. } = self;
-        [last_good, points, detected, body].into_iter().filter(|slot| slot.found)
+        let Self { last_good, points, stretched, detected, body, .. } = self;
+        [last_good, points, stretched, detected, body].into_iter().filter(|slot| slot.found)
     }
 
-    fn slots(&mut self) -> [&mut Proposal; 4] {
-        let Self { last_good, points, detected, body, .. } = self;
-        [last_good, points, detected, body]
+    fn slots(&mut self) -> [&mut Proposal; 5] {
+        let Self { last_good, points, stretched, detected, body, .. } = self;
+        [last_good, points, stretched, detected, body]
     }
 }

@@ -1,10 +1,10 @@
-//! Proposes an arm or leg that ends at a cluster of unexplained points.
+//! Proposes an arm or leg that ends at a cluster of unexplained points, and one that is stretched through it.
 
 use super::{Pool, Propose, SWIVELS};
-use crate::hypotheses::APART;
 use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
+use crate::terms::APART;
 use crate::visibility::FEW;
 
 /// Proposal of ends at the clusters that are farthest from the root and from each other.
@@ -24,7 +24,15 @@ impl UnexplainedCluster {
 impl Propose for UnexplainedCluster {
     fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
         let ends = end_proposals(&rough.score.unexplained, at.root(), &mut self.apart);
+        let mut stretched = pool.least;
         for end in ends.into_iter().flatten() {
+            // A hand that lies on another limb leaves only the points of its forearm, which a stretched arm passes.
+            let beyond = at.root() + (end - at.root()).normalize() * at.chain().stretched_length();
+            let cost = rough.end_at(at, beyond, 1, stretched, &mut pool.stretched.poses);
+            if cost < stretched {
+                stretched = cost;
+                pool.stretched.found = true;
+            }
             let least = rough.end_at(at, end, SWIVELS, pool.least, &mut pool.points.poses);
             if least < pool.least {
                 pool.least = least;

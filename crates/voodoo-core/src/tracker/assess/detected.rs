@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::detect::Detected;
 use crate::math::{Pose, Vec3};
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// Returns the log odds that a limb's pose is right, from the detected positions of the proximal joints of `limbs`: the limb
 /// itself and the next one. The sum over both joints contradicts a limb if the detection is far from most of it, even if one

@@ -7,7 +7,7 @@ use crate::body::Model;
 use crate::body::two_bone::TwoBone;
 use crate::tracker::estimate::LimbStatus;
 use crate::uncertainty::FittedPose;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// Factor on a limb's standard deviation when the second branch puts its end at a distance of `apart` meters. It is 1 where the
 /// branches differ by as much as a point may lie from the limb that explains it.

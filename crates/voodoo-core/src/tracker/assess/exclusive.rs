@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::hypotheses::ROUGH_SAMPLE;
 use crate::math::{Points, Pose, widest};
 use crate::observation::candidates::Candidates;
-use crate::visibility::evidence::EXPLAINED;
+use crate::visibility::EXPLAINED;
 
 /// Total weight of the exclusively explained candidates, and working memory.
 #[derive(Debug, Default)]

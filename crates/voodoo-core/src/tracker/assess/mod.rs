@@ -24,14 +24,14 @@ use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::detect::Detected;
 use crate::fit::{Context, Matched};
-use crate::hypotheses::APART;
 use crate::math::{Pose, Vec3};
+use crate::terms::APART;
 use crate::uncertainty::{EdgeFilter, Uncertainty};
-use crate::visibility::evidence::{EXPLAINED, limb_visibility};
+use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
-use crate::visibility::{FEW, LITTLE};
+use crate::visibility::{EXPLAINED, FEW, LITTLE};
 use detected::detection_log_odds;
 use exclusive::Exclusive;
 use limb_history::LimbHistory;
@@ -189,7 +189,7 @@ impl Assessor {
         self.exclusive.count(body, poses, context.observation.candidates);
         measure_support(views, body, poses, &context.model.extremities, &mut self.raycasters, &mut self.supports);
         for (limb, history) in self.limbs.iter_mut().enumerate() {
-            let visibility = limb_visibility(views, &body.limbs()[limb], &poses[limb]).image;
+            let visibility = limb_visibility(views, &body.limbs()[limb], &poses[limb]);
             let visible = visibility.front_facing - visibility.occluded;
             let exclusive = self.exclusive.weight[limb];
             let mut now = if visibility.front_facing > 0.0 {

@@ -1,0 +1,151 @@
+//! The objective by which poses of a frame are compared: the cost of all terms.
+
+use crate::body::Body;
+use crate::fit::{Context, Matched};
+use crate::math::Pose;
+use crate::regions::{Backdrop, ColorRegions};
+use crate::solver::{LIMIT_SIGMA, OVERLAP_SIGMA, SITE_SCALE};
+use crate::terms::{Colors, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Surface, Term};
+
+/// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
+/// is unexplained.
+pub(crate) const MARGIN: f64 = 3.0;
+/// The decrease for a change to the opposite direction, which depth hardly tells apart.
+pub(crate) const REVERSAL_MARGIN: f64 = 12.0;
+
+/// Negative log-likelihood of poses of a body in a frame, nats.
+#[derive(Debug)]
+pub(crate) struct Objective<'a> {
+    body: &'a Body,
+    matched: Matched<'a>,
+    /// Cost of an unexplained patch in this frame, in those of a usual frame.
+    clutter: f64,
+    /// Weights of all candidates.
+    weights: &'a [f32],
+    surface: Surface<'a>,
+    free_space: FreeSpace<'a>,
+    sites: Sites<'a>,
+    regions: Regions<'a>,
+    limits: Limits,
+    penetration: Penetration<'a>,
+    floor: Option<Floor>,
+}
+
+impl<'a> Objective<'a> {
+    /// The objective of matched poses. An unexplained patch costs `clutter` times the usual. `colors` are the color images where
+    /// they are the only observation.
+    pub(crate) fn new(context: Context<'a>, matched: Matched<'a>, clutter: f64, colors: Option<Colors<'a>>) -> Self {
+        let Context { model, observation, config, .. } = context;
+        let Matched { correspondences, .. } = matched;
+        let information = 1.0 / (config.point_sigma * config.point_sigma);
+        let (tangential_weight, scale) = (config.tangential_weight, config.kernel_end);
+        Self {
+            body: &model.body,
+            matched,
+            clutter,
+            weights: &observation.candidates.weight,
+            surface: Surface { correspondences, information, tangential_weight, scale },
+            free_space: FreeSpace { views: observation.views },
+            sites: Sites { correspondences, information, scale: SITE_SCALE, biased: true },
+            regions: Regions { pairs: &correspondences.regions, colors },
+            limits: Limits { sigma: LIMIT_SIGMA },
+            penetration: Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
+            floor: observation.floor().map(|plane| Floor { plane, sigma: OVERLAP_SIGMA }),
+        }
+    }
+
+    /// Cost of the pose of one limb but for the points.
+    pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
+        let terms: [&dyn Term; 5] = [&self.free_space, &self.sites, &self.regions, &self.limits, &self.penetration];
+        let floor = self.floor.iter().map(|floor| floor as &dyn Term);
+        terms.into_iter().chain(floor).map(|term| term.cost(self.body, poses, limb)).sum()
+    }
+
+    /// Cost of the matched poses of the whole body. A point that no limb explains costs a patch of its weight.
+    pub(crate) fn body(&self) -> f64 {
+        let poses = self.matched.poses;
+        let limbs = 0..poses.len();
+        let total: f64 = self.weights.iter().map(|weight| f64::from(*weight)).sum();
+        let explained: f64 = limbs.clone().map(|limb| self.surface.cost(self.body, poses, limb)).sum();
+        self.clutter * (PATCH * total + explained) + limbs.map(|limb| self.limb(poses, limb)).sum::<f64>()
+    }
+}
+
+/// The color images of a frame, and the limbs drawn in them.
+pub(super) fn colors<'a>(context: Context<'a>, regions: &'a ColorRegions, backdrop: &'a Backdrop) -> Colors<'a> {
+    let Context { observation, previous, .. } = context;
+    Colors { regions, frame: observation.frame(), previous, origin: observation.origin(), backdrop }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use super::*;
+    use crate::body::Model;
+    use crate::fit::Fit;
+    use crate::math::Vec3;
+    use crate::testing::{before_wall, moved, put_board, raised, standing, turned, with_context, without_background};
+
+    /// Costs of poses in an image of the body at `truth`.
+    fn costs(model: &Model, truth: &[Pose], tried: &[Vec<Pose>]) -> Vec<f64> {
+        let (pixels, config) = (before_wall(&model.body, truth), without_background());
+        with_context(&pixels, &config, model, truth, |context| {
+            let mut fit = Fit::new(&config).unwrap();
+            let mut cost = |poses: &Vec<Pose>| {
+                fit.match_last(context, poses);
+                let (before, written) = (poses.clone(), format!("{:?}", fit.correspondences()));
+                let cost = || Objective::new(context, fit.matched(poses), 1.0, None).body();
+                assert_eq!(cost().to_bits(), cost().to_bits(), "the cost of the same input must not change");
+                assert_eq!((&before, written), (poses, format!("{:?}", fit.correspondences())));
+                cost()
+            };
+            tried.iter().map(&mut cost).collect()
+        })
+    }
+
+    #[test]
+    fn a_correct_pose_costs_less_than_disturbed_ones_and_the_cost_has_no_side_effects() {
+        let (model, poses) = standing();
+        let root = poses[0].translation;
+        let mut tried = vec![poses.clone()];
+        for shift in [0.1 * Vec3::X, -0.1 * Vec3::X, 0.1 * Vec3::Y, 0.15 * Vec3::Z, -0.15 * Vec3::Z] {
+            tried.push(moved(&poses, shift));
+        }
+        for (axis, angle) in [(Vec3::Z, 0.15), (Vec3::Z, -0.15), (Vec3::X, 0.2), (Vec3::Y, 0.8)] {
+            tried.push(turned(&poses, root, axis, angle));
+        }
+        tried.push(raised(&model, &poses, 0.2).0);
+        let costs = costs(&model, &poses, &tried);
+        assert!(costs[0] < MARGIN, "{} nats", costs[0]);
+        for (index, cost) in costs.iter().enumerate().skip(1) {
+            assert!(*cost > costs[0] + MARGIN, "{index}: {cost}");
+        }
+    }
+
+    #[test]
+    fn unexplained_points_and_violated_free_space_cost_their_area_and_hidden_limbs_nothing() {
+        let (model, poses) = standing();
+        let config = without_background();
+        let cost = |pixels: &[u16]| {
+            with_context(pixels, &config, &model, &poses, |context| {
+                let mut fit = Fit::new(&config).unwrap();
+                fit.match_last(context, &poses);
+                let all: f32 = context.observation.candidates.weight.iter().sum();
+                (Objective::new(context, fit.matched(&poses), 1.0, None).body(), PATCH * f64::from(all))
+            })
+        };
+        let alone = before_wall(&model.body, &poses);
+        let (right, body) = cost(&alone);
+        // An empty room: the whole visible surface violates free space, at half the price of points.
+        let (past, points) = cost(&vec![4500; alone.len()]);
+        assert!(points == 0.0 && past > 0.4 * body && past < body, "{past} of {body}");
+        // A nearer wall hides the whole body.
+        assert!(cost(&vec![1000; alone.len()]).0 <= right);
+        // A board beside the body.
+        let mut pixels = alone.clone();
+        put_board(&mut pixels, Vec3::new(0.75, 0.0, 2.6), [0.1; 2]);
+        let (beside, all) = cost(&pixels);
+        let board = all - body;
+        assert!(board > 2.0 && (beside - right - board).abs() < 0.1 * board, "{beside}, {board}");
+    }
+}
