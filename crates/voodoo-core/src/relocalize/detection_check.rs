@@ -31,6 +31,8 @@ pub(crate) struct Reasons {
     pub(crate) pose_uncertain: bool,
     /// The body may be anywhere.
     pub(crate) anywhere: bool,
+    /// The person's surface is not that of the body, for example in a skirt: with a suspect limb, every frame needs a detection.
+    pub(crate) unlike: bool,
 }
 
 /// Result of comparing a detection with the tracked pose.
@@ -113,7 +115,7 @@ impl DetectionCheck {
 
     /// Counts a frame and returns whether the detector is due.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons) -> bool {
-        let Reasons { limb_suspect, pose_uncertain, anywhere } = reasons;
+        let Reasons { limb_suspect, pose_uncertain, anywhere, unlike } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
         let waited = |last_detection: Option<f64>, every: f64| {
@@ -122,7 +124,11 @@ impl DetectionCheck {
         // A given start that a detection confirmed is checked half as often.
         let after = if self.agreed && !anywhere { 2.0 * EVERY } else { EVERY };
         let comparison_due = new_track && waited(self.last_comparison, after);
-        let every = if pose_uncertain || anywhere { EVERY } else { NEW_TRACK_AGE };
+        let every = match (limb_suspect && unlike, pose_uncertain || anywhere) {
+            (true, _) => 0.0,
+            (false, true) => EVERY,
+            (false, false) => NEW_TRACK_AGE,
+        };
         let due = comparison_due || (limb_suspect || pose_uncertain || anywhere) && waited(self.last_detection, every);
         self.compares = comparison_due || !new_track;
         if comparison_due {
@@ -187,7 +193,7 @@ mod tests {
     #[test]
     fn new_lost_and_uncertain_tracks_are_checked_often_and_confident_ones_never() {
         let count = |from: f64, [limb_suspect, pose_uncertain, anywhere]: [bool; 3]| {
-            let reasons = Reasons { limb_suspect, pose_uncertain, anywhere };
+            let reasons = Reasons { limb_suspect, pose_uncertain, anywhere, unlike: false };
             let mut check = DetectionCheck::default();
             check.is_due(0.0, Reasons::default());
             (1..=27).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
