@@ -116,3 +116,46 @@ impl Term for DetectedJoints<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::{Detection, JointMap};
+    use crate::testing::{moved, standing};
+
+    /// The measured joints of a detection at the poses of the standing body moved by `aside`, and the pairs for the standing body.
+    fn measured(aside: Vec3, sigma: f64) -> (Vec<MeasuredJoint>, Correspondences) {
+        let (model, poses) = standing();
+        let (body, origin, there) = (&model.body, Vec3::X, moved(&poses, aside));
+        let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
+        let place = |site| body.site_position(&there, site) + origin;
+        let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
+        let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
+        let map = JointMap::new(body, &names, &[]);
+        let (mut joints, mut correspondences) = (Vec::new(), Correspondences::default());
+        Detected { detection: &detection, map: &map }.measure(body, &poses, origin, &[], &mut joints);
+        correspondences.add_detected(body, &poses, &joints, origin);
+        (joints, correspondences)
+    }
+
+    #[test]
+    fn a_detection_counts_more_where_it_is_farther_than_its_deviations() {
+        let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma).0[0].information * sigma * sigma;
+        assert!((factor(0.0, 0.03) - ALIKE).abs() < 1e-9 && (factor(0.1, 0.1) - ALIKE).abs() < 1e-9);
+        assert!((factor(0.2, 0.03) - ALIKE - DOUBTED).abs() < 1e-9);
+    }
+
+    #[test]
+    fn detected_joints_draw_the_body_and_their_sites_only_cost() {
+        let (joints, correspondences) = measured(0.2 * Vec3::Y, 0.05);
+        assert_eq!(correspondences.detected.len(), joints.len());
+        let (model, poses) = standing();
+        let mut normal = NormalEquations::default();
+        normal.clear(poses.len());
+        DetectedJoints { pairs: &correspondences.detected }.add(&model.body, &poses, &mut normal);
+        let force: f64 = normal.limbs.iter().map(|block| block.g[4]).sum();
+        let expected: f64 = joints.iter().map(|joint| -0.2 * joint.information).sum();
+        assert!((force - expected).abs() < 1e-6 * expected.abs(), "{force} {expected}");
+        assert!(correspondences.sites.iter().all(|pair| pair.weight == 0.0 && pair.source == DETECTED));
+    }
+}

@@ -72,6 +72,8 @@ pub(super) struct DetectionCheck {
     last_detection: Option<f64>,
     last_comparison: Option<f64>,
     compares: bool,
+    /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
+    counts: bool,
     /// Whether the last detection agreed with a start that was given by the user.
     agreed: bool,
     /// Whether any detection did.
@@ -124,20 +126,17 @@ impl DetectionCheck {
         // A given start that a detection confirmed is checked half as often.
         let after = if self.agreed && !anywhere { 2.0 * EVERY } else { EVERY };
         let comparison_due = new_track && waited(self.last_comparison, after);
-        let every = match (limb_suspect && unlike, pose_uncertain || anywhere) {
-            (true, _) => 0.0,
-            (false, true) => EVERY,
-            (false, false) => NEW_TRACK_AGE,
-        };
-        let due = comparison_due || (limb_suspect || pose_uncertain || anywhere) && waited(self.last_detection, every);
+        let every = if pose_uncertain || anywhere { EVERY } else { NEW_TRACK_AGE };
+        let suspect = limb_suspect || pose_uncertain || anywhere;
+        self.counts = comparison_due || suspect && waited(self.last_detection, every);
         self.compares = comparison_due || !new_track;
         if comparison_due {
             self.last_comparison = Some(stamp);
         }
-        if due {
+        if self.counts {
             self.last_detection = Some(stamp);
         }
-        due
+        self.counts || limb_suspect && unlike
     }
 
     /// Compares a detection with the pose, world frame: by the trunk, and for a new track (`new_track`) also by legs and arms.
@@ -171,7 +170,7 @@ impl DetectionCheck {
 
     /// Updates with the log odds that the object at the tracked position is a person. Returns whether it is none.
     pub(super) fn is_false_track(&mut self, person_odds: Option<f64>) -> bool {
-        if let Some(person) = person_odds {
+        if let Some(person) = person_odds.filter(|_| self.counts) {
             self.false_track = (self.false_track - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.false_track >= FALSE_TRACK_ODDS
@@ -201,6 +200,19 @@ mod tests {
         let none = [false; 3];
         assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [9; 3]);
         assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [1, 0]);
+    }
+
+    #[test]
+    fn a_suspect_limb_of_an_unlike_person_is_detected_in_every_frame_and_few_of_these_count_against_the_person() {
+        let reasons = Reasons { limb_suspect: true, unlike: true, ..Reasons::default() };
+        let mut check = DetectionCheck::default();
+        check.is_due(0.0, Reasons::default());
+        let mut counted = 0;
+        for frame in 1..=27 {
+            assert!(check.is_due(2.0 + f64::from(frame) / 30.0, reasons));
+            counted += usize::from(check.counts);
+        }
+        assert_eq!(counted, 1);
     }
 
     #[test]
@@ -248,7 +260,7 @@ mod tests {
     #[test]
     fn a_track_that_is_no_person_ends_and_one_that_is_mostly_a_person_does_not() {
         let ends = |odds: &[f64]| {
-            let mut check = DetectionCheck::default();
+            let mut check = DetectionCheck { counts: true, ..DetectionCheck::default() };
             odds.iter().any(|person| check.is_false_track(Some(*person)))
         };
         assert!(ends(&[-4.0; 4]) && !ends(&[-4.0, 4.0].repeat(20)));
