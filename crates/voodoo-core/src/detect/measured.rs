@@ -71,8 +71,8 @@ impl Detected<'_> {
             let limb = body.sites()[site].limb;
             let parent = body.limbs()[limb].parent.as_ref().map_or(limb, |(parent, _)| *parent);
             let factor = ALIKE + DOUBTED * doubt * off(limb).max(off(parent));
-            let DetectedJoint { position, sigma, .. } = *joint;
-            MeasuredJoint { site, position, sigma, information: factor / (sigma * sigma) }
+            let DetectedJoint { position, sigma, visible } = *joint;
+            MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
         }));
     }
 }
