@@ -65,7 +65,7 @@ impl Detected<'_> {
         joints: &mut Vec<MeasuredJoint>,
     ) {
         let doubt = self.doubt(body, poses, origin);
-        let off = |limb: usize| last.get(limb).map_or(1.0, |matches| roughness(matches));
+        let off = |limb: usize| last.get(limb).map_or(1.0, roughness);
         let found = |joint: usize| Some((self.map.site(joint)?, self.joint(joint)?));
         joints.extend((0..self.detection.joints.len()).filter_map(found).map(|(site, joint)| {
             let limb = body.sites()[site].limb;
