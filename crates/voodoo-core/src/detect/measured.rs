@@ -13,6 +13,8 @@ use crate::visibility::FEW;
 /// it where the detection doubts the pose, see [`Detected::doubt`].
 const ALIKE: f64 = 3.0;
 const DOUBTED: f64 = 50.0;
+/// Scale of the kernel of detected joints, in standard deviations: five in space. A joint that is sure and far off is wrong.
+const FAR: f64 = 8.66;
 /// Cost of a hypothesis for each joint that it puts elsewhere than detected, patches; and the distance that costs nothing, in
 /// standard deviations along an axis: the length of a deviation in space.
 const ELSEWHERE: f64 = 25.0;
@@ -36,6 +38,7 @@ pub(crate) struct DetectedPair {
     limb: usize,
     x: Vec3,
     p: Vec3,
+    sigma: f64,
     information: f64,
 }
 
@@ -92,7 +95,7 @@ impl Correspondences {
         for MeasuredJoint { site, position, sigma, information } in joints {
             let limb = body.sites()[*site].limb;
             let (x, p) = (body.site_position(poses, *site), *position - origin);
-            detected.push(DetectedPair { limb, x, p, information: *information });
+            detected.push(DetectedPair { limb, x, p, sigma: *sigma, information: *information });
             let (bias, across, information) = (WITHIN * sigma, Mat3::IDENTITY, Mat3::ZERO);
             let (weight, base_weight, source) = (0.0, ELSEWHERE, DETECTED);
             sites.push(SitePair { limb, x, p, weight, base_weight, bias, across, information, source });
@@ -109,10 +112,12 @@ pub(crate) struct DetectedJoints<'a> {
 
 impl Term for DetectedJoints<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
-        for DetectedPair { limb, x, p, information } in self.pairs {
+        for DetectedPair { limb, x, p, sigma, information } in self.pairs {
             let r = *x - *p;
+            let far = r.length_squared() / (FAR * FAR * sigma * sigma);
+            let information = information / ((1.0 + far) * (1.0 + far));
             normal.cost += information * r.length_squared();
-            normal.limbs[*limb].add_point(&(Mat3::IDENTITY * *information), *x, r);
+            normal.limbs[*limb].add_point(&(Mat3::IDENTITY * information), *x, r);
         }
     }
 }
@@ -154,7 +159,8 @@ mod tests {
         normal.clear(poses.len());
         DetectedJoints { pairs: &correspondences.detected }.add(&model.body, &poses, &mut normal);
         let force: f64 = normal.limbs.iter().map(|block| block.g[4]).sum();
-        let expected: f64 = joints.iter().map(|joint| -0.2 * joint.information).sum();
+        let kernel = (1.0 + 0.04 / (FAR * 0.05).powi(2)).powi(-2);
+        let expected: f64 = joints.iter().map(|joint| -0.2 * kernel * joint.information).sum();
         assert!((force - expected).abs() < 1e-6 * expected.abs(), "{force} {expected}");
         assert!(correspondences.sites.iter().all(|pair| pair.weight == 0.0 && pair.source == DETECTED));
     }
