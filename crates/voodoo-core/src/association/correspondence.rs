@@ -3,8 +3,12 @@
 //!
 //! Everything is in the working frame: world axes, origin near the body.
 
+use crate::detect::DetectedPair;
 use crate::math::{LANES, Mat3, Points, Vec3, widest};
 use crate::shape::SurfaceBatch;
+
+/// Source of sites that a detector found in the depth images of the frame: no source of its own.
+pub(crate) const DETECTED: u16 = u16::MAX;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs are kept with weight zero.
 #[derive(Debug, Default)]
@@ -121,6 +125,8 @@ pub(crate) struct Correspondences {
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
     pub sites: Vec<SitePair>,
+    /// Joints of a detection.
+    pub detected: Vec<DetectedPair>,
     /// Rims of limbs and the depth contour of the body.
     pub contour: Vec<ContourPair>,
     /// Contours of limbs and color edges.
