@@ -3,12 +3,8 @@
 //!
 //! Everything is in the working frame: world axes, origin near the body.
 
-use crate::detect::DetectedPair;
 use crate::math::{LANES, Mat3, Points, Vec3, widest};
 use crate::shape::SurfaceBatch;
-
-/// Source of sites that a detector found in the depth images of the frame: no source of its own.
-pub(crate) const DETECTED: u16 = u16::MAX;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs are kept with weight zero.
 #[derive(Debug, Default)]
@@ -48,6 +44,23 @@ pub(crate) struct SitePair {
     pub information: Mat3,
     /// Index of the source.
     pub source: u16,
+}
+
+/// A joint of the body and where it was detected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct DetectedPair {
+    /// The limb that carries the joint.
+    pub limb: usize,
+    /// The joint in the limb's frame.
+    pub local: Vec3,
+    /// The joint.
+    pub x: Vec3,
+    /// Where it was detected.
+    pub p: Vec3,
+    /// Standard deviation along each axis, meters.
+    pub sigma: f64,
+    /// Information, 1/m^2.
+    pub information: f64,
 }
 
 /// A point of a limb's rim and the edge that an image shows there: a distance along one direction.

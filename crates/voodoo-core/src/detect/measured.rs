@@ -2,23 +2,15 @@
 //! is not the body's: legs in a skirt, a trunk under a backpack.
 
 use super::{Detected, DetectedJoint};
-use crate::association::correspondence::{Correspondences, DETECTED, LimbMatches, SitePair};
+use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
 use crate::body::Body;
-use crate::math::{Mat3, Pose, Vec3};
-use crate::terms::Term;
-use crate::terms::normal_equations::NormalEquations;
+use crate::math::{Pose, Vec3};
 use crate::visibility::FEW;
 
 /// Factor on the information of a detected joint relative to that of surface points, whose errors are alike; and what is added to
 /// it where the detection doubts the pose, see [`Detected::doubt`].
 const ALIKE: f64 = 3.0;
 const DOUBTED: f64 = 50.0;
-/// Scale of the kernel of detected joints, in standard deviations: five in space. A joint that is sure and far off is wrong.
-const FAR: f64 = 8.66;
-/// Cost of a hypothesis for each joint that it puts elsewhere than detected, patches; and the distance that costs nothing, in
-/// standard deviations along an axis: the length of a deviation in space.
-const ELSEWHERE: f64 = 25.0;
-const WITHIN: f64 = 1.7;
 /// Distance of a limb's points, root mean square, from which on its surface is not that of the person, meters.
 const UNLIKE: f64 = 0.03;
 
@@ -28,16 +20,6 @@ const UNLIKE: f64 = 0.03;
 pub(crate) struct MeasuredJoint {
     site: usize,
     position: Vec3,
-    sigma: f64,
-    information: f64,
-}
-
-/// A joint of the body and where it was detected, working frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct DetectedPair {
-    limb: usize,
-    x: Vec3,
-    p: Vec3,
     sigma: f64,
     information: f64,
 }
@@ -87,38 +69,14 @@ fn roughness(matches: &LimbMatches) -> f64 {
 }
 
 impl Correspondences {
-    /// Pairs the body's joints with the detected ones. The sites that are added have no weight: hypotheses that contradict them
-    /// cost more.
+    /// Pairs the body's joints with the detected ones.
     pub(crate) fn add_detected(&mut self, body: &Body, poses: &[Pose], joints: &[MeasuredJoint], origin: Vec3) {
-        let Self { detected, sites, .. } = self;
-        detected.clear();
-        for MeasuredJoint { site, position, sigma, information } in joints {
-            let limb = body.sites()[*site].limb;
-            let (x, p) = (body.site_position(poses, *site), *position - origin);
-            detected.push(DetectedPair { limb, x, p, sigma: *sigma, information: *information });
-            let (bias, across, information) = (WITHIN * sigma, Mat3::IDENTITY, Mat3::ZERO);
-            let (weight, base_weight, source) = (0.0, ELSEWHERE, DETECTED);
-            sites.push(SitePair { limb, x, p, weight, base_weight, bias, across, information, source });
-        }
-    }
-}
-
-/// All detected joints.
-#[derive(Debug)]
-pub(crate) struct DetectedJoints<'a> {
-    /// The pairs.
-    pub pairs: &'a [DetectedPair],
-}
-
-impl Term for DetectedJoints<'_> {
-    fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
-        for DetectedPair { limb, x, p, sigma, information } in self.pairs {
-            let r = *x - *p;
-            let far = r.length_squared() / (FAR * FAR * sigma * sigma);
-            let information = information / ((1.0 + far) * (1.0 + far));
-            normal.cost += information * r.length_squared();
-            normal.limbs[*limb].add_point(&(Mat3::IDENTITY * information), *x, r);
-        }
+        self.detected.clear();
+        self.detected.extend(joints.iter().map(|joint| {
+            let MeasuredJoint { site, position, sigma, information } = *joint;
+            let (limb, local) = (body.sites()[site].limb, body.sites()[site].position);
+            DetectedPair { limb, local, x: poses[limb] * local, p: position - origin, sigma, information }
+        }));
     }
 }
 
@@ -128,8 +86,8 @@ mod tests {
     use crate::detect::{Detection, JointMap};
     use crate::testing::{moved, standing};
 
-    /// The measured joints of a detection at the poses of the standing body moved by `aside`, and the pairs for the standing body.
-    fn measured(aside: Vec3, sigma: f64) -> (Vec<MeasuredJoint>, Correspondences) {
+    /// The measured joints of a detection at the poses of the standing body moved by `aside`, for the standing body.
+    fn measured(aside: Vec3, sigma: f64) -> Vec<MeasuredJoint> {
         let (model, poses) = standing();
         let (body, origin, there) = (&model.body, Vec3::X, moved(&poses, aside));
         let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
@@ -137,31 +95,15 @@ mod tests {
         let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
         let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
         let map = JointMap::new(body, &names, &[]);
-        let (mut joints, mut correspondences) = (Vec::new(), Correspondences::default());
+        let mut joints = Vec::new();
         Detected { detection: &detection, map: &map }.measure(body, &poses, origin, &[], &mut joints);
-        correspondences.add_detected(body, &poses, &joints, origin);
-        (joints, correspondences)
+        joints
     }
 
     #[test]
     fn a_detection_counts_more_where_it_is_farther_than_its_deviations() {
-        let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma).0[0].information * sigma * sigma;
+        let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma)[0].information * sigma * sigma;
         assert!((factor(0.0, 0.03) - ALIKE).abs() < 1e-9 && (factor(0.1, 0.1) - ALIKE).abs() < 1e-9);
         assert!((factor(0.2, 0.03) - ALIKE - DOUBTED).abs() < 1e-9);
-    }
-
-    #[test]
-    fn detected_joints_draw_the_body_and_their_sites_only_cost() {
-        let (joints, correspondences) = measured(0.2 * Vec3::Y, 0.05);
-        assert_eq!(correspondences.detected.len(), joints.len());
-        let (model, poses) = standing();
-        let mut normal = NormalEquations::default();
-        normal.clear(poses.len());
-        DetectedJoints { pairs: &correspondences.detected }.add(&model.body, &poses, &mut normal);
-        let force: f64 = normal.limbs.iter().map(|block| block.g[4]).sum();
-        let kernel = (1.0 + 0.04 / (FAR * 0.05).powi(2)).powi(-2);
-        let expected: f64 = joints.iter().map(|joint| -0.2 * kernel * joint.information).sum();
-        assert!((force - expected).abs() < 1e-6 * expected.abs(), "{force} {expected}");
-        assert!(correspondences.sites.iter().all(|pair| pair.weight == 0.0 && pair.source == DETECTED));
     }
 }

@@ -76,7 +76,7 @@ impl Hypotheses {
 
     /// Whether the last frame showed clearly more than the body explains.
     pub(crate) fn unlike(&self) -> bool {
-        self.stamp.is_some() && self.unexplained.patch_cost < UNLIKE
+        self.stamp.is_some() && self.unexplained.clutter < UNLIKE
     }
 
     /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;

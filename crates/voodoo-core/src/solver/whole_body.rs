@@ -8,10 +8,9 @@ use super::{
 };
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
-use crate::detect::DetectedJoints;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
+use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
 
 /// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
 pub(crate) const OVERLAP_SIGMA: f64 = 0.03;

@@ -1,7 +1,7 @@
 //! Fills the estimate from the tracker's state, without allocation once its buffers have grown.
 
 use super::estimate::{Estimate, SourceReport};
-use crate::association::correspondence::{Correspondences, DETECTED};
+use crate::association::correspondence::Correspondences;
 use crate::body::Body;
 use crate::fit::Motion;
 use crate::observation::candidates::Candidates;
@@ -51,7 +51,7 @@ impl Estimate {
                 }
             }
         }
-        for pair in correspondences.sites.iter().filter(|pair| pair.source != DETECTED) {
+        for pair in &correspondences.sites {
             let report = entry(sources, pair.source);
             report.count += 1;
             report.add(pair.base_weight, (pair.x - pair.p).length_squared());
