@@ -46,12 +46,18 @@ pub(crate) enum DetectionVerdict {
     Elsewhere,
 }
 
+/// Whether the trunk was detected elsewhere than at these poses, whose frame has its origin at `origin` in the world.
+pub(crate) fn trunk_is_elsewhere(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3) -> bool {
+    let [apart, spread] = joint_distance(detected, body, poses, origin, detected.map.trunk());
+    apart > ELSEWHERE && apart > SIGMAS * spread
+}
+
 /// Returns the mean distance of detected joints from the tracked ones, and the mean of their standard deviations, meters.
-fn joint_distance(detected: Detected, body: &Body, world_from_limb: &[Pose], joints: &[usize]) -> [f64; 2] {
+fn joint_distance(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3, joints: &[usize]) -> [f64; 2] {
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
     for joint in joints {
         if let (Some(detected), Some(site)) = (detected.joint(*joint), detected.map.site(*joint)) {
-            let tracked: Vec3 = body.site_position(world_from_limb, site);
+            let tracked: Vec3 = body.site_position(poses, site) + origin;
             apart += detected.position.distance(tracked);
             spread += detected.sigma;
             count += 1.0;
@@ -148,12 +154,12 @@ impl DetectionCheck {
         new_track: bool,
     ) -> DetectionVerdict {
         let elsewhere = |joints: &[usize], least: f64| {
-            let [apart, spread] = joint_distance(detected, body, world_from_limb, joints);
+            let [apart, spread] = joint_distance(detected, body, world_from_limb, Vec3::ZERO, joints);
             apart > least && apart > SIGMAS * spread
         };
         let Detected { detection, map } = detected;
         let limbs_are = new_track && (elsewhere(map.legs(), ELSEWHERE) || elsewhere(map.arms(), APART));
-        if elsewhere(map.trunk(), ELSEWHERE) || limbs_are {
+        if trunk_is_elsewhere(detected, body, world_from_limb, Vec3::ZERO) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
             self.agreed = false;
             return if self.elsewhere >= ENOUGH_ODDS {

@@ -9,7 +9,7 @@ mod report;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::{Detect, DetectError, PlacedDetection};
+use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -18,7 +18,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer};
+use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, trunk_is_elsewhere};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::FittedPose;
 use assess::Assessor;
@@ -284,7 +284,10 @@ impl BodyTracker {
                 relocalizer.detect(&model.body, frame, ownership, poses[0].translation + *origin, reasons);
             }
         }
-        let detected = relocalizer.detected().filter(|_| schedule.whole_body);
+        // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the track is wrong.
+        let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
+        let measures = schedule.whole_body && !relocalizer.is_new(frame.stamp);
+        let detected = relocalizer.detected().filter(|detected| measures && here(detected));
         fit.set_detected(detected, &model.body, poses, *origin);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
