@@ -46,6 +46,23 @@ pub(crate) struct SitePair {
     pub source: u16,
 }
 
+/// A joint of the body and where it was detected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct DetectedPair {
+    /// The limb that carries the joint.
+    pub limb: usize,
+    /// The joint in the limb's frame.
+    pub local: Vec3,
+    /// The joint.
+    pub x: Vec3,
+    /// Where it was detected.
+    pub p: Vec3,
+    /// Standard deviation along each axis, meters.
+    pub sigma: f64,
+    /// Information, 1/m^2.
+    pub information: f64,
+}
+
 /// A point of a limb's rim and the edge that an image shows there: a distance along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ContourPair {
@@ -121,6 +138,8 @@ pub(crate) struct Correspondences {
     pub limbs: Vec<LimbMatches>,
     /// Sites with positions and rays.
     pub sites: Vec<SitePair>,
+    /// Joints of a detection.
+    pub detected: Vec<DetectedPair>,
     /// Rims of limbs and the depth contour of the body.
     pub contour: Vec<ContourPair>,
     /// Contours of limbs and color edges.

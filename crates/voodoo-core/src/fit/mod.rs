@@ -15,10 +15,11 @@ use crate::association::buried::Buried;
 use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
-use crate::body::Pair;
+use crate::body::{Body, Pair};
 use crate::config::Config;
+use crate::detect::{Detected, MeasuredJoint};
 use crate::error::TrackError;
-use crate::math::Pose;
+use crate::math::{Pose, Vec3};
 use crate::regions;
 use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
 use crate::threads::Threads;
@@ -38,6 +39,8 @@ pub(crate) struct Fit {
     regions: regions::ColorRegions,
     /// Whether color edges are searched for over a larger distance.
     far: bool,
+    /// Joints that a detector found in this frame.
+    detected: Vec<MeasuredJoint>,
     band_weights: Vec<f64>,
     threads: Threads,
 }
@@ -53,9 +56,18 @@ impl Fit {
             contours: Contours::default(),
             regions: regions::ColorRegions::default(),
             far: false,
+            detected: Vec::new(),
             band_weights: Vec::new(),
             threads: Threads::new(config)?,
         })
+    }
+
+    /// Sets the detection of this frame, if there is one, whose joints are fitted as well; `poses` are the expected ones.
+    pub(crate) fn set_detected(&mut self, detected: Option<Detected>, body: &Body, poses: &[Pose], origin: Vec3) {
+        self.detected.clear();
+        if let Some(detected) = detected {
+            detected.measure(body, poses, origin, &self.correspondences.limbs, &mut self.detected);
+        }
     }
 
     /// Returns the solver's schedule for the loop.
@@ -235,6 +247,7 @@ impl Fit {
     fn match_sites(&mut self, context: Context, poses: &[Pose]) {
         let (frame, origin) = (context.observation.frame(), context.observation.origin());
         self.correspondences.add_sites(&context.model.body, poses, frame, origin);
+        self.correspondences.add_detected(&context.model.body, poses, &self.detected, origin);
     }
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
@@ -303,7 +316,6 @@ fn problem<'a>(
 mod tests {
     use super::*;
     use crate::config::SolverKind;
-    use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, moved, standing, turned, with_context};
 
     /// The solvers, and their error after the steps of one frame, meters: the published one leaves limbs tilted.

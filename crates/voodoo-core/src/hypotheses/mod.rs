@@ -31,6 +31,9 @@ use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
 
+/// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of it, where 5 % are usual.
+const UNLIKE: f64 = 0.85;
+
 /// Tests every arm and leg in every frame, and keeps a history of each.
 #[derive(Debug, Default)]
 pub(crate) struct Hypotheses {
@@ -69,6 +72,11 @@ impl Hypotheses {
     /// Fits the second branch to a frame of few color images, before the body itself is fitted. Returns the number of ICP steps.
     pub(crate) fn follow_branch(&mut self, context: Context, fit: &mut Fit) -> usize {
         self.branch.follow(context, fit)
+    }
+
+    /// Whether the last frame showed clearly more than the body explains.
+    pub(crate) fn unlike(&self) -> bool {
+        self.stamp.is_some() && self.unexplained.clutter < UNLIKE
     }
 
     /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;

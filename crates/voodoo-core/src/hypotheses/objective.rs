@@ -5,7 +5,9 @@ use crate::fit::{Context, Matched};
 use crate::math::Pose;
 use crate::regions::{Backdrop, ColorRegions};
 use crate::solver::{LIMIT_SIGMA, OVERLAP_SIGMA, SITE_SCALE};
-use crate::terms::{Colors, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Surface, Term};
+use crate::terms::{
+    Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Surface, Term,
+};
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
 /// is unexplained.
@@ -25,6 +27,7 @@ pub(crate) struct Objective<'a> {
     surface: Surface<'a>,
     free_space: FreeSpace<'a>,
     sites: Sites<'a>,
+    detected: DetectedJoints<'a>,
     regions: Regions<'a>,
     limits: Limits,
     penetration: Penetration<'a>,
@@ -47,6 +50,7 @@ impl<'a> Objective<'a> {
             surface: Surface { correspondences, information, tangential_weight, scale },
             free_space: FreeSpace { views: observation.views },
             sites: Sites { correspondences, information, scale: SITE_SCALE, biased: true },
+            detected: DetectedJoints { pairs: &correspondences.detected },
             regions: Regions { pairs: &correspondences.regions, colors },
             limits: Limits { sigma: LIMIT_SIGMA },
             penetration: Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
@@ -56,7 +60,8 @@ impl<'a> Objective<'a> {
 
     /// Cost of the pose of one limb but for the points.
     pub(crate) fn limb(&self, poses: &[Pose], limb: usize) -> f64 {
-        let terms: [&dyn Term; 5] = [&self.free_space, &self.sites, &self.regions, &self.limits, &self.penetration];
+        let terms: [&dyn Term; 6] =
+            [&self.free_space, &self.sites, &self.detected, &self.regions, &self.limits, &self.penetration];
         let floor = self.floor.iter().map(|floor| floor as &dyn Term);
         terms.into_iter().chain(floor).map(|term| term.cost(self.body, poses, limb)).sum()
     }

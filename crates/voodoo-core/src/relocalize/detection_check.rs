@@ -31,6 +31,8 @@ pub(crate) struct Reasons {
     pub(crate) pose_uncertain: bool,
     /// The body may be anywhere.
     pub(crate) anywhere: bool,
+    /// The person's surface is not that of the body, for example in a skirt: with a suspect limb, every frame needs a detection.
+    pub(crate) unlike: bool,
 }
 
 /// Result of comparing a detection with the tracked pose.
@@ -44,12 +46,18 @@ pub(crate) enum DetectionVerdict {
     Elsewhere,
 }
 
+/// Whether the trunk was detected elsewhere than at these poses, whose frame has its origin at `origin` in the world.
+pub(crate) fn trunk_is_elsewhere(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3) -> bool {
+    let [apart, spread] = joint_distance(detected, body, poses, origin, detected.map.trunk());
+    apart > ELSEWHERE && apart > SIGMAS * spread
+}
+
 /// Returns the mean distance of detected joints from the tracked ones, and the mean of their standard deviations, meters.
-fn joint_distance(detected: Detected, body: &Body, world_from_limb: &[Pose], joints: &[usize]) -> [f64; 2] {
+fn joint_distance(detected: Detected, body: &Body, poses: &[Pose], origin: Vec3, joints: &[usize]) -> [f64; 2] {
     let (mut apart, mut spread, mut count) = (0.0, 0.0, 0.0_f64);
     for joint in joints {
         if let (Some(detected), Some(site)) = (detected.joint(*joint), detected.map.site(*joint)) {
-            let tracked: Vec3 = body.site_position(world_from_limb, site);
+            let tracked: Vec3 = body.site_position(poses, site) + origin;
             apart += detected.position.distance(tracked);
             spread += detected.sigma;
             count += 1.0;
@@ -70,6 +78,8 @@ pub(super) struct DetectionCheck {
     last_detection: Option<f64>,
     last_comparison: Option<f64>,
     compares: bool,
+    /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
+    counts: bool,
     /// Whether the last detection agreed with a start that was given by the user.
     agreed: bool,
     /// Whether any detection did.
@@ -113,7 +123,7 @@ impl DetectionCheck {
 
     /// Counts a frame and returns whether the detector is due.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons) -> bool {
-        let Reasons { limb_suspect, pose_uncertain, anywhere } = reasons;
+        let Reasons { limb_suspect, pose_uncertain, anywhere, unlike } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
         let waited = |last_detection: Option<f64>, every: f64| {
@@ -123,15 +133,16 @@ impl DetectionCheck {
         let after = if self.agreed && !anywhere { 2.0 * EVERY } else { EVERY };
         let comparison_due = new_track && waited(self.last_comparison, after);
         let every = if pose_uncertain || anywhere { EVERY } else { NEW_TRACK_AGE };
-        let due = comparison_due || (limb_suspect || pose_uncertain || anywhere) && waited(self.last_detection, every);
+        let suspect = limb_suspect || pose_uncertain || anywhere;
+        self.counts = comparison_due || suspect && waited(self.last_detection, every);
         self.compares = comparison_due || !new_track;
         if comparison_due {
             self.last_comparison = Some(stamp);
         }
-        if due {
+        if self.counts {
             self.last_detection = Some(stamp);
         }
-        due
+        self.counts || limb_suspect && unlike
     }
 
     /// Compares a detection with the pose, world frame: by the trunk, and for a new track (`new_track`) also by legs and arms.
@@ -143,12 +154,12 @@ impl DetectionCheck {
         new_track: bool,
     ) -> DetectionVerdict {
         let elsewhere = |joints: &[usize], least: f64| {
-            let [apart, spread] = joint_distance(detected, body, world_from_limb, joints);
+            let [apart, spread] = joint_distance(detected, body, world_from_limb, Vec3::ZERO, joints);
             apart > least && apart > SIGMAS * spread
         };
         let Detected { detection, map } = detected;
         let limbs_are = new_track && (elsewhere(map.legs(), ELSEWHERE) || elsewhere(map.arms(), APART));
-        if elsewhere(map.trunk(), ELSEWHERE) || limbs_are {
+        if trunk_is_elsewhere(detected, body, world_from_limb, Vec3::ZERO) || limbs_are {
             self.elsewhere += detection.person.min(detection.facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
             self.agreed = false;
             return if self.elsewhere >= ENOUGH_ODDS {
@@ -165,7 +176,7 @@ impl DetectionCheck {
 
     /// Updates with the log odds that the object at the tracked position is a person. Returns whether it is none.
     pub(super) fn is_false_track(&mut self, person_odds: Option<f64>) -> bool {
-        if let Some(person) = person_odds {
+        if let Some(person) = person_odds.filter(|_| self.counts) {
             self.false_track = (self.false_track - person.clamp(-ENOUGH_ODDS, ENOUGH_ODDS)).max(0.0);
         }
         self.false_track >= FALSE_TRACK_ODDS
@@ -187,7 +198,7 @@ mod tests {
     #[test]
     fn new_lost_and_uncertain_tracks_are_checked_often_and_confident_ones_never() {
         let count = |from: f64, [limb_suspect, pose_uncertain, anywhere]: [bool; 3]| {
-            let reasons = Reasons { limb_suspect, pose_uncertain, anywhere };
+            let reasons = Reasons { limb_suspect, pose_uncertain, anywhere, unlike: false };
             let mut check = DetectionCheck::default();
             check.is_due(0.0, Reasons::default());
             (1..=27).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
@@ -195,6 +206,19 @@ mod tests {
         let none = [false; 3];
         assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [9; 3]);
         assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [1, 0]);
+    }
+
+    #[test]
+    fn a_suspect_limb_of_an_unlike_person_is_detected_in_every_frame_and_few_of_these_count_against_the_person() {
+        let reasons = Reasons { limb_suspect: true, unlike: true, ..Reasons::default() };
+        let mut check = DetectionCheck::default();
+        check.is_due(0.0, Reasons::default());
+        let mut counted = 0;
+        for frame in 1..=27 {
+            assert!(check.is_due(2.0 + f64::from(frame) / 30.0, reasons));
+            counted += usize::from(check.counts);
+        }
+        assert_eq!(counted, 1);
     }
 
     #[test]
@@ -242,7 +266,7 @@ mod tests {
     #[test]
     fn a_track_that_is_no_person_ends_and_one_that_is_mostly_a_person_does_not() {
         let ends = |odds: &[f64]| {
-            let mut check = DetectionCheck::default();
+            let mut check = DetectionCheck { counts: true, ..DetectionCheck::default() };
             odds.iter().any(|person| check.is_false_track(Some(*person)))
         };
         assert!(ends(&[-4.0; 4]) && !ends(&[-4.0, 4.0].repeat(20)));

@@ -10,7 +10,7 @@ use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
+use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
 
 /// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
 pub(crate) const OVERLAP_SIGMA: f64 = 0.03;
@@ -140,8 +140,10 @@ impl WholeBody {
         let posture = Posture { fraction: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The cost function: a new term is a new file and a line here.
-        let terms: [Option<&dyn Term>; 6] = [
+        let detected = DetectedJoints { pairs: &correspondences.detected };
+        let terms: [Option<&dyn Term>; 7] = [
             Some(&measurements),
+            biased.then_some(&detected),
             Some(&prior),
             config.limits.then_some(&limits),
             contours_alone(problem).then_some(&posture),

@@ -1,12 +1,12 @@
 //! Joint limits, one-sided and soft: each component of the joint's rotation vector stays in its range.
 
-use super::{LARGEST_COST, Term};
+use super::Term;
 use crate::body::{Body, Joint};
 use crate::math::{Pose, Quat, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
-/// Standard deviation of the limits between persons, radians: a violation by less tells little about which pose is right.
-const BETWEEN_PERSONS: f64 = 0.2;
+/// Greatest cost of a joint, nats: limits differ between persons.
+const LARGEST_COST: f64 = 3.0;
 
 /// All joints that have limits.
 #[derive(Debug)]
@@ -43,7 +43,7 @@ impl Term for Limits {
         let Some(limits) = &joint.limits else { return 0.0 };
         let (_, v) = turn_in_joint(joint, &poses[*parent], &poses[limb]);
         let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
-        let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / BETWEEN_PERSONS).powi(2)).sum();
+        let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / self.sigma).powi(2)).sum();
         (0.5 * squares).min(LARGEST_COST)
     }
 }
@@ -88,7 +88,7 @@ mod tests {
         let [[least, _], ..] = joint.limits.unwrap();
         let term = Limits { sigma: 0.05 };
         assert!(term.cost(&model.body, &poses, elbow) < 1e-9);
-        for (beyond, expected) in [(0.1, 0.125), (0.4, 2.0), (1.2, LARGEST_COST)] {
+        for (beyond, expected) in [(0.05, 0.5), (0.1, 2.0), (0.4, LARGEST_COST)] {
             let mut bent = poses.clone();
             bent[elbow] = place(joint, &poses[*parent], Quat::from_axis_angle(hinge_axis(joint), least - beyond));
             let cost = term.cost(&model.body, &bent, elbow);

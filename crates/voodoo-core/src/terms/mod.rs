@@ -1,6 +1,7 @@
 //! The cost function: each term adds to the same normal equations. The list of files is the list of terms.
 
 mod contour;
+mod detected;
 mod floor;
 mod free_space;
 mod limits;
@@ -13,6 +14,7 @@ mod sites;
 mod surface;
 
 pub(crate) use contour::Contour;
+pub(crate) use detected::DetectedJoints;
 pub(crate) use floor::Floor;
 pub(crate) use free_space::FreeSpace;
 pub(crate) use limits::Limits;

@@ -9,7 +9,7 @@ mod report;
 
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::detect::{Detect, DetectError, PlacedDetection};
+use crate::detect::{Detect, DetectError, Detected, PlacedDetection};
 use crate::error::TrackError;
 use crate::fit::{Fit, Motion, Setting};
 use crate::hypotheses::Hypotheses;
@@ -18,7 +18,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer};
+use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, trunk_is_elsewhere};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::FittedPose;
 use assess::Assessor;
@@ -103,6 +103,7 @@ impl BodyTracker {
     pub(crate) fn reset(&mut self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<&Estimate, TrackError> {
         let (body, poses) = self.model.fit(positions, fit_sizes)?;
         self.restart(body, poses, fit_sizes);
+        self.relocalizer.forget();
         Ok(&self.estimate)
     }
 
@@ -117,6 +118,7 @@ impl BodyTracker {
             ));
         }
         self.restart(self.model.body.clone(), world_from_limb.to_vec(), false);
+        self.relocalizer.forget();
         Ok(&self.estimate)
     }
 
@@ -267,6 +269,26 @@ impl BodyTracker {
         let Motion { poses, previous, predicted, origin, .. } = motion;
         observer.observe(frame, &body_box(&model.body, poses, config.body_box_margin), *origin, ownership, config);
         let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale };
+        if schedule.whole_body && known {
+            let lost = assessor.status() == Status::Lost;
+            // A lost body is searched for with everybody's detections, see `crate::People`.
+            if lost {
+                relocalizer.forget();
+            } else {
+                let reasons = Reasons {
+                    limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
+                    pose_uncertain: assessor.is_uncertain(),
+                    anywhere: interrupted,
+                    unlike: hypotheses.unlike(),
+                };
+                relocalizer.detect(&model.body, frame, ownership, poses[0].translation + *origin, reasons);
+            }
+        }
+        // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the track is wrong.
+        let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
+        let measures = schedule.whole_body && !relocalizer.is_new(frame.stamp);
+        let detected = relocalizer.detected().filter(|detected| measures && here(detected));
+        fit.set_detected(detected, &model.body, poses, *origin);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.with_model(model), poses);
@@ -279,20 +301,6 @@ impl BodyTracker {
         sizes.initialize(setting, model, poses, fit);
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
-        if schedule.whole_body && known {
-            let lost = assessor.status() == Status::Lost;
-            // A lost body is searched for with everybody's detections, see `crate::People`.
-            if lost {
-                relocalizer.forget();
-            } else {
-                let reasons = Reasons {
-                    limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
-                    pose_uncertain: assessor.is_uncertain(),
-                    anywhere: interrupted,
-                };
-                relocalizer.detect(&model.body, frame, ownership, poses[0].translation + *origin, reasons);
-            }
-        }
         if config.hypotheses && schedule.whole_body && known {
             let detected = relocalizer.detected_pose(&model.body).unwrap_or_default();
             steps +=

@@ -4,13 +4,17 @@
 use nalgebra::Vector6;
 use proptest::prelude::*;
 use voodoo_core::Body;
-use voodoo_core::association::correspondence::{ContourPair, Correspondences, LimbMatches, RegionPair, SitePair};
+use voodoo_core::association::correspondence::{
+    ContourPair, Correspondences, DetectedPair, LimbMatches, RegionPair, SitePair,
+};
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
 use voodoo_core::math::{Mat3, Pose, Vec3};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
-use voodoo_core::terms::{Contour, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term};
+use voodoo_core::terms::{
+    Contour, DetectedJoints, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term,
+};
 
 /// Compares the analytic gradient with differences of the cost; `evaluate` fills the system at given poses. Where the cost has a
 /// kink, as where two limbs begin to touch, the gradient lies between the differences to both sides; elsewhere these agree.
@@ -124,6 +128,20 @@ proptest! {
                 ContourPair { limb, x, normal, distance: normal.dot(targets[limb] - x), weight: 0.7 }
             }).collect();
             Contour { pairs: &edges, information: 1.0, scale: 0.05 }.add(&body, poses, system);
+        })?;
+    }
+
+    #[test]
+    fn detected_joints(angles in angles(), offsets in proptest::collection::vec(-0.4..0.4_f64, 18)) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = random_pose(&body, &angles);
+        let targets: Vec<Vec3> = poses.iter().zip(&offsets).map(|(pose, off)| pose.translation + Vec3::new(*off, 0.1, -off)).collect();
+        check(&body, &poses, &|poses, system| {
+            let pairs: Vec<DetectedPair> = poses.iter().zip(&targets).enumerate().map(|(limb, (pose, p))| {
+                let local = Vec3::new(0.02, 0.0, 0.1);
+                DetectedPair { limb, local, x: *pose * local, p: *p, sigma: 0.05, information: 1.0 + limb as f64 }
+            }).collect();
+            DetectedJoints { pairs: &pairs }.add(&body, poses, system);
         })?;
     }
 

@@ -247,7 +247,8 @@ impl Assessor {
                 }
                 let log_odds = detected
                     .map(|detected| detection_log_odds(detected, &model.body, poses, origin, [Some(limb), next]));
-                limbs[limb].observe(evidence, log_odds.unwrap_or_default(), unexpected);
+                // The pose was fitted to the detection, so that it agrees counts half.
+                limbs[limb].observe(evidence, log_odds.map_or(0.0, |odds| odds.min(0.5 * odds)), unexpected);
             }
         }
     }

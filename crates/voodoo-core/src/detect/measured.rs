@@ -1,0 +1,109 @@
+//! Detected joints as measurements of the tracked body. They hold what a frame hides, and what its surface shows wrongly because it
+//! is not the body's: legs in a skirt, a trunk under a backpack.
+
+use super::{Detected, DetectedJoint};
+use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
+use crate::body::Body;
+use crate::math::{Pose, Vec3};
+use crate::visibility::FEW;
+
+/// Factor on the information of a detected joint relative to that of surface points, whose errors are alike; and what is added to
+/// it where the detection doubts the pose, see [`Detected::doubt`].
+const ALIKE: f64 = 3.0;
+const DOUBTED: f64 = 50.0;
+/// Distance of a limb's points, root mean square, from which on its surface is not that of the person, meters.
+const UNLIKE: f64 = 0.03;
+
+/// A detected joint of the body: its site, its position, world frame, its standard deviation along each axis, meters, and its
+/// information, 1/m^2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MeasuredJoint {
+    site: usize,
+    position: Vec3,
+    sigma: f64,
+    information: f64,
+}
+
+impl Detected<'_> {
+    /// How far trunk and legs at these poses, working frame, are from where they were detected: the mean squared deviation in
+    /// space, in variances, beyond the one that is expected; from 0 to 1.
+    fn doubt(&self, body: &Body, poses: &[Pose], origin: Vec3) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0_f64);
+        for joint in self.map.trunk().iter().chain(self.map.legs()) {
+            if let (Some(joint), Some(site)) = (self.joint(*joint), self.map.site(*joint)) {
+                let apart = body.site_position(poses, site) + origin - joint.position;
+                sum += apart.length_squared() / (3.0 * joint.sigma * joint.sigma);
+                count += 1.0;
+            }
+        }
+        (sum / count.max(1.0) - 1.0).clamp(0.0, 1.0)
+    }
+
+    /// Writes the joints to `joints`, for a body that is expected at these poses, working frame. `last` are the matches of the last
+    /// frame: limbs whose points lay on them are doubted less.
+    pub(crate) fn measure(
+        &self,
+        body: &Body,
+        poses: &[Pose],
+        origin: Vec3,
+        last: &[LimbMatches],
+        joints: &mut Vec<MeasuredJoint>,
+    ) {
+        let doubt = self.doubt(body, poses, origin);
+        let off = |limb: usize| last.get(limb).map_or(1.0, roughness);
+        let found = |joint: usize| Some((self.map.site(joint)?, self.joint(joint)?));
+        joints.extend((0..self.detection.joints.len()).filter_map(found).map(|(site, joint)| {
+            let limb = body.sites()[site].limb;
+            let parent = body.limbs()[limb].parent.as_ref().map_or(limb, |(parent, _)| *parent);
+            let factor = ALIKE + DOUBTED * doubt * off(limb).max(off(parent));
+            let DetectedJoint { position, sigma, visible } = *joint;
+            MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
+        }));
+    }
+}
+
+/// Mean square of the distances of a limb's points in units of `UNLIKE`; at most 1, also where there are hardly any points.
+fn roughness(matches: &LimbMatches) -> f64 {
+    let (weight, square) = matches.weighed();
+    if weight < FEW { 1.0 } else { (square / (weight * UNLIKE * UNLIKE)).min(1.0) }
+}
+
+impl Correspondences {
+    /// Pairs the body's joints with the detected ones.
+    pub(crate) fn add_detected(&mut self, body: &Body, poses: &[Pose], joints: &[MeasuredJoint], origin: Vec3) {
+        self.detected.clear();
+        self.detected.extend(joints.iter().map(|joint| {
+            let MeasuredJoint { site, position, sigma, information } = *joint;
+            let (limb, local) = (body.sites()[site].limb, body.sites()[site].position);
+            DetectedPair { limb, local, x: poses[limb] * local, p: position - origin, sigma, information }
+        }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::{Detection, JointMap};
+    use crate::testing::{moved, standing};
+
+    /// The measured joints of a detection at the poses of the standing body moved by `aside`, for the standing body.
+    fn measured(aside: Vec3, sigma: f64) -> Vec<MeasuredJoint> {
+        let (model, poses) = standing();
+        let (body, origin, there) = (&model.body, Vec3::X, moved(&poses, aside));
+        let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
+        let place = |site| body.site_position(&there, site) + origin;
+        let joint = |site| Some(DetectedJoint { position: place(site), sigma, visible: 1.0 });
+        let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
+        let map = JointMap::new(body, &names, &[]);
+        let mut joints = Vec::new();
+        Detected { detection: &detection, map: &map }.measure(body, &poses, origin, &[], &mut joints);
+        joints
+    }
+
+    #[test]
+    fn a_detection_counts_more_where_it_is_farther_than_its_deviations() {
+        let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma)[0].information * sigma * sigma;
+        assert!((factor(0.0, 0.03) - ALIKE).abs() < 1e-9 && (factor(0.1, 0.1) - ALIKE).abs() < 1e-9);
+        assert!((factor(0.2, 0.03) - ALIKE - DOUBTED).abs() < 1e-9);
+    }
+}
