@@ -9,10 +9,10 @@ use crate::visibility::FEW;
 
 /// Factor on the information of a detected joint relative to that of surface points, whose errors are alike; and what is added to
 /// it where the detection doubts the pose, see [`Detected::doubt`].
-const ALIKE: f64 = 3.0;
+const ALIKE_JOINTS: f64 = 3.0;
 const DOUBTED: f64 = 50.0;
 /// Distance of a limb's points, root mean square, from which on its surface is not that of the person, meters.
-const UNLIKE: f64 = 0.03;
+const UNLIKE_SURFACE: f64 = 0.03;
 
 /// A detected joint of the body: its site, its position, world frame, its standard deviation along each axis, meters, and its
 /// information, 1/m^2.
@@ -55,17 +55,17 @@ impl Detected<'_> {
         joints.extend((0..self.detection.joints.len()).filter_map(found).map(|(site, joint)| {
             let limb = body.sites()[site].limb;
             let parent = body.limbs()[limb].parent.as_ref().map_or(limb, |(parent, _)| *parent);
-            let factor = ALIKE + DOUBTED * doubt * off(limb).max(off(parent));
+            let factor = ALIKE_JOINTS + DOUBTED * doubt * off(limb).max(off(parent));
             let DetectedJoint { position, sigma, visible } = *joint;
             MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
         }));
     }
 }
 
-/// Mean square of the distances of a limb's points in units of `UNLIKE`; at most 1, also where there are hardly any points.
+/// Mean square of the distances of a limb's points in units of `UNLIKE_SURFACE`; at most 1, also where there are hardly any points.
 fn roughness(matches: &LimbMatches) -> f64 {
     let (weight, square) = matches.weighed();
-    if weight < FEW { 1.0 } else { (square / (weight * UNLIKE * UNLIKE)).min(1.0) }
+    if weight < FEW { 1.0 } else { (square / (weight * UNLIKE_SURFACE * UNLIKE_SURFACE)).min(1.0) }
 }
 
 impl Correspondences {
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn a_detection_counts_more_where_it_is_farther_than_its_deviations() {
         let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma)[0].information * sigma * sigma;
-        assert!((factor(0.0, 0.03) - ALIKE).abs() < 1e-9 && (factor(0.1, 0.1) - ALIKE).abs() < 1e-9);
-        assert!((factor(0.2, 0.03) - ALIKE - DOUBTED).abs() < 1e-9);
+        assert!((factor(0.0, 0.03) - ALIKE_JOINTS).abs() < 1e-9 && (factor(0.1, 0.1) - ALIKE_JOINTS).abs() < 1e-9);
+        assert!((factor(0.2, 0.03) - ALIKE_JOINTS - DOUBTED).abs() < 1e-9);
     }
 }

@@ -32,7 +32,7 @@ use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
 
 /// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of it, where 5 % are usual.
-const UNLIKE: f64 = 0.85;
+const UNLIKE_FRAME: f64 = 0.85;
 
 /// Tests every arm and leg in every frame, and keeps a history of each.
 #[derive(Debug, Default)]
@@ -76,7 +76,7 @@ impl Hypotheses {
 
     /// Whether the last frame showed clearly more than the body explains.
     pub(crate) fn unlike(&self) -> bool {
-        self.stamp.is_some() && self.unexplained.clutter < UNLIKE
+        self.stamp.is_some() && self.unexplained.clutter < UNLIKE_FRAME
     }
 
     /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;

@@ -8,11 +8,11 @@ use crate::math::{Mat3, Pose};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Scale of the kernel, in standard deviations: five in space. A joint that is sure and far off is wrong.
-const FAR: f64 = 8.66;
+const FAR_SIGMAS: f64 = 8.66;
 /// Greatest cost of a joint, unexplained patches; and the distance that costs nothing, in standard deviations along an axis: the
 /// length of a deviation in space.
-const ELSEWHERE: f64 = 25.0;
-const WITHIN: f64 = 1.7;
+const ELSEWHERE_COST: f64 = 25.0;
+const WITHIN_SIGMAS: f64 = 1.7;
 
 /// All detected joints.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ impl Term for DetectedJoints<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for DetectedPair { limb, x, p, sigma, information, .. } in self.pairs {
             let r = *x - *p;
-            let far = r.length_squared() / (FAR * FAR * sigma * sigma);
+            let far = r.length_squared() / (FAR_SIGMAS * FAR_SIGMAS * sigma * sigma);
             let information = information / ((1.0 + far) * (1.0 + far));
             normal.cost += information * (1.0 + far) * r.length_squared();
             normal.limbs[*limb].add_point(&(Mat3::IDENTITY * information), *x, r);
@@ -34,8 +34,8 @@ impl Term for DetectedJoints<'_> {
 
     fn cost(&self, _body: &Body, poses: &[Pose], limb: usize) -> f64 {
         let cost = |pair: &DetectedPair| {
-            let off = (poses[limb] * pair.local).distance(pair.p) - WITHIN * pair.sigma;
-            PATCH * ELSEWHERE * (off.max(0.0) / APART).powi(2).min(1.0)
+            let off = (poses[limb] * pair.local).distance(pair.p) - WITHIN_SIGMAS * pair.sigma;
+            PATCH * ELSEWHERE_COST * (off.max(0.0) / APART).powi(2).min(1.0)
         };
         self.pairs.iter().filter(|pair| pair.limb == limb).map(cost).sum()
     }
@@ -59,7 +59,7 @@ mod tests {
                 .map(|limb| DetectedJoints { pairs: &[pair] }.cost(&model.body, &shifted, limb))
                 .sum::<f64>()
         };
-        assert_eq!(cost(WITHIN * 0.05), 0.0);
-        assert!((cost(WITHIN * 0.05 + 0.05) - 0.25 * 3.0).abs() < 1e-9 && (cost(1.0) - 3.0).abs() < 1e-9);
+        assert_eq!(cost(WITHIN_SIGMAS * 0.05), 0.0);
+        assert!((cost(WITHIN_SIGMAS * 0.05 + 0.05) - 0.25 * 3.0).abs() < 1e-9 && (cost(1.0) - 3.0).abs() < 1e-9);
     }
 }

@@ -6,7 +6,7 @@ use crate::math::{Pose, Quat, ShortestAxis, Vec3};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Greatest cost of a joint, nats: limits differ between persons.
-const LARGEST_COST: f64 = 3.0;
+const LARGEST_LIMIT_COST: f64 = 3.0;
 
 /// All joints that have limits.
 #[derive(Debug)]
@@ -44,7 +44,7 @@ impl Term for Limits {
         let (_, v) = turn_in_joint(joint, &poses[*parent], &poses[limb]);
         let excess = |(axis, [low, high]): (usize, &[f64; 2])| (low - v[axis]).max(v[axis] - high).max(0.0);
         let squares: f64 = limits.iter().enumerate().map(|limit| (excess(limit) / self.sigma).powi(2)).sum();
-        (0.5 * squares).min(LARGEST_COST)
+        (0.5 * squares).min(LARGEST_LIMIT_COST)
     }
 }
 
@@ -88,7 +88,7 @@ mod tests {
         let [[least, _], ..] = joint.limits.unwrap();
         let term = Limits { sigma: 0.05 };
         assert!(term.cost(&model.body, &poses, elbow) < 1e-9);
-        for (beyond, expected) in [(0.05, 0.5), (0.1, 2.0), (0.4, LARGEST_COST)] {
+        for (beyond, expected) in [(0.05, 0.5), (0.1, 2.0), (0.4, LARGEST_LIMIT_COST)] {
             let mut bent = poses.clone();
             bent[elbow] = place(joint, &poses[*parent], Quat::from_axis_angle(hinge_axis(joint), least - beyond));
             let cost = term.cost(&model.body, &bent, elbow);

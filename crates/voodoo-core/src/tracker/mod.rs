@@ -286,7 +286,7 @@ impl BodyTracker {
         }
         // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the track is wrong.
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
-        let measures = schedule.whole_body && !relocalizer.is_new(frame.stamp);
+        let measures = schedule.whole_body && !relocalizer.is_new(frame.stamp) && hypotheses.unlike();
         let detected = relocalizer.detected().filter(|detected| measures && here(detected));
         fit.set_detected(detected, &model.body, poses, *origin);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).

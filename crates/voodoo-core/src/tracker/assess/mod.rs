@@ -220,11 +220,14 @@ impl Assessor {
             history
                 .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
         }
-        self.weigh_images(context, poses, detected);
+        self.weigh_images(context, matched, detected);
     }
 
     /// Updates arms and legs with the evidence of this frame's images and of a detection, if there is one.
-    fn weigh_images(&mut self, context: Context, poses: &[Pose], detected: Option<Detected>) {
+    fn weigh_images(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
+        let Matched { correspondences, poses } = matched;
+        // A pose that was fitted to the detection is not confirmed by it.
+        let most = if correspondences.detected.is_empty() { f64::INFINITY } else { 0.0 };
         let Self { limbs, supports, .. } = self;
         let (model, origin) = (context.model, context.observation.origin());
         for chain in &model.extremities {
@@ -247,8 +250,7 @@ impl Assessor {
                 }
                 let log_odds = detected
                     .map(|detected| detection_log_odds(detected, &model.body, poses, origin, [Some(limb), next]));
-                // The pose was fitted to the detection, so that it agrees counts half.
-                limbs[limb].observe(evidence, log_odds.map_or(0.0, |odds| odds.min(0.5 * odds)), unexpected);
+                limbs[limb].observe(evidence, log_odds.unwrap_or_default().min(most), unexpected);
             }
         }
     }
