@@ -269,6 +269,8 @@ impl BodyTracker {
         let Motion { poses, previous, predicted, origin, .. } = motion;
         observer.observe(frame, &body_box(&model.body, poses, config.body_box_margin), *origin, ownership, config);
         let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale };
+        // Beside other persons, what the body does not explain may be theirs.
+        let unlike = ownership.alone && hypotheses.unlike();
         if schedule.whole_body && known {
             let lost = assessor.status() == Status::Lost;
             // A lost body is searched for with everybody's detections, see `crate::People`.
@@ -279,14 +281,15 @@ impl BodyTracker {
                     limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
                     pose_uncertain: assessor.is_uncertain(),
                     anywhere: interrupted,
-                    unlike: hypotheses.unlike(),
+                    unlike,
                 };
                 relocalizer.detect(&model.body, frame, ownership, poses[0].translation + *origin, reasons);
             }
         }
-        // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the track is wrong.
+        // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the
+        // track is wrong.
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
-        let measures = schedule.whole_body && !relocalizer.is_new(frame.stamp) && hypotheses.unlike();
+        let measures = schedule.whole_body && unlike && !relocalizer.is_new(frame.stamp);
         let detected = relocalizer.detected().filter(|detected| measures && here(detected));
         fit.set_detected(detected, &model.body, poses, *origin);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
