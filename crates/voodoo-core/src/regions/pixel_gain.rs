@@ -31,13 +31,6 @@ pub(crate) struct PixelGain {
     pub area: f64,
 }
 
-impl std::ops::AddAssign for PixelGain {
-    fn add_assign(&mut self, other: Self) {
-        self.gained += other.gained;
-        self.area += other.area;
-    }
-}
-
 /// Label images of selected limbs, one per camera.
 #[derive(Debug, Default)]
 pub(crate) struct Backdrop {

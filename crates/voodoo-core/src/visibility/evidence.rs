@@ -21,14 +21,6 @@ pub(crate) struct Patches {
     pub front_facing: f64,
 }
 
-impl std::ops::AddAssign for Patches {
-    fn add_assign(&mut self, other: Self) {
-        self.free_space += other.free_space;
-        self.occluded += other.occluded;
-        self.front_facing += other.front_facing;
-    }
-}
-
 /// Returns the patches of a limb's surface that are visible to the cameras, occluded, and in free space.
 pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Patches {
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
@@ -93,9 +85,14 @@ mod tests {
         let frame = Frame { images: &images, ..Frame::empty(0.0) };
         let views =
             DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
-        let mut all = Patches::default();
-        body.limbs().iter().zip(poses).for_each(|(limb, pose)| all += limb_visibility(views, limb, pose));
-        all
+        body.limbs().iter().zip(poses).map(|(limb, pose)| limb_visibility(views, limb, pose)).fold(
+            Patches::default(),
+            |all, one| Patches {
+                free_space: all.free_space + one.free_space,
+                occluded: all.occluded + one.occluded,
+                front_facing: all.front_facing + one.front_facing,
+            },
+        )
     }
 
     /// A person who faces the camera, 2.5 m before it, arms hanging.
