@@ -61,8 +61,9 @@ class Watched(Output):
 
     receiver = True
 
-    def __init__(self, name: str, call: Callable[[Step], object], *, prompt: bool = False) -> None:
-        self.name, self.prompt, self.publish = name, prompt, call  # type: ignore[method-assign,assignment]
+    def __init__(self, name: str, call: Callable[[Step], object], *, prompt: bool = False, waits: bool = True) -> None:
+        self.name, self.prompt, self.waits = name, prompt, waits
+        self.publish = call  # type: ignore[method-assign,assignment]
         self.waiting = 1 if prompt or name != "steps" else 1000
 
     def publish(self, step: Step) -> None:
@@ -123,7 +124,7 @@ def cost(recording: MadeUpRecording, rounds: int) -> None:
     for name in [*outputs] * rounds:
         steps, at = list[Step](), list[float]()
         taken = Watched("steps", lambda step, steps=steps, at=at: (steps.append(step), at.append(time.process_time())))
-        beside = [Watched(one.name, one.publish, prompt=one.prompt) for one in outputs[name]]
+        beside = [Watched(one.name, one.publish, prompt=one.prompt, waits=one.waits) for one in outputs[name]]
         report = session(recording, [taken, *beside], []).report()
         first = len(steps) // 3  # everybody is found
         used[name].append(1e3 * (at[-1] - at[first]) / (len(steps) - first - 1))

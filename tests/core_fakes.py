@@ -63,7 +63,7 @@ class Estimate:
     limb_points: dict = field(default_factory=dict)
     limb_status: dict = field(default_factory=dict)
     joint_covariances: np.ndarray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    limb_covariance: dict = field(default_factory=dict)
+    root_covariance: object = field(default_factory=lambda: np.full((6, 6), np.nan))
     joint_sigma: dict = field(default_factory=dict)
 
     @property

@@ -318,6 +318,27 @@ def test_several_people_are_published_as_a_bag_has_them(root):
                 np.testing.assert_allclose(here, there, atol=1e-12)
 
 
+def test_a_frame_is_written_in_as_few_messages_as_it_has_topics_and_encoded_once(monkeypatch):
+    encoded = []
+    monkeypatch.setattr("voodoo.live.sinks.ros2.cdr", lambda message: encoded.append(message) or cdr(message))
+    node = FakeNode()
+    output = Ros2Sink(root_frame=lambda: "odom", node=node)
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    steps = [step for step, _ in zip(track(recording, tracker), range(6), strict=False)]
+    for number in range(1, 5):
+        node.unheard.add(f"/humans/bodies/p{number}/markers")
+    counts = []
+    for step in steps[2:]:
+        people, bodies = (dict.fromkeys(range(1, 5), one) for one in (step.estimate, tracker.body))
+        output.publish(Step(LiveFrame(step.estimate.stamp, (), 0, 0.0, 0.0, False), people, bodies, 0.0))
+        sent = [topic for topic, _ in node.sent if "description" not in topic]
+        node.take()
+        counts.append((len(sent), len(set(sent)), len(encoded)))
+    assert {count[:2] for count in counts} == {(10, 10)}  # /tf, the list of ids, and two of each person
+    assert counts[0][2] == counts[-1][2] == 14  # the descriptions, too
+
+
 def test_a_whole_recording_goes_through_the_bus():
     """Messages as a driver sends them give what the recording gives, to the last bit."""
     recording = open_recording(sample_path(), use=("depth",), bare=True)

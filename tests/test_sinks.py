@@ -50,7 +50,7 @@ def step_of(track, body, index=0, *, number=1, status="tracking", stamp=None):
         world_from_limb=dict(zip(track.limb_names, track.world_from_limb[index], strict=True)),
         limb_status=dict.fromkeys(track.limb_names, "measured"),
         joint_covariances=(),
-        limb_covariance={},
+        root_covariance=np.full((6, 6), np.nan),
     )
     return Step(LiveFrame(stamp, (), 0, 0.0, 0.0, False), {number: estimate}, {number: body}, 0.0)
 
@@ -175,6 +175,39 @@ def test_a_dead_receiver_of_vmc_is_named_once_and_receives_when_it_is_back(monke
     rig.finish()
 
 
+def test_sinks_that_never_wait_share_a_thread_and_messages_are_encoded_once(monkeypatch):
+    class Threaded(Output):
+        def __init__(self, name, waits):
+            self.name, self.waits, self.threads, self.count = name, waits, set(), 0
+
+        def publish(self, step):
+            self.threads.add(threading.get_ident())
+            self.count += 1
+
+    made = [Threaded("a", False), Threaded("b", False), Threaded("c", True), Threaded("d", True)]
+    rig = Paced(made, voodoo.Body.human())
+    rig.send(3)
+    until(lambda: all(one.count for one in made))
+    rig.finish()
+    (a,), (b,), (c,), (d,) = (one.threads for one in made)
+    assert a == b and len({a, c, d}) == 3
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as place:
+        place.bind(("127.0.0.1", 0))
+        vmc = opened(f"vmc://127.0.0.1:{place.getsockname()[1]}")
+        server = opened("ws://:0")
+        assert not vmc.waits and not server.waits
+        encoded, encode = [], vmc._bundle
+        monkeypatch.setattr(vmc, "_bundle", lambda messages: encoded.append(len(messages)) or encode(messages))
+        body = voodoo.Body.human()
+        track, datagrams = track_of(body), []
+        for index in range(4):
+            vmc.publish(step_of(track, body, index))
+            datagrams.append([place.recv(65536) for _ in encoded])
+        assert len(encoded) == len(datagrams[0]) == 2 and datagrams[0] != datagrams[3]
+        vmc.close()
+        server.close()
+
+
 class Fake(Output):
     """A receiver that hangs while `free` is not set, and fails while `dead`."""
 
@@ -247,7 +280,7 @@ class Lent(Output):
     receiver = True
 
     def __init__(self, sink):
-        self.name, self.sink = sink.name, sink
+        self.name, self.sink, self.waits = sink.name, sink, sink.waits
 
     def publish(self, step):
         self.sink.publish(step)

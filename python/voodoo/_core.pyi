@@ -23,6 +23,7 @@ __all__ = [
     "SiteRay",
     "SkinCue",
     "TaperedEllipticCylinder",
+    "Template",
     "Tracker",
     "View",
     "__version__",
@@ -30,13 +31,19 @@ __all__ = [
     "body_before",
     "carried",
     "config_fields",
+    "cylinders",
     "euler_angles",
     "expected_sites",
+    "joint_angles",
     "linear_sum_assignment",
+    "moved_covariances",
     "nearest_surface",
     "person_candidates",
+    "placed",
     "quaternions",
     "render_depth",
+    "skeleton",
+    "with_numbers",
 ]
 
 __version__: str
@@ -255,6 +262,22 @@ class SiteRay:
     def trusted(self, trust: float) -> SiteRay:
         """Returns the ray with another trust."""
 
+@final
+class Template:
+    """Messages with places for numbers, each of which is in them once.
+
+    Numbers are stored in double precision with the least significant byte first, or in single precision with the most.
+    """
+
+    def __new__(
+        cls, messages: Sequence[bytes], numbers: npt.NDArray[np.float64], single: bool, stamp: bytes
+    ) -> Template: ...
+    def filled(self, numbers: Sequence[npt.NDArray[np.float64]], stamp: bytes) -> list[bytes]:
+        """The messages with other numbers, in arrays one after the other, and another stamp that takes as many bytes."""
+
+def with_numbers(text: str, numbers: Sequence[npt.NDArray[np.float64]]) -> str:
+    """A text whose null characters are replaced by the rounded numbers of arrays, one after the other."""
+
 def quaternions(rotations: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], bool]:
     """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3), whose largest entry is positive; and whether one of
     the matrices is only approximately a rotation."""
@@ -264,6 +287,46 @@ def euler_angles(quaternions: npt.NDArray[np.float64], order: tuple[int, int, in
 
     If the first and third axes are parallel, only their sum is determined; the third angle is then zero.
     """
+
+def skeleton(
+    bodies: Sequence[Body],
+    poses: npt.NDArray[np.float64],
+    joints: npt.NDArray[np.float64],
+    own: npt.NDArray[np.int64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Rotations world_from_bone (F, L, 3, 3) and heads (F, L, 3) of poses (F, L, 4, 4) of one body, or of one of each frame.
+
+    Rows of `own` are limbs whose joint to the parent is one of joints (F, J, 3), and the number of that.
+    """
+
+def placed(
+    rotations: npt.NDArray[np.float64],
+    points: npt.NDArray[np.float64],
+    plan: npt.NDArray[np.int64],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Places (F, N, 3) of frames; and place and rotation x, y, z, w (F, N, 7) of each on its parent.
+
+    Rows (4) of `plan` are, of each frame, the number of its rotation among (F, L, 3, 3), those of two points among (F, M, 3) in
+    the middle of which it is, and that of its parent among the frames or -1.
+    """
+
+def joint_angles(
+    rotations: npt.NDArray[np.float64],
+    plan: npt.NDArray[np.int64],
+) -> npt.NDArray[np.float64]:
+    """Angles (F, N) [rad] between two of the rotations (F, L, 3, 3) each.
+
+    Rows (8) of `plan` are, of each angle, the numbers of the rotation above and of the other; the three moving axes of Euler
+    angles (0, 1, 2: x, y, z), or -1 for the twist about y; which of the three angles it is; its sign; and whether half a turn is
+    added before.
+    """
+
+def moved_covariances(covariances: npt.NDArray[np.float64], across: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Covariances (F, 6, 6) of poses of points that are away by (F, 3) from those whose covariances are given."""
+
+def cylinders(bodies: Sequence[Body], poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Of poses (F, L, 4, 4) of one body, or of one of each frame: middle, rotation x, y, z, w, both diameters, length, and scales
+    of both ends of each limb's cylinder (F, 12 L)."""
 
 def carried(
     points: _Points,
@@ -719,6 +782,9 @@ class Estimate:
     def limb_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Covariance (6, 6) of the pose of every limb: x, y, z [m], then rotations about the world's x, y, z [rad] through the
         origin of the limb frame, as in geometry_msgs/PoseWithCovariance."""
+    @property
+    def root_covariance(self) -> npt.NDArray[np.float64]:
+        """The covariance (6, 6) of the first limb in `limb_covariance`."""
     @property
     def angle_covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Covariance (3, 3) [rad^2] of the rotation of every joint about the world's axes."""

@@ -62,6 +62,18 @@ pub(crate) fn joint((name, on_parent, on_limb, semi_axes, weight, limits, motion
     }
 }
 
+/// Of each limb its orientation when the body stands at rest, and where it is joined to its parent in its own frame.
+pub(crate) fn at_rest(body: &Body) -> Vec<(Mat3, Vec3)> {
+    let mut turns: Vec<Quat> = Vec::new();
+    for limb in body.limbs() {
+        turns.push(limb.parent.as_ref().map_or(Quat::IDENTITY, |(parent, joint)| {
+            turns[*parent] * joint.parent_from_joint.rotation * joint.limb_from_joint.rotation.inverse()
+        }));
+    }
+    let place = |limb: &Limb| limb.parent.as_ref().map_or(Vec3::ZERO, |(_, joint)| joint.limb_from_joint.translation);
+    turns.into_iter().zip(body.limbs()).map(|(turn, limb)| (Mat3::from_quat(turn), place(limb))).collect()
+}
+
 #[pymethods]
 impl PyBody {
     #[new]
@@ -142,17 +154,10 @@ impl PyBody {
 
     #[doc = stub!("Body.at_rest")]
     fn at_rest<'py>(&self, py: Python<'py>) -> PyResult<(Array<'py>, Array<'py>)> {
-        let mut turns: Vec<Quat> = Vec::new();
-        for limb in self.0.limbs() {
-            turns.push(limb.parent.as_ref().map_or(Quat::IDENTITY, |(parent, joint)| {
-                turns[*parent] * joint.parent_from_joint.rotation * joint.limb_from_joint.rotation.inverse()
-            }));
-        }
-        let place =
-            |limb: &Limb| limb.parent.as_ref().map_or(Vec3::ZERO, |(_, joint)| joint.limb_from_joint.translation);
-        let turned = turns.iter().flat_map(|turn| Mat3::from_quat(*turn).transpose().to_cols_array()).collect();
-        let places = self.0.limbs().iter().flat_map(|limb| place(limb).to_array()).collect();
-        Ok((frozen(py, turned, &[turns.len(), 3, 3])?, frozen(py, places, &[turns.len(), 3])?))
+        let rest = at_rest(&self.0);
+        let turned = rest.iter().flat_map(|(turn, _)| turn.transpose().to_cols_array()).collect();
+        let places = rest.iter().flat_map(|(_, place)| place.to_array()).collect();
+        Ok((frozen(py, turned, &[rest.len(), 3, 3])?, frozen(py, places, &[rest.len(), 3])?))
     }
 
     /// For pickle and copy.

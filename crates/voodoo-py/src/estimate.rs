@@ -256,6 +256,13 @@ impl PyEstimate {
         rows(&this.names.limbs, &frozen(slf.py(), all, &[limbs.len(), 6, 6])?)
     }
 
+    #[doc = stub!("Estimate.root_covariance")]
+    #[getter]
+    fn root_covariance<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let root = self.estimate.covariances.limbs.first().copied().unwrap_or([[f64::NAN; 6]; 6]);
+        frozen(py, root.into_iter().flatten().collect(), &[6, 6])
+    }
+
     #[doc = stub!("Estimate.angle_covariance")]
     #[getter]
     fn angle_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {

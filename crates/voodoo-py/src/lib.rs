@@ -29,7 +29,9 @@ mod render;
 mod rotations;
 mod shape;
 mod sites;
+mod skeleton;
 mod skin;
+mod template;
 mod tracker;
 
 use pyo3::prelude::*;
@@ -68,7 +70,11 @@ mod _core {
     #[pymodule_export]
     use super::sites::{PySiteGate, PySiteRay, expected_sites};
     #[pymodule_export]
+    use super::skeleton::{cylinders, joint_angles, moved_covariances, placed, skeleton};
+    #[pymodule_export]
     use super::skin::PySkinCue;
+    #[pymodule_export]
+    use super::template::{Template, with_numbers};
     #[pymodule_export]
     use super::tracker::{PyTracker, body_before};
 

@@ -32,6 +32,11 @@ pub(crate) fn quaternions<'py>(
     Ok((PyArray1::from_vec(py, found).reshape(shape)?, skewed))
 }
 
+/// Whether Euler angles can be about these axes.
+pub(crate) fn are_axes(order: [usize; 3]) -> bool {
+    order[0] != order[1] && order[1] != order[2] && order.iter().all(|axis| *axis < 3)
+}
+
 #[doc = stub!("euler_angles")]
 #[pyfunction]
 pub(crate) fn euler_angles<'py>(
@@ -40,7 +45,7 @@ pub(crate) fn euler_angles<'py>(
     order: [usize; 3],
 ) -> PyResult<Array<'py>> {
     let shape = [leading(&quaternions, &[4])?, &[3]].concat();
-    if order[0] == order[1] || order[1] == order[2] || order.iter().any(|axis| *axis > 2) {
+    if !are_axes(order) {
         return Err(exception(py, "MeasurementError", format!("order: expected axes that differ, found {order:?}")));
     }
     let rows = quaternions.as_slice()?.as_chunks::<4>().0;

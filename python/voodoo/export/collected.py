@@ -51,6 +51,5 @@ def covariances_of(
     for index, estimate in enumerate(estimates):
         if len(estimate.joint_covariances) == len(joint_names):
             joints[index] = estimate.joint_covariances
-        if limb_names and limb_names[0] in estimate.limb_covariance:
-            root[index] = estimate.limb_covariance[limb_names[0]]
+        root[index] = estimate.root_covariance
     return (joints if np.isfinite(joints).any() else np.empty((len(estimates), 0, 3, 3))), root

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+import voodoo._core as _core
 from voodoo.errors import installed
 from voodoo.export.human_frames import human_frames, placed_names
 from voodoo.export.skeleton import FloatArray, skeleton
-from voodoo.export.template import STAMP_NS, Template
+from voodoo.export.template import STAMP_NS, template
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
-from voodoo.model.rotations import quaternions
 from voodoo.whole import appearing_whole
 
 SUFFIX = ".foxglove.mcap"
@@ -56,7 +57,7 @@ class Channels:
             foxglove.Channel(topic, schema=kind.get_schema(), message_encoding="protobuf", context=context)
             for topic, kind in ((TRANSFORMS, self._messages.FrameTransforms), (SCENE, self._messages.SceneUpdate))
         )
-        self._transforms_of, self._entity_of = lru_cache(64)(self._make_transforms), lru_cache(64)(self._make_entity)
+        self._template_of = lru_cache(8)(self._make_template)
 
     @property
     def are_wanted(self) -> bool:
@@ -65,42 +66,25 @@ class Channels:
 
     def log(self, stamp: float, people: Sequence[FoxgloveRow], root_frame: str) -> None:
         """Write a frame of those who are there; `root_frame` has z up."""
-        seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
-        log_time, time = round(stamp * 1e9), _timestamp(seconds, rest)
-        # Messages one after the other are one with the entries of all of them.
-        if people:
-            made = [self._transforms_of(*one[:3], root_frame).filled(one.on_parents.ravel(), time) for one in people]
-            self._transforms.log(b"".join(made), log_time=log_time)
+        at = round(stamp * 1e9)
+        made = self._template_of(tuple(one[:5] for one in people), root_frame)
+        numbers = [part for one in people for part in (one.on_parents, one.shapes)]
+        *transforms, scene = made.filled(numbers, _timestamp(*divmod(at, 1_000_000_000)))
+        for message in transforms:
+            self._transforms.log(message, log_time=at)
+        self._scene.log(scene, log_time=at)
+
+    def _make_template(self, people: Sequence[tuple[Any, ...]], root_frame: str) -> _core.Template:
+        """Messages of the first fields of rows: transforms, if somebody is there, and the scene."""
         m = self._messages
-        before = m.SceneEntityDeletion(timestamp=m.Timestamp(seconds, rest), type=m.SceneEntityDeletionType.All)
-        entities = [self._entity_of(one.person, *one[3:5], root_frame).filled(one.shapes, time) for one in people]
-        self._scene.log(b"".join([m.SceneUpdate(deletions=[before]).encode(), *entities]), log_time=log_time)
-
-    def _make_transforms(
-        self, person: str, names: tuple[str, ...], parents: tuple[int, ...], root_frame: str
-    ) -> Template:
-        m, placed = self._messages, placed_names(names, parents, person, root_frame)
-
-        def encode(numbers: list[float]) -> bytes:
-            rows = [numbers[start : start + 7] for start in range(0, len(numbers), 7)]
-            transforms = [
-                m.FrameTransform(
-                    timestamp=m.Timestamp(*divmod(STAMP_NS, 1_000_000_000)),
-                    parent_frame_id=parent,
-                    child_frame_id=name,
-                    translation=m.Vector3(**_xyz(row)),
-                    rotation=m.Quaternion(**_xyz(row[3:], "xyzw")),
-                )
-                for (parent, name), row in zip(placed, rows, strict=True)
-            ]
-            return bytes(m.FrameTransforms(transforms=transforms).encode())
-
-        return Template(encode, 7 * len(placed), kind="<f8", stamp=_STAMP)
-
-    def _make_entity(self, person: str, limbs: tuple[str, ...], joints: int, root_frame: str) -> Template:
-        m = self._messages
+        time = m.Timestamp(*divmod(STAMP_NS, 1_000_000_000))
         size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**_JOINT)
         still = m.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+        before = m.SceneEntityDeletion(timestamp=time, type=m.SceneEntityDeletionType.All)
+
+        def transform(parent: str, name: str, row: list[float]) -> Any:  # noqa: ANN401
+            how = {"translation": m.Vector3(**_xyz(row)), "rotation": m.Quaternion(**_xyz(row[3:], "xyzw"))}
+            return m.FrameTransform(timestamp=time, parent_frame_id=parent, child_frame_id=name, **how)
 
         def cylinder(limb: str, row: list[float]) -> Any:  # noqa: ANN401
             turn = m.Quaternion(**_xyz(row[3:7], "xyzw"))
@@ -112,25 +96,25 @@ class Channels:
                 color=m.Color(**(_LEFT if limb.startswith("l_") else _RIGHT)),
             )
 
-        def encode(numbers: list[float]) -> bytes:
-            rows = [numbers[start:] for start in range(0, 12 * len(limbs), 12)]
-            places = [numbers[12 * len(limbs) + 3 * index :] for index in range(joints)]
-            spheres = [
-                m.SpherePrimitive(
-                    pose=m.Pose(position=m.Vector3(**_xyz(place)), orientation=still), size=size, color=red
-                )
-                for place in places
-            ]
-            entity = m.SceneEntity(
-                timestamp=m.Timestamp(*divmod(STAMP_NS, 1_000_000_000)),
-                frame_id=root_frame,
-                id=person,
-                cylinders=[cylinder(*pair) for pair in zip(limbs, rows, strict=True)],
-                spheres=spheres,
+        def sphere(row: list[float]) -> Any:  # noqa: ANN401
+            return m.SpherePrimitive(
+                pose=m.Pose(position=m.Vector3(**_xyz(row)), orientation=still), size=size, color=red
             )
-            return bytes(m.SceneUpdate(entities=[entity]).encode())
 
-        return Template(encode, 12 * len(limbs) + 3 * joints, kind="<f8", stamp=_STAMP)
+        def encode(numbers: list[float]) -> list[bytes]:
+            left, transforms, entities = iter(numbers), [], []
+            for person, names, parents, limbs, joints in people:
+                placed = placed_names(names, parents, person, root_frame)
+                transforms += [transform(*pair, list(islice(left, 7))) for pair in placed]
+                cylinders = [cylinder(limb, list(islice(left, 12))) for limb in limbs]
+                spheres = [sphere(list(islice(left, 3))) for _ in range(joints)]
+                what = {"cylinders": cylinders, "spheres": spheres}
+                entities.append(m.SceneEntity(timestamp=time, frame_id=root_frame, id=person, **what))
+            scene = m.SceneUpdate(deletions=[before], entities=entities)
+            return [one.encode() for one in (*[m.FrameTransforms(transforms=transforms)] * bool(people), scene)]
+
+        count = sum(7 * len(names) + 12 * len(limbs) + 3 * joints for _, names, _, limbs, joints in people)
+        return template(encode, count, stamp=_timestamp(*divmod(STAMP_NS, 1_000_000_000)))
 
 
 class FoxgloveRow(NamedTuple):
@@ -154,15 +138,9 @@ def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray
         limb_poses: (F, L, 4, 4).
         joints: (F, J, 3).
     """
-    length, a0, b0, a1, b1 = np.array([body.core.sizes() for body in bodies]).transpose(2, 0, 1)
-    a, b = a0 + a1, b0 + b1
-    low = a0 / a + b0 / b  # of the mean of both ends
-    sizes = np.array([a, b, length, low, 2.0 - low]).transpose(1, 2, 0)
-    middles = limb_poses[..., :3, 3] + limb_poses[..., :3, 2] * length[..., None] / 2.0
-    count, limbs = limb_poses.shape[:2]
-    rows = [middles, quaternions(limb_poses[..., :3, :3]), np.broadcast_to(sizes, (count, limbs, 5))]
-    cylinders = np.concatenate(rows, axis=2).reshape(count, 12 * limbs)
-    return np.concatenate([cylinders, joints.reshape(count, 3 * joints.shape[1])], axis=1)
+    poses = np.ascontiguousarray(limb_poses, dtype=np.float64)
+    cylinders = _core.cylinders([body.core for body in bodies], poses)
+    return np.concatenate([cylinders, joints.reshape(len(joints), 3 * joints.shape[1])], axis=1)
 
 
 def _timestamp(seconds: int, nanoseconds: int) -> bytes:
@@ -172,9 +150,6 @@ def _timestamp(seconds: int, nanoseconds: int) -> bytes:
         for number in (seconds, nanoseconds)
     ]
     return b"\x08" + words[0] + b"\x10" + words[1]
-
-
-_STAMP = _timestamp(*divmod(STAMP_NS, 1_000_000_000))
 
 
 def _xyz(values: Iterable[float], names: str = "xyz") -> dict[str, float]:
@@ -209,7 +184,7 @@ def write_foxglove(
         found = track.of_frames(track.found)
         placed = human_frames(track.joint_names, found.joints, skeleton(found, body))
         about = person, placed.names, placed.parents, track.limb_names, len(track.joint_names)
-        rows = zip(placed.on_parents(), shapes_of([body], found.world_from_limb, found.joints), strict=True)
+        rows = zip(placed.on_parents, shapes_of([body], found.world_from_limb, found.joints), strict=True)
         for stamp, there in zip(track.stamps.tolist(), track.found.tolist(), strict=True):
             frames.setdefault(stamp, []).extend([FoxgloveRow(*about, *next(rows))] if there else [])
     with appearing_whole(Path(path)) as place, foxglove.open_mcap(str(place), context=context):

@@ -7,10 +7,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.export.conventions import NAMES
 from voodoo.export.skeleton import FloatArray, Skeleton
-from voodoo.model.rotations import quaternions
 
 FRAMES = {limb: names.rep155 for limb, names in NAMES.items() if names.rep155}
 """REP-155 frame of each limb of the default humans; other limbs (the neck) keep their own name."""
@@ -22,30 +23,21 @@ class HumanFrames(NamedTuple):
     Attributes:
         names: N names without that of the person; the first is "body".
         parents: N numbers of the parent; -1 of the first one, which is on the root frame.
-        rotations: (F, N, 3, 3) root_from_frame.
         places: (F, N, 3) [m] in the root frame.
+        on_parents: (F, N, 7): place x, y, z [m] and rotation x, y, z, w of each frame on its parent.
     """
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
-    rotations: FloatArray
     places: FloatArray
-
-    def on_parents(self) -> FloatArray:
-        """(F, N, 7): place x, y, z [m] and rotation x, y, z, w of each frame on its parent."""
-        above = self.parents[1:]
-        turns, places = self.rotations.copy(), self.places.copy()
-        back = self.rotations[:, above].swapaxes(2, 3)
-        turns[:, 1:] = back @ turns[:, 1:]
-        places[:, 1:] = (back @ (places[:, 1:] - self.places[:, above])[..., None])[..., 0]
-        return np.concatenate([places, quaternions(turns)], axis=2)
+    on_parents: FloatArray
 
 
 def human_frames(joint_names: tuple[str, ...], joints: FloatArray, posed: Skeleton) -> HumanFrames:
     """Frames of poses with joints (F, J, 3)."""
-    names, parents, limbs, *ends = _plan(joint_names, posed.limbs)
+    names, parents, plan = _plan(joint_names, posed.limbs)
     points = np.concatenate([posed.heads, joints], axis=1)
-    return HumanFrames(names, parents, posed.rotations[:, limbs], (points[:, ends[0]] + points[:, ends[1]]) / 2.0)
+    return HumanFrames(names, parents, *_core.placed(posed.rotations, points, plan))
 
 
 def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root: str) -> list[tuple[str, str]]:
@@ -54,15 +46,12 @@ def placed_names(names: Sequence[str], parents: Sequence[int], person: str, root
     return [(names[above] if above >= 0 else root, name) for name, above in zip(names, parents, strict=True)]
 
 
-_Numbers = tuple[int, ...]
-
-
 @lru_cache(maxsize=64)
 def _plan(
     joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
-) -> tuple[tuple[str, ...], _Numbers, _Numbers, _Numbers, _Numbers]:
-    """Of each frame the name, the parent, the limb it turns with, and two points in the middle of which it is: heads of limbs,
-    then joints."""
+) -> tuple[tuple[str, ...], tuple[int, ...], npt.NDArray[np.int64]]:
+    """Of each frame the name; the parent; and the plan of `placed`: the limb it turns with, two points in the middle of which it
+    is (heads of limbs, then joints), and the parent."""
     sites = {name: len(limbs) + index for index, name in enumerate(joint_names)}
     there = {name for name, _ in limbs}
 
@@ -70,7 +59,7 @@ def _plan(
         left, right = sites.get(f"l_{joint}"), sites.get(f"r_{joint}")
         return (otherwise, otherwise) if left is None or right is None else (left, right)
 
-    rows: list[tuple[str, int, int, int, int]] = [("body", -1, 0, *middle("hip", 0))]
+    rows: list[tuple[str, int, int, int, int]] = [("body", 0, *middle("hip", 0), -1)]
     frame_of: list[int] = []
     for number, (name, above) in enumerate(limbs):
         parent = 0 if above is None or name.endswith("_thigh") else frame_of[above]
@@ -78,16 +67,15 @@ def _plan(
         if name in ("torso", "thorax"):
             ends = middle("shoulder", number)
         elif above is None:
-            ends = rows[0][3:]
+            ends = rows[0][2:4]
         elif name == "head" and "head_center" in sites:
             ends = sites["head_center"], sites["head_center"]
         frame_of.append(len(rows))
-        rows.append((FRAMES.get(name, name), parent, number, *ends))
+        rows.append((FRAMES.get(name, name), number, *ends, parent))
         # In bodies without hand or foot, the forearm or calf carries the frame of the wrist or ankle.
         for limb, end, site in (("_forearm", "_hand", "_wrist"), ("_calf", "_foot", "_ankle")):
             side = name.removesuffix(limb)
             if name.endswith(limb) and side + end not in there and side + site in sites:
                 place = sites[side + site]
-                rows.append((side + site, frame_of[number], number, place, place))
-    names, parents, turning, first, second = zip(*rows, strict=True)
-    return names, parents, turning, first, second
+                rows.append((side + site, number, place, place, frame_of[number]))
+    return tuple(row[0] for row in rows), tuple(row[-1] for row in rows), np.array([row[1:] for row in rows])

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.export.human_frames import human_frames, placed_names
@@ -166,8 +167,9 @@ class _Human:
             self._joints, angles = joint_angles(posed)
             self._frames = placed_names(frames.names, frames.parents, person, self.root)
             roots = track.world_from_limb[self._displayed, 0, :3, 3]
-            sure = body_covariances(track.root_covariance[self._displayed], frames.places[:, 0] - roots)
-            self._rows = zip(angles, frames.on_parents(), sure, strict=True)
+            known = np.ascontiguousarray(track.root_covariance[self._displayed], dtype=np.float64)
+            sure = _core.moved_covariances(known, frames.places[:, 0] - roots)
+            self._rows = zip(angles, frames.on_parents, sure, strict=True)
 
     def kinds(self, markers: bool) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
@@ -196,15 +198,6 @@ class _Human:
 def root_on_parent(pose: FloatArray) -> list[float]:
     """Place and rotation, as in `HumanFrames.on_parents`, of the upright frame on the root frame that `pose` turns."""
     return [*(-pose[:3, :3].T @ pose[:3, 3]).tolist(), *quaternions(pose[:3, :3].T).tolist()]
-
-
-def body_covariances(covariances: FloatArray, across: FloatArray) -> FloatArray:
-    """Covariances (F, 6, 6) of poses, moved by vectors (F, 3) to other points of the body."""
-    moved = np.zeros_like(covariances) + np.eye(6)
-    x, y, z = across.T
-    moved[:, [0, 0, 1, 1, 2, 2], [4, 5, 3, 5, 3, 4]] = np.array([z, -y, -z, x, y, -x]).T
-    result: FloatArray = moved @ covariances @ moved.swapaxes(1, 2)
-    return result
 
 
 def transforms_message(nanoseconds: int, rows: Iterable[tuple[str, str, Sequence[float]]]) -> Any:  # noqa: ANN401

@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.model.body import Body
@@ -131,20 +132,16 @@ def skeleton_of(
     bodies: Sequence[Body], stamps: FloatArray, poses: FloatArray, joint_names: tuple[str, ...], joints: FloatArray
 ) -> Skeleton:
     """The skeleton of F poses (F, L, 4, 4) with joints (F, J, 3) of a body, or of persons of one instant with a body each."""
-    rest, _ = bodies[0].core.at_rest()
-    places = np.array([body.core.at_rest()[1] for body in bodies])
-    turn = poses[:, :, :3, :3]
-    heads = (turn @ places[..., None])[..., 0] + poses[:, :, :3, 3]
-    limbs, sites = _sites(bodies[0].limb_joints, joint_names)
-    heads[:, limbs] = joints[:, sites]
-    return Skeleton(bodies[0], stamps, turn @ rest.transpose(0, 2, 1), heads)
+    poses, joints = (np.ascontiguousarray(one, dtype=np.float64) for one in (poses, joints))
+    own = _own(bodies[0].limb_joints, joint_names)
+    return Skeleton(bodies[0], stamps, *_core.skeleton([body.core for body in bodies], poses, joints, own))
 
 
 @lru_cache(maxsize=64)
-def _sites(joints: tuple[str | None, ...], names: tuple[str, ...]) -> tuple[list[int], list[int]]:
+def _own(joints: tuple[str | None, ...], names: tuple[str, ...]) -> npt.NDArray[np.int64]:
     """Limbs whose joint to the parent has a position of its own, and the number of that."""
-    limbs = [index for index, joint in enumerate(joints) if joint in names]
-    return limbs, [names.index(joint) for joint in joints if joint in names]
+    own = [(index, names.index(joint)) for index, joint in enumerate(joints) if joint in names]
+    return np.array(own, dtype=np.int64).reshape(-1, 2)
 
 
 def held(posed: Skeleton, found: npt.NDArray[np.bool_]) -> Skeleton:

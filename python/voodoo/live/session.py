@@ -33,7 +33,7 @@ _CLOSE_S = 3.0
 
 
 class Output(ABC):
-    """A receiver of poses. It is called from its own thread.
+    """A receiver of poses. It is called from a thread of its own, or of all that never wait.
 
     Attributes:
         name: name in messages.
@@ -41,6 +41,7 @@ class Output(ABC):
         waiting: queue capacity in steps; when it is exceeded, the oldest is dropped and counted.
         receiver: it sends to programs that may be slow, hang or be gone: the session names that once, neither waits for it nor
             ends with it, and goes on when it takes poses again.
+        waits: its `publish` may wait for somebody.
         on_reset: lets everybody be searched for again; set by the session.
         on_choice: lets only the person at a place be followed, see `Session.choose`; set by the session.
     """
@@ -49,6 +50,7 @@ class Output(ABC):
     prompt: bool = False
     waiting: int = 1
     receiver: bool = False
+    waits: bool = True
     on_reset: Callable[[], None] | None = None
     on_choice: Callable[[str, FloatArray], None] | None = None
 
@@ -171,7 +173,10 @@ class Session:
         prompt = [output for output in outputs if output.prompt]
         log = live.faults.log
         self._prompt = _Lane(prompt, log, self._count)
-        self._lanes = [self._prompt, *(_Lane([output], log) for output in outputs if not output.prompt)]
+        others = [output for output in outputs if not output.prompt]
+        swift = [output for output in others if not output.waits]
+        alone = [[output] for output in others if output.waits]
+        self._lanes = [self._prompt, *(_Lane(group, log) for group in (swift, *alone) if group)]
         self._thread = threading.Thread(target=self._track, daemon=True)
         self._thread.start()
 

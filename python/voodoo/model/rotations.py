@@ -89,10 +89,5 @@ def euler_angles(rotations: FloatArray, order: str) -> FloatArray:
 
     If the first and third axes are parallel, only their sum is determined; the third angle is then zero.
     """
-    return euler_angles_of_quaternions(quaternions(rotations), order)
-
-
-def euler_angles_of_quaternions(q: FloatArray, order: str) -> FloatArray:
-    """As `euler_angles`, of unit quaternions (N, 4)."""
     first, second, third = ("XYZ".index(axis) for axis in order)
-    return _core.euler_angles(np.ascontiguousarray(q, dtype=np.float64), (first, second, third))
+    return _core.euler_angles(quaternions(rotations), (first, second, third))

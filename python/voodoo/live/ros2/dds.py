@@ -152,6 +152,8 @@ class Subscription:
 
     def take(self) -> list[bytes]:
         """Received messages, as they were sent."""
+        if not self._condition.triggered:
+            return []
         return [sample.data_as_sent for sample in self._reader.take(N=100) if hasattr(sample, "data_as_sent")]
 
     def lost(self) -> int:

@@ -30,7 +30,7 @@ class FoxgloveSink(Output):
         VoodooError: an address that is in use or not of this machine, or foxglove-sdk is not installed.
     """
 
-    receiver = True
+    receiver, waits = True, False
 
     def __init__(self, address: str, *, root_frame: Callable[[], str], on_message: Callable[[str], None]) -> None:
         """Start the server."""
@@ -53,13 +53,13 @@ class FoxgloveSink(Output):
             return
         people, rows = shown(step, self._root()), []
         if people is not None and len(people.present):
-            names, parents, *_ = people.frames
+            names, parents, _, on_parents = people.frames
             limbs = people.posed.body.limb_names
             shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
             rows = [
                 FoxgloveRow(
                     person_id(people.numbers[index]),
-                    *(names, parents, limbs, people.joints.shape[1], people.on_parents[index], shapes[index]),
+                    *(names, parents, limbs, people.joints.shape[1], on_parents[index], shapes[index]),
                 )
                 for index in people.present.tolist()
             ]

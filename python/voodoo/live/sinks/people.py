@@ -10,10 +10,10 @@ from threading import Lock
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.export.human_frames import HumanFrames, human_frames
 from voodoo.export.joint_angles import joint_angles
-from voodoo.export.ros2 import body_covariances
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton_of
 from voodoo.export.upright import SUFFIX, Turn, by_axes
 from voodoo.live.follow import Step
@@ -22,11 +22,10 @@ from voodoo.model.body import Body
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Persons P of a step who have a pose: stamp [s]; frame with z up of everything, and how the root frame was turned to it;
+    """Persons P of a step who have a pose: frame with z up of everything, and how the root frame was turned to it;
     numbers; estimates in the root frame; bodies; joints (P, J, 3) [m]; limb poses (P, L, 4, 4); and a skeleton that has persons
     in the place of frames."""
 
-    stamp: float
     frame: str
     turn: Turn
     numbers: tuple[int, ...]
@@ -47,11 +46,6 @@ class Shown:
         return human_frames(tuple(self.estimates[0].joint_names), self.joints, self.posed)
 
     @cached_property
-    def on_parents(self) -> FloatArray:
-        """See HumanFrames.on_parents."""
-        return self.frames.on_parents()
-
-    @cached_property
     def angles(self) -> tuple[tuple[str, ...], FloatArray]:
         """See joint_angles."""
         return joint_angles(self.posed)
@@ -59,10 +53,11 @@ class Shown:
     @cached_property
     def covariances(self) -> FloatArray:
         """Covariances (P, 6, 6) of the poses of their frames "body"; NaN where unknown."""
-        root, unknown = self.posed.body.limb_names[0], np.full((6, 6), np.nan)
-        turned = np.kron(np.eye(2), self.turn.pose[:3, :3]) if self.turn.words else np.eye(6)
-        found = np.array([one.limb_covariance.get(root, unknown) for one in self.estimates])
-        return body_covariances(turned @ found @ turned.T, self.frames.places[:, 0] - self.limb_poses[:, 0, :3, 3])
+        found = np.array([one.root_covariance for one in self.estimates])
+        if self.turn.words:
+            turned = np.kron(np.eye(2), self.turn.pose[:3, :3])
+            found = turned @ found @ turned.T
+        return _core.moved_covariances(found, self.frames.places[:, 0] - self.limb_poses[:, 0, :3, 3])
 
 
 _lock = Lock()
@@ -89,7 +84,7 @@ def _shown(step: Step, root_frame: str) -> Shown | None:
     bodies = [step.bodies[number] for number in numbers]
     stamps = np.full(len(numbers), step.stamp)
     posed = skeleton_of(bodies, stamps, poses, tuple(estimates[0].joint_names), joints)
-    return Shown(step.stamp, frame, turn, numbers, estimates, bodies, joints, poses, posed)
+    return Shown(frame, turn, numbers, estimates, bodies, joints, poses, posed)
 
 
 def upright_frame(step: Step, root_frame: str) -> str:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
+from functools import lru_cache
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
+import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.human_frames import placed_names
 from voodoo.export.ros2 import (
@@ -29,11 +32,11 @@ from voodoo.export.ros2 import (
     tracked,
     transforms_message,
 )
-from voodoo.export.template import STAMP_NS, Template
+from voodoo.export.template import STAMP_NS, template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import Shown, shown
+from voodoo.live.sinks.people import shown, upright_frame
 from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody
@@ -82,10 +85,9 @@ class Ros2Sink(Output):
         self._root = root_frame
         self._node = Node(quiet=True) if node is None else node
         self._topics: dict[str, Publication] = {}
-        self._displayed: set[int] = set()
-        self._bodies: dict[int, Body] = {}
+        self._displayed: dict[int, Body] = {}
         self._described: dict[int, float] = {}
-        self._templates: dict[str, tuple[object, Template]] = {}
+        self._template_of = lru_cache(8)(self._make_template)
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", TF, 100)
@@ -102,75 +104,64 @@ class Ros2Sink(Output):
             chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
             if self.on_choice is not None:
                 self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
-        people = shown(step, self._root())
-        observed = set() if people is None else {people.numbers[index] for index in people.present}
-        if people is not None and observed:
-            self._write_people(people)
-        for number in self._displayed | observed:
-            # They take as long as everything else together; those of persons who left are deleted once.
+        root = self._root()
+        people, frame = shown(step, root), upright_frame(step, root)
+        observed: dict[int, Body] = {}
+        about: tuple[Any, ...] = (), (), (), ()
+        numbers: list[FloatArray] = []
+        if people is not None and len(there := people.present):
+            observed = {people.numbers[index]: people.bodies[index] for index in there}
+            (joints, angles), (names, parents, _, rows) = people.angles, people.frames
+            sure = there[np.isfinite(people.covariances[there]).all(axis=(1, 2))]
+            about = tuple(person_id(people.numbers[index]) for index in sure), names, parents, joints
+            numbers = [np.array(root_on_parent(people.turn.pose))] if frame != root else []
+            numbers += [rows[there], angles[there]]
+            numbers.append(np.concatenate([rows[sure, 0], people.covariances[sure].reshape(-1, 36)], axis=1))
+        topics, made = self._template_of(tuple(map(person_id, observed)), root, frame, *about)
+        # Together: what follows takes longer, and the network wakes once.
+        for (topic, kind), message in zip(topics, made.filled(numbers, _stamp(round(step.stamp * 1e9))), strict=True):
+            self._publish_on(topic, kind).write(message)
+        for number, body in observed.items():
+            size = float(body.core.sizes()[:, 0].sum())
+            if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
+                self._write(description(body, person_id(number)))
+                self._described[number] = size
+        for number, body in (self._displayed | observed).items():
+            # Those of persons who left are deleted once.
             topic = f"{BODIES}/{person_id(number)}/markers"
             if self._publish_on(topic, _MARKERS).subscribers:
                 estimate = step.estimates[number] if number in observed else nobody(step.stamp)
-                how: Any = {"root_frame": self._root(), "person": person_id(number), "turn": step.turn}
-                made = instant(estimate, step.bodies.get(number) or self._bodies[number], **how)
-                self._write({topic: made[topic]})
+                how: Any = {"root_frame": root, "person": person_id(number), "turn": step.turn}
+                self._write({topic: instant(estimate, body, **how)[topic]})
         self._displayed = observed
-        self._bodies = {number: step.bodies[number] for number in observed}
-        ids = [person_id(number) for number in sorted(observed)]
-        self._write(tracked(step.stamp, ids, root_frame=self._root()))
 
-    def _write_people(self, people: Shown) -> None:
-        there, frame, (names, parents, *_) = people.present, people.frame, people.frames
-        ids = tuple(person_id(people.numbers[index]) for index in there)
-        above = () if frame == self._root() else ((self._root(), frame, root_on_parent(people.turn.pose)),)
-
-        def transforms(numbers: list[float]) -> Any:  # noqa: ANN401
-            placed = [row for person in ids for row in placed_names(names, parents, person, frame)]
-            rows = [(*row, numbers[7 * index : 7 * index + 7]) for index, row in enumerate(placed)]
-            return transforms_message(STAMP_NS, [*above, *rows])
-
-        self._send("/tf", TF, people.stamp, (ids, frame, repr(above)), lambda: people.on_parents[there], transforms)
-        for index, person in zip(there.tolist(), ids, strict=True):
-            self._write_person(people, index, person)
-        for index, person in zip(there.tolist(), ids, strict=True):  # last: it takes milliseconds
-            number, body = people.numbers[index], people.bodies[index]
-            size = float(body.core.sizes()[:, 0].sum())
-            if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
-                self._write(description(body, person))
-                self._described[number] = size
-
-    def _write_person(self, people: Shown, index: int, person: str) -> None:
-        topic, sure = f"{BODIES}/{person}", people.covariances[index]
-        self._send(
-            *(f"{topic}/joint_states", JOINTS, people.stamp, person),
-            lambda: people.angles[1][index],
-            lambda angles: joint_message(STAMP_NS, person, people.angles[0], angles),
-        )
-        if np.isfinite(sure).all():
-            self._send(
-                *(f"{topic}/pose", POSE, people.stamp, people.frame),
-                lambda: np.concatenate([people.on_parents[index, 0], sure.ravel()]),
-                lambda numbers: pose_message(STAMP_NS, people.frame, numbers[:7], numbers[7:]),
-            )
-
-    def _send(
+    def _make_template(
         self,
-        topic: str,
-        kind: str,
-        stamp: float,
-        key: object,
-        numbers: Callable[[], FloatArray],
-        message: Callable[[list[float]], Any],
-    ) -> None:
-        """Publish a message, which is made again when its key changes, with numbers at a time, if somebody subscribes."""
-        publication = self._publish_on(topic, kind)
-        if publication.subscribers:
-            values = numbers().ravel()
-            key = key, len(values)
-            if self._templates.get(topic, (None,))[0] != key:
-                made = Template(lambda found: cdr(message(found)), len(values), kind="<f8", stamp=_stamp(STAMP_NS))
-                self._templates[topic] = key, made
-            publication.write(self._templates[topic][1].filled(values, _stamp(round(stamp * 1e9))))
+        ids: tuple[str, ...],
+        root: str,
+        frame: str,
+        sure: tuple[str, ...],
+        names: tuple[str, ...],
+        parents: tuple[int, ...],
+        joints: tuple[str, ...],
+    ) -> tuple[list[tuple[str, str]], _core.Template]:
+        """Topics with their types, and the messages on them, of persons of whom some have a covariance."""
+        topics = [("/tf", TF)] * bool(ids) + [(f"{BODIES}/{person}/joint_states", JOINTS) for person in ids]
+        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), (TRACKED, IDS)]
+        placed = [(root, frame)] * (frame != root) if ids else []
+        placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
+
+        def encode(numbers: list[float]) -> list[bytes]:
+            left = iter(numbers)
+            rows = [(*pair, list(islice(left, 7))) for pair in placed]
+            messages = [transforms_message(STAMP_NS, rows)] if ids else []
+            for person in ids:
+                messages.append(joint_message(STAMP_NS, person, joints, list(islice(left, len(joints)))))
+            messages += [pose_message(STAMP_NS, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
+            return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
+
+        count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
+        return topics, template(encode, count, stamp=_stamp(STAMP_NS))
 
     def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:

@@ -10,23 +10,24 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
-from itertools import accumulate, pairwise
 
 import numpy as np
+import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.skeleton import FloatArray, Skeleton
-from voodoo.export.template import Template
+from voodoo.export.template import template
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks.address import parts_of
 from voodoo.live.sinks.people import shown
-from voodoo.model.rotations import matrix_of_turn, quaternions
+from voodoo.model.rotations import matrix_of_turn
 
 PORT = 39539
-_UNITY: FloatArray = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-"""(X, Y, Z) of Unity from (x forward, y left, z up); left-handed."""
+_AXES, _SIGNS = [1, 2, 0, 4, 5, 3, 6], np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
+"""Place X, Y, Z and rotation X, Y, Z, W of Unity, left-handed, from those with x forward, y left, z up."""
 _TURN = np.pi / 2.0
 """At rest our arms hang; those of a VRM avatar point to the sides, a quarter turn about the forward axis."""
 _ARM = ("upperarm", "forearm", "hand")
@@ -54,7 +55,7 @@ class VmcSink(Output):
         missing = f"{address}: expected python-osc, found none; pip install 'voodoo-tracker[stream]'"
         self._bundle_of = installed("pythonosc.osc_bundle_builder", missing).OscBundleBuilder
         self._message_of = installed("pythonosc.osc_message_builder", missing).OscMessageBuilder
-        self.name, self.receiver = address, True
+        self.name, self.receiver, self.waits = address, True, False
         self._root = root_frame
         host, port, _ = parts_of(address, host=None, port=PORT)
         try:
@@ -65,7 +66,7 @@ class VmcSink(Output):
         except OSError as error:
             raise VoodooError(f"{address}: expected the name or address of a host, found: {error.strerror}") from error
         self._start: float | None = None
-        self._templates: dict[tuple[str, ...], tuple[Template, list[int]]] = {}
+        self._template_of = lru_cache(2)(self._make_template)
 
     def publish(self, step: Step) -> None:
         """See Output.
@@ -80,15 +81,12 @@ class VmcSink(Output):
         if people is not None and len(people.present):
             first = min(people.present.tolist(), key=lambda index: people.numbers[index])
             names, numbers = bones_of(people.posed, first, self.name)
-        if names not in self._templates:
-            lengths = map(len, self._datagrams(names, [0.0] * (1 + numbers.size)))
-            whole = Template(lambda given: b"".join(self._datagrams(names, given)), 1 + numbers.size, kind=">f4")
-            self._templates = {names: (whole, [0, *accumulate(lengths)])}
-        template, ends = self._templates[names]
-        sent = template.filled(np.concatenate([[step.stamp - self._start], numbers.ravel()]))
-        for first, end in pairwise(ends):
+        for datagram in self._template_of(names).filled([np.array([step.stamp - self._start]), numbers], b""):
             with suppress(BlockingIOError):
-                self._socket.send(sent[first:end])
+                self._socket.send(datagram)
+
+    def _make_template(self, names: tuple[str, ...]) -> _core.Template:
+        return template(lambda numbers: self._datagrams(names, numbers), 1 + 7 * len(names), single=True)
 
     def _datagrams(self, names: tuple[str, ...], numbers: list[float]) -> list[bytes]:
         """Messages of the time and of bones, whose seven numbers each follow it."""
@@ -124,23 +122,19 @@ def bones_of(posed: Skeleton, index: int, address: str) -> tuple[tuple[str, ...]
     Raises:
         VoodooError: the body lacks bones without which an avatar does not move.
     """
-    chosen, names, parents, arms = _avatar(posed.limbs, address)
-    turns, heads = posed.rotations[index] @ arms, posed.heads[index]
-    # The root is on the origin of the world.
-    turns, heads = np.concatenate([turns, np.eye(3)[None]]), np.concatenate([heads, np.zeros((1, 3))])
-    above = _UNITY @ turns[parents].swapaxes(1, 2)
-    places = (above @ (heads[chosen] - heads[parents])[..., None])[..., 0]
-    return names, np.concatenate([places, quaternions(above @ turns[chosen] @ _UNITY.T)], axis=1)
+    chosen, names, plan, arms = _avatar(posed.limbs, address)
+    _, rows = _core.placed((posed.rotations[index] @ arms)[None], posed.heads[index][None], plan)
+    return names, rows[0][chosen][:, _AXES] * _SIGNS
 
 
 @lru_cache(maxsize=8)
 def _avatar(
     limbs: tuple[tuple[str, int | None], ...], address: str
-) -> tuple[list[int], tuple[str, ...], list[int], FloatArray]:
-    """Limbs that are bones of an avatar, their names and parents (-1: the world), and the turns of all limbs to its rest pose."""
+) -> tuple[list[int], tuple[str, ...], npt.NDArray[np.int64], FloatArray]:
+    """Limbs that are bones of an avatar, their names, and of all limbs the plan of `placed` and the turns to its rest pose."""
     quarter = {"l": matrix_of_turn((-_TURN, 0.0, 0.0)), "r": matrix_of_turn((_TURN, 0.0, 0.0))}
     arms = [quarter.get(limb[0], np.eye(3)) if limb.partition("_")[2] in _ARM else np.eye(3) for limb, _ in limbs]
-    rows = {names_of(limb).vrm: (index, -1 if up is None else up) for index, (limb, up) in enumerate(limbs)}
+    rows = {names_of(limb).vrm: index for index, (limb, _) in enumerate(limbs)}
     rows.pop("", None)
     if missing := [name for name in _NEEDED if name not in rows]:
         needed = [limb for limb, names in NAMES.items() if names.vrm in missing and limb != "torso"]
@@ -148,5 +142,5 @@ def _avatar(
             f"{address}: expected the body of a human, with the limbs {', '.join(needed)}, found "
             f"{', '.join(limb for limb, _ in limbs)}"
         )
-    chosen, parents = zip(*rows.values(), strict=True)
-    return list(chosen), tuple(rows), list(parents), np.array(arms)
+    plan = [(index, index, index, -1 if up is None else up) for index, (_, up) in enumerate(limbs)]
+    return list(rows.values()), tuple(rows), np.array(plan), np.array(arms)

@@ -18,6 +18,7 @@ from urllib.parse import parse_qs
 
 import numpy as np
 
+import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
@@ -57,7 +58,7 @@ class WebSocketSink(Output):
         missing = f"{address}: expected websockets, found none; pip install 'voodoo-tracker[stream]'"
         server = installed("websockets.asyncio.server", missing)
         self._left, self._broadcast = installed("websockets.exceptions", missing).ConnectionClosed, server.broadcast
-        self.name, self.receiver = address, True
+        self.name, self.receiver, self.waits = address, True, False
         self._root, self._on_message = root_frame, on_message
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
         origins = [None, _OWN_PAGES, *parse_qs(parts.query).get("origin", ())]
@@ -130,20 +131,22 @@ def message_of(step: Step, root_frame: str) -> str:
     people = shown(step, root_frame)
     if people is None:
         return _format(upright_frame(step, root_frame), (), (), ()) % repr(step.stamp)
-    limbs = people.posed.limbs
+    limbs, count = people.posed.limbs, len(people.numbers)
+    joint_names = tuple(people.estimates[0].joint_names)
     # Whole numbers of 10 um and of 1e-6 are written several times as fast as others.
     bones = np.concatenate([1e5 * people.posed.heads, 1e6 * quaternions(people.posed.rotations)], axis=2)
-    rows = np.concatenate([1e5 * people.joints.reshape(len(bones), -1), bones.reshape(len(bones), -1)], axis=1)
-    values: list[Any] = [repr(step.stamp)]
-    for estimate, row in zip(people.estimates, np.rint(rows).astype(np.int64).tolist(), strict=True):
+    rows = np.concatenate([1e5 * people.joints.reshape(count, -1), bones.reshape(count, -1)], axis=1)
+    text = _core.with_numbers(_format(people.frame, people.numbers, joint_names, limbs), [rows])
+    values = [repr(step.stamp)]
+    for estimate in people.estimates:
         residual = estimate.residual
-        values += [estimate.status, repr(residual) if math.isfinite(residual) else "null", *row]
+        values += [estimate.status, repr(residual) if math.isfinite(residual) else "null"]
         values += estimate.limb_status.values() or [""] * len(limbs)
-    return _format(people.frame, people.numbers, tuple(people.estimates[0].joint_names), limbs) % tuple(values)
+    return text % tuple(values)
 
 
 _WRITTEN = {
-    "\0word": '"%s"', "\0value": "%s", "\0place": "[%de-5, %de-5, %de-5]", "\0turn": "[%de-6, %de-6, %de-6, %de-6]",
+    "\0word": '"%s"', "\0value": "%s", "\0place": "[\0e-5, \0e-5, \0e-5]", "\0turn": "[\0e-6, \0e-6, \0e-6, \0e-6]",
 }  # fmt: skip
 """Values of a message, and how they are formatted; names cannot begin like them."""
 
@@ -152,7 +155,7 @@ _WRITTEN = {
 def _format(
     frame: str, numbers: tuple[int, ...], joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
 ) -> str:
-    """A message in which only values are missing, which `%` fills in."""
+    """A message in which only values are missing: numbers, which `with_numbers` fills in, and words, which `%` does."""
     bones = {
         name: {"parent": None if above is None else limbs[above][0], "position": "\0place", "rotation": "\0turn"}
         for name, above in limbs

@@ -1,0 +1,227 @@
+//! Poses of many frames, or of persons of one instant, as files and live outputs need them.
+
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use std::f64::consts::PI;
+use voodoo_core::math::{self, Mat3, Vec3};
+use voodoo_core::{Body, Limb};
+
+use crate::body::{PyBody, at_rest};
+use crate::errors::exception;
+use crate::rotations::are_axes;
+
+type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
+/// A table of numbers, which is read faster than tuples.
+type Plan<'py> = PyReadonlyArray2<'py, i64>;
+
+/// Rows of `N` numbers of each frame of an array (F, K, ...).
+fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<&'a [[f64; N]]>> {
+    let shape = array.shape();
+    if shape.len() < 2 || shape[2..].iter().product::<usize>() != N || !array.is_c_contiguous() {
+        let text = format!("contiguous frames of rows of {N} numbers, found shape {shape:?}");
+        return Err(wrong(array.py(), name, &text));
+    }
+    let rows = array.as_slice()?.as_chunks::<N>().0;
+    Ok((0..shape[0]).map(|frame| rows.get(frame * shape[1]..(frame + 1) * shape[1]).unwrap_or_default()).collect())
+}
+
+/// Rows of a plan.
+fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
+    match plan.shape()[1] {
+        columns if columns == N && plan.is_c_contiguous() => Ok(plan.as_slice()?.as_chunks().0),
+        columns => Err(wrong(plan.py(), "plan", &format!("{N} columns, found {columns}"))),
+    }
+}
+
+/// The entry with a number of a plan.
+fn entry<T>(entries: &[T], number: i64) -> Option<&T> {
+    entries.get(usize::try_from(number).ok()?)
+}
+
+fn wrong(py: Python<'_>, name: &str, expected: &str) -> PyErr {
+    exception(py, "MeasurementError", format!("{name}: expected {expected}"))
+}
+
+fn unplanned(py: Python<'_>) -> PyErr {
+    wrong(py, "plan", "numbers of limbs, joints and frames that are there, and axes that differ")
+}
+
+fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
+    PyArray1::from_vec(py, values).reshape(shape)
+}
+
+fn rotation(rows: &[f64; 9]) -> Mat3 {
+    Mat3::from_cols_array(rows).transpose()
+}
+
+fn rows_of(rotation: &Mat3) -> [f64; 9] {
+    rotation.transpose().to_cols_array()
+}
+
+/// Rotation and translation of a 4x4 matrix.
+fn parts(m: &[f64; 16]) -> (Mat3, Vec3) {
+    (rotation(&[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]]), Vec3::new(m[3], m[7], m[11]))
+}
+
+/// Rotations of the bones of a posed body, and where they are joined to their parents.
+fn bones(body: &Body, poses: &[[f64; 16]], joints: &[[f64; 3]], own: &[[i64; 2]]) -> Option<(Vec<Mat3>, Vec<Vec3>)> {
+    let found = at_rest(body).into_iter().zip(poses).map(|((rest, place), pose)| {
+        let (limb, at) = parts(pose);
+        (limb * rest.transpose(), limb * place + at)
+    });
+    let (turns, mut heads): (Vec<_>, Vec<_>) = found.unzip();
+    for &[limb, joint] in own {
+        *heads.get_mut(usize::try_from(limb).ok()?)? = Vec3::from_array(*entry(joints, joint)?);
+    }
+    (turns.len() == body.limbs().len() && poses.len() == turns.len()).then_some((turns, heads))
+}
+
+/// Places of frames; and place and quaternion of each on its parent.
+fn placed_frames(turns: &[Mat3], points: &[Vec3], plan: &[[i64; 4]]) -> Option<(Vec<Vec3>, Vec<[f64; 7]>)> {
+    let there = |&[limb, first, second, _]: &[i64; 4]| {
+        Some((*entry(turns, limb)?, (*entry(points, first)? + *entry(points, second)?) / 2.0))
+    };
+    let found = plan.iter().map(there).collect::<Option<Vec<_>>>()?;
+    let on_parent = |((turn, place), &[.., parent]): (&(Mat3, Vec3), &[i64; 4])| {
+        let (turn, place) = entry(&found, parent).map_or((*turn, *place), |(above, origin)| {
+            (above.transpose() * *turn, above.transpose() * (*place - *origin))
+        });
+        let ([x, y, z], [a, b, c, d]) = (place.to_array(), math::quaternion(&turn));
+        [x, y, z, a, b, c, d]
+    };
+    let rows = found.iter().zip(plan).map(on_parent).collect();
+    Some((found.into_iter().map(|(_, place)| place).collect(), rows))
+}
+
+/// The body of each frame: the only one, or one of each.
+fn each<'a>(bodies: &'a [PyRef<'_, PyBody>]) -> impl Iterator<Item = &'a Body> {
+    let again = bodies.iter().cycle().take(if bodies.len() == 1 { usize::MAX } else { bodies.len() });
+    again.map(|body| &body.0)
+}
+
+fn angles(turns: &[Mat3], plan: &[[i64; 8]]) -> Option<Vec<f64>> {
+    let wrapped = |angle: f64| (angle + PI).rem_euclid(2.0 * PI) - PI;
+    let angle = |&[above, limb, first, second, third, which, sign, shifted]: &[i64; 8]| {
+        let quaternion = math::quaternion(&(entry(turns, above)?.transpose() * *entry(turns, limb)?));
+        let found = if first < 0 {
+            wrapped(2.0 * quaternion[1].atan2(quaternion[3]))
+        } else {
+            let order = [usize::try_from(first).ok()?, usize::try_from(second).ok()?, usize::try_from(third).ok()?];
+            *entry(&are_axes(order).then(|| math::euler_angles(&quaternion, order))?, which)?
+        };
+        let found = if shifted != 0 { wrapped(found + PI) } else { found };
+        Some(if sign < 0 { -found } else { found })
+    };
+    plan.iter().map(angle).collect()
+}
+
+/// The covariance of a pose, place before turn, of another point, which is away from its point.
+fn moved_covariance(covariance: &[[f64; 6]; 6], across: Vec3) -> [[f64; 6]; 6] {
+    let [x, y, z] = across.to_array();
+    let lever = Mat3::from_cols(Vec3::new(0.0, -z, y), Vec3::new(z, 0.0, -x), Vec3::new(-y, x, 0.0));
+    let moved = |column: [f64; 6]| {
+        let [a, b, c, d, e, f] = column;
+        let [a, b, c] = (Vec3::new(a, b, c) + lever * Vec3::new(d, e, f)).to_array();
+        [a, b, c, d, e, f]
+    };
+    let transposed =
+        |rows: &[[f64; 6]; 6]| [0, 1, 2, 3, 4, 5].map(|at: usize| std::array::from_fn(|row| rows[row][at]));
+    let half: [[f64; 6]; 6] = transposed(covariance).map(moved);
+    transposed(&half).map(moved)
+}
+
+#[doc = stub!("skeleton")]
+#[pyfunction]
+pub(crate) fn skeleton<'py>(
+    py: Python<'py>,
+    bodies: Vec<PyRef<'py, PyBody>>,
+    poses: Given<'py>,
+    joints: Given<'py>,
+    own: Plan<'py>,
+) -> PyResult<(Array<'py>, Array<'py>)> {
+    let (poses, joints, own) = (frames("poses", &poses)?, frames("joints", &joints)?, plan(&own)?);
+    let (mut turns, mut heads) = (Vec::new(), Vec::new());
+    for ((poses, joints), body) in poses.iter().zip(&joints).zip(each(&bodies)) {
+        let found = bones(body, poses, joints, own).ok_or_else(|| unplanned(py))?;
+        turns.extend(found.0.iter().flat_map(rows_of));
+        heads.extend(found.1.iter().flat_map(Vec3::to_array));
+    }
+    let (count, limbs) = (poses.len(), bodies.first().map_or(0, |body| body.0.limbs().len()));
+    Ok((array(py, turns, &[count, limbs, 3, 3])?, array(py, heads, &[count, limbs, 3])?))
+}
+
+#[doc = stub!("placed")]
+#[pyfunction]
+pub(crate) fn placed<'py>(
+    py: Python<'py>,
+    rotations: Given<'py>,
+    points: Given<'py>,
+    plan: Plan<'py>,
+) -> PyResult<(Array<'py>, Array<'py>)> {
+    let (rotations, points) = (frames("rotations", &rotations)?, frames("points", &points)?);
+    let plan = self::plan(&plan)?;
+    let (mut places, mut rows) = (Vec::new(), Vec::new());
+    for (rotations, points) in rotations.iter().zip(&points) {
+        let turns: Vec<_> = rotations.iter().map(rotation).collect();
+        let points: Vec<_> = points.iter().copied().map(Vec3::from_array).collect();
+        let found = placed_frames(&turns, &points, plan).ok_or_else(|| unplanned(py))?;
+        places.extend(found.0.iter().flat_map(Vec3::to_array));
+        rows.extend(found.1.into_iter().flatten());
+    }
+    let (count, all) = (points.len(), plan.len());
+    Ok((array(py, places, &[count, all, 3])?, array(py, rows, &[count, all, 7])?))
+}
+
+#[doc = stub!("joint_angles")]
+#[pyfunction]
+pub(crate) fn joint_angles<'py>(py: Python<'py>, rotations: Given<'py>, plan: Plan<'py>) -> PyResult<Array<'py>> {
+    let (rotations, plan) = (frames("rotations", &rotations)?, self::plan(&plan)?);
+    let mut all = Vec::new();
+    for rotations in &rotations {
+        let turns: Vec<_> = rotations.iter().map(rotation).collect();
+        all.extend(angles(&turns, plan).ok_or_else(|| unplanned(py))?);
+    }
+    array(py, all, &[rotations.len(), plan.len()])
+}
+
+#[doc = stub!("moved_covariances")]
+#[pyfunction]
+pub(crate) fn moved_covariances<'py>(
+    py: Python<'py>,
+    covariances: Given<'py>,
+    across: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Array<'py>> {
+    let covariances = frames::<6>("covariances", &covariances)?;
+    let mut moved = Vec::new();
+    for (covariance, across) in covariances.iter().zip(across.as_array().rows()) {
+        let (Ok(covariance), &[x, y, z]) = ((*covariance).try_into(), &across.to_vec()[..]) else {
+            return Err(wrong(py, "covariances", "shapes (F, 6, 6) and (F, 3)"));
+        };
+        moved.extend(moved_covariance(covariance, Vec3::new(x, y, z)).into_iter().flatten());
+    }
+    array(py, moved, &[covariances.len(), 6, 6])
+}
+
+#[doc = stub!("cylinders")]
+#[pyfunction]
+pub(crate) fn cylinders<'py>(
+    py: Python<'py>,
+    bodies: Vec<PyRef<'py, PyBody>>,
+    poses: Given<'py>,
+) -> PyResult<Array<'py>> {
+    let poses = frames("poses", &poses)?;
+    let limbs = bodies.first().map_or(0, |body| body.0.limbs().len());
+    let mut rows = Vec::new();
+    for (poses, body) in poses.iter().zip(each(&bodies)) {
+        for (pose, Limb { shape, .. }) in poses.iter().zip(body.limbs()) {
+            let (turn, at) = parts(pose);
+            let (a, b) = (shape.a0() + shape.a1(), shape.b0() + shape.b1());
+            let low = shape.a0() / a + shape.b0() / b;
+            rows.extend((at + turn.z_axis * (shape.length() / 2.0)).to_array());
+            rows.extend(math::quaternion(&turn));
+            rows.extend([a, b, shape.length(), low, 2.0 - low]);
+        }
+    }
+    array(py, rows, &[poses.len(), limbs * 12])
+}

@@ -1,0 +1,114 @@
+//! Messages of live outputs, in which only numbers change.
+
+use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::exception;
+
+#[doc = stub!("Template")]
+#[pyclass(module = "voodoo._core", frozen)]
+pub(crate) struct Template {
+    messages: Vec<u8>,
+    ends: Vec<usize>,
+    /// Where each number begins.
+    places: Vec<usize>,
+    stamps: Vec<usize>,
+    /// Single precision with the most significant byte first, instead of double precision with the least.
+    single: bool,
+}
+
+fn found(messages: &[u8], bytes: &[u8]) -> impl Iterator<Item = usize> {
+    let starts = messages.windows(bytes.len().max(1)).enumerate();
+    starts.filter(move |(_, window)| *window == bytes).map(|(at, _)| at)
+}
+
+fn put(messages: &mut [u8], at: usize, bytes: &[u8]) {
+    if let Some(place) = messages.get_mut(at..at + bytes.len()) {
+        place.copy_from_slice(bytes);
+    }
+}
+
+fn put_number(messages: &mut [u8], at: usize, number: f64, single: bool) {
+    if single {
+        put(messages, at, &(number as f32).to_be_bytes());
+    } else {
+        put(messages, at, &number.to_le_bytes());
+    }
+}
+
+#[pymethods]
+impl Template {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        messages: Vec<Bound<'_, PyBytes>>,
+        numbers: PyReadonlyArray1<'_, f64>,
+        single: bool,
+        stamp: &[u8],
+    ) -> PyResult<Self> {
+        let ends = messages.iter().scan(0, |end, message| {
+            *end += message.as_bytes().len();
+            Some(*end)
+        });
+        let ends = ends.collect();
+        let messages: Vec<u8> = messages.iter().flat_map(|message| message.as_bytes()).copied().collect();
+        let mut last = 0;
+        let place = |number: &f64| {
+            let (mut bytes, width) = ([0; 8], if single { 4 } else { 8 });
+            put_number(&mut bytes, 0, *number, single);
+            // Most numbers are in their order.
+            let next = found(messages.get(last..)?, bytes.get(..width)?).next().map(|at| last + at);
+            last = next.or_else(|| found(&messages, bytes.get(..width)?).next())?;
+            Some(last)
+        };
+        let places: Option<Vec<usize>> = numbers.as_slice()?.iter().map(place).collect();
+        let places = places.ok_or_else(|| {
+            exception(py, "MeasurementError", "numbers: expected those in the messages, found another".into())
+        })?;
+        let stamps = found(&messages, stamp).collect();
+        Ok(Self { messages, ends, places, stamps, single })
+    }
+
+    #[doc = stub!("Template.filled")]
+    fn filled<'py>(
+        &self,
+        py: Python<'py>,
+        numbers: Vec<PyReadonlyArrayDyn<'py, f64>>,
+        stamp: &[u8],
+    ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+        let mut messages = self.messages.clone();
+        let given: usize = numbers.iter().map(|part| part.len()).sum();
+        if given != self.places.len() {
+            let text = format!("numbers: expected {}, found {given}", self.places.len());
+            return Err(exception(py, "MeasurementError", text));
+        }
+        // In their order, however they are stored.
+        for (place, number) in self.places.iter().zip(numbers.iter().flat_map(|part| part.as_array().into_iter())) {
+            put_number(&mut messages, *place, *number, self.single);
+        }
+        for at in &self.stamps {
+            put(&mut messages, *at, stamp);
+        }
+        let starts = std::iter::once(&0).chain(&self.ends);
+        let slices = starts.zip(&self.ends).filter_map(|(start, end)| messages.get(*start..*end));
+        Ok(slices.map(|slice| PyBytes::new(py, slice)).collect())
+    }
+}
+
+#[doc = stub!("with_numbers")]
+#[pyfunction]
+pub(crate) fn with_numbers(py: Python<'_>, text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
+    let places = text.matches('\0').count();
+    let given: usize = numbers.iter().map(|part| part.len()).sum();
+    if places != given {
+        return Err(exception(py, "MeasurementError", format!("numbers: expected {places}, found {given}")));
+    }
+    let all = numbers.iter().flat_map(|part| part.as_array().into_iter());
+    let whole = all.map(|number| (number.round_ties_even() as i64).to_string());
+    Ok(text
+        .split('\0')
+        .zip(whole.chain([String::new()]))
+        .flat_map(|(part, number)| [part.to_owned(), number])
+        .collect())
+}
