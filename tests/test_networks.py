@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import color_scene as scene
+import dot_networks
 import voodoo
 from commands import run
 from live_rig import Rig, arrival_of
@@ -356,6 +357,34 @@ def test_rtmpose_by_a_mode_by_files_and_without_either(monkeypatch, tmp_path, ca
     monkeypatch.setitem(sys.modules, "rtmlib", None)
     with pytest.raises(ConfigError, match=r"pip install 'voodoo-tracker\[rtmpose\]'"):
         network_of("rtmpose")
+
+
+@pytest.mark.parametrize("chosen", [True, False])
+def test_the_real_rtmlib_finds_dots_where_they_are(chosen, tmp_path):
+    """Its own scaling, boxes and decoding, with networks that find colored dots."""
+    for library in ("rtmlib", "onnxruntime", "onnx"):
+        pytest.importorskip(library, reason="pip install rtmlib onnxruntime onnx")
+    files = tmp_path / "persons.onnx", tmp_path / "pose.onnx"
+    dot_networks.write_persons(files[0], chosen=chosen)
+    dot_networks.write_pose(files[1])
+    network = network_of(f"rtmpose:{files[0]},{files[1]}")
+    assert network.layout == "halpe26"
+    image = np.full((480, 640, 3), dot_networks.GRAY, np.uint8)
+    assert list(network.detect(image)) == []
+    chance, people = np.random.default_rng(4), {}
+    for middle in ((160.0, 260.0), (468.0, 210.0)):
+        cells = [(column, row) for column in range(-2, 3) for row in range(-3, 4) if (column, row) != (0, 0)]
+        places = 30.0 * np.array(cells)[chance.permutation(len(cells))[:26]] + chance.uniform(-6, 6, (26, 2))
+        people[middle] = places + middle
+        for place, code in zip(people[middle], dot_networks.CODES, strict=True):
+            dot_networks.dot(image, place, code, 9.0)
+        dot_networks.dot(image, middle, dot_networks.PERSON, 12.0)
+    found = sorted(network.detect(image), key=lambda rows: rows[:, 0].mean())
+    assert len(found) == 2
+    for rows, places in zip(found, people.values(), strict=True):
+        away = np.linalg.norm(rows[:, :2] - places, axis=1)
+        assert away.max() < 1.3, away  # a pixel of the crop
+        assert (rows[:, 2] > 0.3).all() and (rows[:, 2] <= 1.0).all()
 
 
 # The real ones, where their weights are

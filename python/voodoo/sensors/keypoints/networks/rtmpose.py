@@ -49,10 +49,10 @@ class RtmPose:
                 "rtmpose:DETECTOR.onnx,POSE.onnx names files"
             ) from error
         self._persons, self._pose = network.det_model, network.pose_model
-        for each in (self._persons, self._pose):
+        for each, rows_first in ((self._persons, True), (self._pose, False)):
             height, width = each.session.get_inputs()[0].shape[2:]
             if isinstance(height, int) and isinstance(width, int):
-                each.model_input_size = (width, height)
+                each.model_input_size = (height, width) if rows_first else (width, height)
         count = self._pose.session.get_outputs()[0].shape[1]
         if count not in _LAYOUTS:
             raise ConfigError(
