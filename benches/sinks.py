@@ -10,6 +10,7 @@ sinks take turns. A sink whose library is missing is named.
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import subprocess
 import sys
@@ -173,8 +174,10 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=4.0)
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
-    sys.setswitchinterval(5e-4)  # as `voodoo live` does
+    sys.setswitchinterval(5e-4)  # as `voodoo live` does, and freezing below
     recording = four_people(arguments.seconds)
+    gc.collect()
+    gc.freeze()
     lateness(recording, arguments.rounds)
     cost(recording, arguments.rounds)
 

@@ -175,10 +175,11 @@ class Publication:
 
     def __init__(self, participant: Any, topic: str, kind: str, depth: int, latched: bool) -> None:  # noqa: ANN401
         """Advertise."""
+        from cyclonedds.core import DDSException
         from cyclonedds.pub import DataWriter
         from cyclonedds.topic import Topic
 
-        self._type = dds_type(kind)
+        self._type, self._failed = dds_type(kind), DDSException
         self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, latched, depth))
         self.key = str(self._writer.guid)
 
@@ -188,11 +189,9 @@ class Publication:
         Raises:
             OSError: a subscriber holds it up, or the network is gone.
         """
-        from cyclonedds.core import DDSException
-
         try:
             self._writer.write(message_of(self._type, message))
-        except DDSException as error:
+        except self._failed as error:
             raise OSError(str(error)) from error
 
     @property
