@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from voodoo.errors import CameraError, RecordingError, installed, naming, reading
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, usable
+from voodoo.recordings.together import in_turn
 
 FRAME = "depth_camera_optical_frame"
 COLOR_FRAME = "rgb_camera_optical_frame"
@@ -105,21 +106,21 @@ class AzureKinectRecording(Recording):
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
-        waiting: list[ColorImage] = []
+        return in_turn(self._measurements(), "depth")
+
+    def _measurements(self) -> Iterator[Measurement]:
         number = -1
         with reading(self.path, _EXPECTED), _opened(self.path) as film:
             for sensor, stamp, packet in self._packets(film):
                 if sensor == "color":
                     size = (self._color.width, self._color.height)
                     load = partial(decode_color, bytes(packet), f"{self.path}, color at {stamp:.6f}", size)
-                    waiting.append(ColorImage("color", stamp, load, self._color, self._depth_from_color))
+                    yield ColorImage("color", stamp, load, self._color, self._depth_from_color)
                     continue
                 number += 1
                 make = partial(self._depth_image, stamp, bytes(packet))
-                item = usable(make, number, f"{self.path}, depth", self._left_out)
-                if item is not None:
-                    yield RecordedFrame(stamp, (*waiting, item))
-                    waiting.clear()
+                if item := usable(make, number, f"{self.path}, depth", self._left_out):
+                    yield item
 
     def _depth_image(self, stamp: float, content: bytes) -> DepthImage:
         where, size = f"{self.path}, depth", (self._camera.height, self._camera.width)

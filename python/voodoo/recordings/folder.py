@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -24,6 +25,7 @@ from voodoo.recordings.recording import (
     usable,
 )
 from voodoo.recordings.set_back import SetBack
+from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_start, read_truth
 from voodoo.stored import read_stored, read_stored_text
 
@@ -132,17 +134,13 @@ class FolderRecording(Recording):
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
         color = self._calibration.color
-        colors = iter(self._color)
-        upcoming = next(colors, None)
-        measurements: list[Measurement] = []
-        for number, (stamp, file) in enumerate(self._depth):
-            while color is not None and upcoming is not None and upcoming[0] <= stamp:
-                measurements.append(color_image(*upcoming, color))
-                upcoming = next(colors, None)
-            item = usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out)
-            if item is not None:
-                yield RecordedFrame(stamp, (*measurements, item))
-                measurements.clear()
+        colors: Iterator[Measurement] = (color_image(*entry, color) for entry in self._color if color is not None)
+        depths: Iterator[Measurement] = (
+            item
+            for number, (stamp, file) in enumerate(self._depth)
+            if (item := usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out))
+        )
+        return in_turn(heapq.merge(colors, depths, key=lambda item: item.stamp), "depth")
 
     def info(self) -> RecordingInfo:
         """Summarize from names and calibration."""

@@ -38,7 +38,7 @@ from voodoo.recordings.ros_messages import (
 )
 from voodoo.recordings.ros_topics import COMPRESSED, TopicChoice, TopicFinder, TopicSource
 from voodoo.recordings.set_back import SetBack
-from voodoo.recordings.together import together
+from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
 from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
 
@@ -142,15 +142,7 @@ class RosRecording(Recording):
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the bag; see Recording."""
-        if self.complete:
-            yield from together(self._measurements(), self._driver.topic)
-            return
-        pending: list[Measurement] = []
-        for measured in self._measurements():
-            pending.append(measured)
-            if measured.sensor == self._driver.topic:
-                yield RecordedFrame(measured.stamp, tuple(pending))
-                pending.clear()
+        return (together if self.complete else in_turn)(self._measurements(), self._driver.topic)
 
     def _measurements(self) -> Iterator[Measurement]:
         """All used measurements, in the order of recording."""
