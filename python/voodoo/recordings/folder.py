@@ -17,13 +17,7 @@ from voodoo.recordings.calibration import Calibration, FolderCalibration, read_c
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    SensorInfo,
-    number_option,
-    usable,
-)
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option, usable
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_start, read_truth

@@ -17,13 +17,7 @@ from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.order import in_order, matched, numbers_of
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    Reference,
-    SensorInfo,
-    number_option,
-)
+from voodoo.recordings.recording import Recording, RecordingInfo, Reference, SensorInfo, number_option
 
 SITES = {
     f"{side}{joint}": f"{side.lower()}_{site}"

@@ -12,31 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
+from voodoo.measurements import DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    SensorInfo,
-    number_option,
-    refuse_blank,
-)
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option, refuse_blank
 from voodoo.recordings.ros_bag import Bag
-from voodoo.recordings.ros_messages import (
-    Message,
-    camera_of,
-    cloud_points,
-    color_image,
-    compressed_depth_image,
-    depth_image,
-    scan_fields,
-    stamp_of,
-)
-from voodoo.recordings.ros_topics import COMPRESSED, TopicChoice, TopicFinder, TopicSource
+from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
+from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
@@ -179,7 +164,10 @@ class RosRecording(Recording):
                     f"{where}: expected rising stamps, found {stamp:.6f} after {before:.6f}",
                     reason="with a repeated stamp" if stamp == before else "with a stamp before the last one",
                 )
-            measured = self._measurement(self._sources[topic], message, stamp, f"{where}, stamp {stamp:.6f}")
+            source = self._sources[topic]
+            pose = self._tree.lookup(self.root_frame, self._bag.frame_of(topic, message), stamp)
+            sensed = Sensed(topic, stamp, pose, source.camera, (self._units[topic], self._float_unit))
+            measured = sensed.of(source.kind, message, f"{where}, stamp {stamp:.6f}")
             if self._left_out is not None and isinstance(measured, DepthImage):
                 refuse_blank(measured, where)
         last[topic] = stamp
@@ -327,20 +315,3 @@ class RosRecording(Recording):
                         self._left_out.add("calibrations unlike the first", f"{where}: {camera}")
                     elif camera != source.camera:
                         raise RecordingError(f"{where}: expected one calibration, found {camera} after {source.camera}")
-
-    def _measurement(self, source: TopicSource, message: Message, stamp: float, where: str) -> Measurement:
-        root_from_sensor = self._tree.lookup(self.root_frame, self._bag.frame_of(source.topic, message), stamp)
-        camera, compressed = source.camera, source.type == COMPRESSED
-        if source.kind == "scan":
-            return LaserScan(source.topic, stamp, **scan_fields(message, where), root_from_sensor=root_from_sensor)
-        if source.kind == "points":
-            return PointCloud(source.topic, stamp, cloud_points(message, where), root_from_sensor)
-        if camera is None:
-            raise RecordingError(f"{where}: expected a calibrated camera, found none")
-        if source.kind == "depth":
-            image = (compressed_depth_image if compressed else depth_image)(message, camera, where)
-            scale = self._units[source.topic] if image.dtype.kind == "u" else self._float_unit
-            return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
-
-        decode = partial(color_image, message, camera, where, compressed=compressed)
-        return ColorImage(source.topic, stamp, decode, camera, root_from_sensor)

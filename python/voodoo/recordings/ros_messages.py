@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import CameraError, RecordingError, naming, reading
-from voodoo.measurements import FloatArray
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png
 from voodoo.recordings.rvl import decode_rvl
@@ -169,14 +171,14 @@ def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.
     return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
 
 
-def color_image(message: Message, camera: Camera, source: str, *, compressed: bool) -> npt.NDArray[np.uint8]:
+def color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image, or of a JPEG or PNG sensor_msgs/CompressedImage.
 
     Raises:
         RecordingError: it cannot be decoded, or has another encoding or size.
     """
     with reading(source, "a readable picture"):
-        if compressed:
+        if hasattr(message, "format"):
             return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
         return _raw_color(message, camera, source)
 
@@ -235,6 +237,37 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
             f"{source}: expected one turn at most, found {len(message.ranges)} rays by {numbers['angle_increment']} rad"
         )
     return {"ranges": message.ranges.astype(np.float32), **numbers}
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a measurement needs beside its message: topic, stamp [s], root_from_sensor (4, 4), camera of an image, and meters of
+    a unit of 16-bit depth and of float depth."""
+
+    topic: str
+    stamp: float
+    pose: FloatArray
+    camera: Camera | None
+    units: tuple[float, float]
+
+    def of(self, kind: str, message: Message, where: str) -> Measurement:
+        """The measurement in a message of the kind "scan", "points", "depth" or "color"; `where` is named in errors.
+
+        Raises:
+            RecordingError: the message cannot be used, or is an image without a camera.
+        """
+        if kind == "scan":
+            return LaserScan(self.topic, self.stamp, **scan_fields(message, where), root_from_sensor=self.pose)
+        if kind == "points":
+            return PointCloud(self.topic, self.stamp, cloud_points(message, where), self.pose)
+        if self.camera is None:
+            raise RecordingError(f"{where}: expected a calibrated camera, found none")
+        if kind == "color":
+            decode = partial(color_image, message, self.camera, where)
+            return ColorImage(self.topic, self.stamp, decode, self.camera, self.pose)
+        image = (compressed_depth_image if hasattr(message, "format") else depth_image)(message, self.camera, where)
+        unit = self.units[image.dtype.kind == "f"]
+        return DepthImage(self.topic, self.stamp, image, unit, self.camera, self.pose)
 
 
 def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:

@@ -17,12 +17,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import DepthImage, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.recordings.matlab import read_mat
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    Reference,
-    SensorInfo,
-)
+from voodoo.recordings.recording import Recording, RecordingInfo, Reference, SensorInfo
 
 CAMERA = Camera(width=320, height=240, fx=285.63, fy=285.63, cx=160.5, cy=119.0)
 """Kinect v1 at 320x240, for the un-mirrored image. The nominal center of the mirrored one is (160, 120), hence

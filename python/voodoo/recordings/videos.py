@@ -18,12 +18,7 @@ from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.order import in_order, matched
 from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    SensorInfo,
-    number_option,
-)
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option
 from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_start, read_truth
 
