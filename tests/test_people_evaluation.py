@@ -16,7 +16,8 @@ from voodoo.evaluation.people_evaluate import read_rows
 from voodoo.evaluation.people_report import people_markdown
 from voodoo.export.table import save_result
 from voodoo.recordings.loaders import open_recording
-from voodoo.recordings.people_truth import PeopleTruth, read_people_truth
+from voodoo.recordings.people_truth import PeopleTruth
+from voodoo.recordings.truth import read_people_truth
 
 pytest.importorskip("motmetrics")
 NAMES = ("humanoid_root", *metrics.JOINTS)

@@ -15,10 +15,10 @@ from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
 from voodoo.pipeline.start import Init, start_tracker
 from voodoo.recordings import open_recording, sample_path
-from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
+from voodoo.recordings.truth import read_positions
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints import KeypointSensor
 from voodoo.sensors.settings import FrontEndSettings

@@ -14,7 +14,7 @@ from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.model.transforms import is_rigid
-from voodoo.recordings.camera_yaml import camera_tables
+from voodoo.recordings.camera_files import PlacedCamera, camera_of, camera_tables
 from voodoo.recordings.pictures import picture_size
 from voodoo.stored import read_stored
 
@@ -26,23 +26,13 @@ _ROUNDING, _TYPED = 1e-9, 2e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
-    """A camera: model, frame name and pose (4, 4) in the root frame; whether its images are mirrored left to right."""
-
-    camera: Camera
-    sensor_frame: str
-    root_from_sensor: FloatArray
-    mirrored: bool = False
-
-
-@dataclass(frozen=True, eq=False)
 class FolderCalibration:
-    """Cameras of a folder; `depth_factor` is units per meter of the depth images."""
+    """Cameras of a folder, named by their frames; `depth_factor` is units per meter of the depth images."""
 
     root_frame: str
     depth_factor: float
-    depth: Calibration
-    color: Calibration | None
+    depth: PlacedCamera
+    color: PlacedCamera | None
 
 
 _TEMPLATE = """\
@@ -76,12 +66,12 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
     Raises:
         RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
     """
-    content = _from_yaml(path.parent) if not path.is_file() and path.parent.is_dir() else None
-    if not path.is_file() and content is None:
+    if not path.is_file():
+        if path.parent.is_dir() and (found := _from_yaml(path.parent)):
+            return found
         hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
         raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
-    if content is None:
-        content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
+    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
     tables = {"depth", "color"}
     _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))
     depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
@@ -93,23 +83,20 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
         table = _entry(content, "color", dict, {}, "a table", str(path))
         _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
         color = _camera(table, "color", f"{path}, [color]")
-    unmoved = np.array_equal(depth.root_from_sensor, np.eye(4))
-    otherwise = depth.sensor_frame if unmoved else "root"
+    unmoved = np.array_equal(depth.world_from_sensor, np.eye(4))
+    otherwise = depth.name if unmoved else "root"
     root_frame = _entry(content, "root_frame", str, otherwise, "a name", str(path))
     return FolderCalibration(root_frame, float(factor), depth, color)
 
 
-def _from_yaml(folder: Path) -> dict[str, Any] | None:
-    """The keys by the only camera in the YAML files of a folder, with depth in millimeters; None: there is no such one."""
+def _from_yaml(folder: Path) -> FolderCalibration | None:
+    """The only camera in the YAML files of a folder, with depth in millimeters; None: there is no such one."""
     files = sorted((*folder.glob("*.yaml"), *folder.glob("*.yml")))
-    tables = [table for file in files for table in camera_tables(file).values()]
-    if len(tables) != 1 or "size" not in tables[0]:
+    tables = [(f"{file}, [{name}]", table) for file in files for name, table in camera_tables(file).items()]
+    if len(tables) != 1 or "size" not in tables[0][1]:
         return None
-    (fx, _, cx), (_, fy, cy), _ = tables[0]["matrix"]
-    lens = tables[0]["distortions"]
-    model = "equidistant" if tables[0]["fisheye"] else "plumb_bob" if len(lens) < 8 else "rational_polynomial"
-    known = dict(zip(_CAMERA_KEYS, (*tables[0]["size"], fx, fy, cx, cy), strict=True))
-    return {**known, "distortion": lens, "model": model, "depth_factor": 1000.0}
+    frame = "camera_depth_optical_frame"
+    return FolderCalibration(frame, 1000.0, PlacedCamera(frame, camera_of(*tables[0]), np.eye(4)), None)
 
 
 def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
@@ -134,7 +121,7 @@ def _entry(table: dict[str, Any], key: str, kind: type[T], otherwise: T, expecte
     return value
 
 
-def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
+def _camera(table: dict[str, Any], kind: str, where: str) -> PlacedCamera:
     distortion = _entry(table, "distortion", list, [], "a list of numbers", where)
     with naming(where, CameraError, error=RecordingError):
         camera = Camera(
@@ -144,7 +131,7 @@ def _camera(table: dict[str, Any], kind: str, where: str) -> Calibration:
         )
     frame = _entry(table, "sensor_frame", str, f"camera_{kind}_optical_frame", "a name", where)
     mirrored = _entry(table, "mirrored", bool, False, "true or false", where)
-    return Calibration(camera, frame, _pose(table.get("root_from_sensor"), where), mirrored)
+    return PlacedCamera(frame, camera, _pose(table.get("root_from_sensor"), where), mirrored)
 
 
 def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here

@@ -13,14 +13,15 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
-from voodoo.recordings.calibration import Calibration, FolderCalibration, read_calibration
+from voodoo.recordings.calibration import FolderCalibration, read_calibration
+from voodoo.recordings.camera_files import PlacedCamera
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option, usable
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import in_turn
-from voodoo.recordings.truth import read_start, read_truth
+from voodoo.recordings.truth import read_beside
 from voodoo.stored import read_stored, read_stored_text
 
 _RATE = 30.0
@@ -104,7 +105,7 @@ class FolderRecording(Recording):
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
         if not bare:
-            self._read_beside()
+            read_beside(self, lambda name: path / name if (path / name).is_file() else None, root=self.root_frame)
         self._color: list[tuple[float, Path]] = []
         self._unused: tuple[tuple[str, str], ...] = ()
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
@@ -113,13 +114,6 @@ class FolderRecording(Recording):
             else:
                 self._color = _listing(path, "rgb", _PICTURES, clock, left_out, set_back)
         self.assumed = (*clock.notes, *set_back.words)
-
-    def _read_beside(self) -> None:
-        start, truth = self.path / "init.json", self.path / "truth.csv"
-        if start.is_file():
-            self.start = read_start(start, lambda frame: self.root_from(frame or self.root_frame, 0.0))
-        if truth.is_file():
-            self.reference = read_truth(truth, lambda stamp: np.eye(4))
 
     def __len__(self) -> int:
         """Number of depth images."""
@@ -258,19 +252,19 @@ def depth_image(stamp: float, file: Path, calibration: FolderCalibration) -> Dep
     place = calibration.depth
     image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
     image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
-    return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.root_from_sensor)
+    return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.world_from_sensor)
 
 
-def color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+def color_image(stamp: float, file: Path, color: PlacedCamera) -> ColorImage:
     """The image in a file of rgb/, which is read when it is decoded."""
     size = (color.camera.width, color.camera.height)
     step = -1 if color.mirrored else 1
     load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
-    return ColorImage("rgb", stamp, load, color.camera, color.root_from_sensor)
+    return ColorImage("rgb", stamp, load, color.camera, color.world_from_sensor)
 
 
-def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: Calibration) -> SensorInfo:
+def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: PlacedCamera) -> SensorInfo:
     span = entries[-1][0] - entries[0][0]
     detail = f"{calibration.camera.width}x{calibration.camera.height} {words}"
     name = "rgb" if kind == "color" else kind
-    return SensorInfo.during(span, name, kind, calibration.sensor_frame, len(entries), detail)
+    return SensorInfo.during(span, name, kind, calibration.name, len(entries), detail)

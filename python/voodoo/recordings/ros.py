@@ -17,7 +17,6 @@ from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
-from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option, refuse_blank
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
@@ -25,7 +24,7 @@ from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
-from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
+from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_beside
 
 _MILLIMETER = 0.001
 STILL_FRAMES = ("odom", "map")
@@ -118,7 +117,9 @@ class RosRecording(Recording):
 
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
-        self._read_beside(place, bare=bare)
+        if not bare:
+            find, first = partial(find_beside, place), self._driver.first_stamp
+            read_beside(self, find, root=self._own_root, first=first, left_out=left_out)
         self._scene = EmptyScene(place, background, self._names_of_cameras())
 
     def __len__(self) -> int:
@@ -209,25 +210,6 @@ class RosRecording(Recording):
             return number_option(
                 self.path, str(units), float(f"{self._bag.first(str(units)).data:.7g}"), "a length > 0", most=1e3
             )
-
-    def _read_beside(self, place: Path, *, bare: bool) -> None:
-        """Read reference and start from the files beside the bag; if damage is left out, files that do not fit are only noted."""
-        own = partial(self.root_from, self._own_root)
-        for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
-            file = find_beside(place, name)
-            try:
-                if file is not None and name == "truth.csv":
-                    self.reference = read_truth(file, own)
-                elif file is not None and name == PEOPLE_TRUTH_FILE:
-                    self.people = read_people_truth(file, own)
-                elif file is not None:
-                    self.start = read_start(
-                        file, lambda frame: self.root_from(frame or self._own_root, self._driver.first_stamp)
-                    )
-            except RecordingError as error:
-                if self._left_out is None:
-                    raise
-                self.assumed = (*self.assumed, f"{file} is not used: {error}")
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from voodoo.recordings.order import in_order, matched
 from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation
 from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option
 from voodoo.recordings.together import together
-from voodoo.recordings.truth import find_beside, read_start, read_truth
+from voodoo.recordings.truth import find_beside, read_beside
 
 _ROOMS = ("videos", "images", ".")
 """Folders that are searched for videos or image folders; the first one with any is used."""
@@ -89,23 +90,14 @@ class VideosRecording(Recording):
         self._notes: tuple[str, ...] = ()
         names = {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}
         self._scene = EmptyScene(path, background, names)
-        self._read_beside(bare=bare)
-
-    def _read_beside(self, *, bare: bool) -> None:
         if bare:
             return
-        truth, start = (find_beside(self.path, name) for name in ("truth.csv", "init.json"))
-        self.reference = (
-            read_triangulation(self.path, self.info().rate_hz)
-            if truth is None
-            else read_truth(truth, lambda _: np.eye(4))
-        )
-        if start is not None:
-            self.start = read_start(start, lambda frame: self.root_from(frame or FRAME, 0.0))
-        elif self.reference is not None and not self.reference.exact:
-            self.start = self.reference.as_start()
+        read_beside(self, partial(find_beside, path), root=FRAME)
+        if self.reference is None:
+            self.reference = read_triangulation(path, self.info().rate_hz)
         if self.reference is not None and not self.reference.exact:
             self._notes = ("the reference is triangulated from keypoints: another tracker's opinion",)
+            self.start = self.start or self.reference.as_start()
 
     def __len__(self) -> int:
         """Number of images of the first camera."""

@@ -76,7 +76,7 @@ class CameraSource(Source):
         self._root_from_depth, self.placed = np.eye(4), calibration is not None
         if calibration is not None:
             place = read_calibration(calibration)
-            self.root_frame, self._root_from_depth = place.root_frame, place.depth.root_from_sensor
+            self.root_frame, self._root_from_depth = place.root_frame, place.depth.world_from_sensor
         self._ends: list[Callable[[], object]] = []
         self._arrivals: deque[Arrival] = deque(maxlen=_WAITING)
         self._error: VoodooError | None = None

@@ -59,7 +59,7 @@ class Ros2Source(Source):
             root_frame=root_frame,
             meters_per_unit=meters_per_unit,
             tf_max_age=tf_max_age,
-            sensor_pose=None if place is None else (place.root_frame, place.depth.root_from_sensor),
+            sensor_pose=None if place is None else (place.root_frame, place.depth.world_from_sensor),
         )
         self._subscriptions: dict[str, Subscription] = {}
         self._gone = False
