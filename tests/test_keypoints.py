@@ -11,8 +11,7 @@ from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints import KeypointSensor
-from voodoo.sensors.keypoints.sites import nearest_person, site_pixels
-from voodoo.sensors.keypoints.surface import window_depth
+from voodoo.sensors.keypoints.sites import nearest_person, site_pixels, window_depth
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, (-0.1, 0.02, 0.0, 0.0))
 # 3 m in front of the person, 1 m high, looking along world y

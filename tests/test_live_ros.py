@@ -14,10 +14,9 @@ from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
-from voodoo.live.ros2.dds import Offer
+from voodoo.live.ros2.dds import Offer, dds_name, ros_name
 from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
 from voodoo.live.ros2.listing import listing
-from voodoo.live.ros2.types import dds_name, ros_name
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import RESET, Ros2Sink
 from voodoo.live.source import SourceGone

@@ -18,8 +18,8 @@ from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
 from voodoo.export.opensim import write_mot, write_sto
 from voodoo.export.people import PeopleTrack
-from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import person_id, write_people_bag
+from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.export.trc import write_trc
 from voodoo.export.upright import Turn, upright

@@ -14,10 +14,22 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError, a_path, columns_in, naming, reading
-from voodoo.export.result_file import check_suffix
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import appearing_whole
+
+SUFFIXES = (".csv", ".npz")
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse result files that are neither .csv nor .npz.
+
+    Raises:
+        VoodooError: names both.
+    """
+    if path.suffix not in SUFFIXES:
+        raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
+
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]

@@ -7,10 +7,10 @@ from voodoo.ik.chain import Chain as Chain
 from voodoo.ik.image import Silhouette as Silhouette
 from voodoo.ik.image import signed_distance as signed_distance
 from voodoo.ik.options import Options as Options
-from voodoo.ik.posture import Posture as Posture
-from voodoo.ik.posture import Postures as Postures
-from voodoo.ik.rest import Rest as Rest
 from voodoo.ik.solve import Follower as Follower
+from voodoo.ik.solve import Posture as Posture
+from voodoo.ik.solve import Postures as Postures
+from voodoo.ik.solve import Rest as Rest
 from voodoo.ik.solve import solve as solve
 from voodoo.ik.solve import solve_many as solve_many
 from voodoo.ik.targets import Target as Target

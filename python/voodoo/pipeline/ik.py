@@ -14,15 +14,14 @@ from voodoo.export.track import Track
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette
 from voodoo.ik.options import Options
-from voodoo.ik.posture import Posture
-from voodoo.ik.solve import Follower, solve
+from voodoo.ik.solve import Follower, Posture, solve
 from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
 from voodoo.sensors.silhouettes.color import StillBackground
 from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.masks import surroundings
 from voodoo.sensors.silhouettes.regions import RegionSilhouettes
-from voodoo.sensors.silhouettes.surroundings import surroundings
 from voodoo.tracker import Tracker
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]

@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
-from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
-from voodoo.recordings.keypoint_depth import check_on_depth
+from voodoo.recordings.keypoint_check import check_keypoints, check_on_depth, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut

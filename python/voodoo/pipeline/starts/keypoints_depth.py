@@ -20,8 +20,7 @@ from voodoo.pipeline.starts.base import (
 )
 from voodoo.sensors.depth import depth_points
 from voodoo.sensors.keypoints.sensor import POINT_SIGMA_M
-from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
-from voodoo.sensors.keypoints.surface import behind_surface
+from voodoo.sensors.keypoints.sites import SitePixel, behind_surface, site_pixels
 from voodoo.sensors.pixels import FloatArray, in_sensor, world_rays
 
 _TOGETHER_S = 0.05

@@ -16,8 +16,14 @@ from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.gating import SiteGate
-from voodoo.sensors.keypoints.sites import MIN_CONFIDENCE, check_confidence, checked_rows, compiled
-from voodoo.sensors.keypoints.surface import DepthArray, window_depth
+from voodoo.sensors.keypoints.sites import (
+    MIN_CONFIDENCE,
+    DepthArray,
+    check_confidence,
+    checked_rows,
+    compiled,
+    window_depth,
+)
 from voodoo.sensors.model import PixelNoise, SensorModel
 from voodoo.sensors.pixels import checked_camera
 from voodoo.sensors.rays import SiteRay, add_rays

@@ -1,21 +1,67 @@
-"""Converts the keypoints of an image to pixels of body sites."""
+"""Keypoints of an image as pixels of body sites, the depth at them, and the persons to whom they belong; networks report several
+people in arbitrary order."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo.errors import MeasurementError
+from voodoo.measurements import KeypointImage
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
-from voodoo.sensors.keypoints.surface import behind_surface
+from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
+
+DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+
+
+EDGE_M = 0.10
+"""Depths in a window that differ by more than this belong to different surfaces."""
+
+
+BEHIND_SURFACE_M: dict[str, float] = {
+    "head_center": 0.09, "skullbase": 0.06, "skull_tip": 0.05, "vc7": 0.06, "humanoid_root": 0.11,
+    "shoulder": 0.06, "elbow": 0.04, "wrist": 0.03, "hand": 0.02, "hip": 0.09, "knee": 0.055, "ankle": 0.04,
+    "toe": 0.03,
+}  # fmt: skip
+"""How far behind the visible surface a site lies along the ray [m]: half the depth of the limb there, for an adult
+(means of ANSUR II: head breadth 0.15 and length 0.19, chest depth 0.25, knee breadth 0.11, wrist breadth 0.06...)."""
+
+
+def behind_surface(site: str) -> float:
+    """How far behind the visible surface a site lies [m], of either side."""
+    return BEHIND_SURFACE_M[site.removeprefix("l_").removeprefix("r_")]
+
+
+def window_depth(
+    depth: DepthArray, pixel: tuple[float, float], *, meters_per_unit: float = 0.001, radius: int = 2
+) -> float | None:
+    """Depth [m] of the nearest surface around a pixel, None where fewer than a quarter of the window's pixels returned.
+
+    The nearest surface is what lies within EDGE_M behind the window's 20 % quantile; its median is robust against
+    flying pixels on either side.
+    """
+    u, v = round(pixel[0]), round(pixel[1])
+    height, width = depth.shape
+    if not (0 <= u < width and 0 <= v < height):
+        return None
+    window = depth[max(v - radius, 0) : v + radius + 1, max(u - radius, 0) : u + radius + 1]
+    values = window.astype(np.float64).ravel() * meters_per_unit
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if len(values) < max(window.size // 4, 1):
+        return None
+    near = float(np.quantile(values, 0.2, method="lower"))
+    surface = values[np.abs(values - near) <= EDGE_M]
+    return float(np.median(surface))
+
 
 MIN_CONFIDENCE = 0.1
 """Keypoints with a lower confidence are not used."""
@@ -116,3 +162,56 @@ def nearest_person(
         least=MIN_CONFIDENCE,
     )
     return None if nearest is None else people[nearest]
+
+
+WRONG_M = 0.3
+"""Greatest median distance of the rays of keypoints from a person that they belong to."""
+_FEWEST = 4
+
+
+@dataclass(frozen=True, eq=False)
+class AssignedKeypoints:
+    """The keypoints of one image by person.
+
+    Args:
+        of: id of a person -> the image with only that person's keypoints.
+        rest: the image with the keypoints that were assigned to no person.
+    """
+
+    of: Mapping[int, KeypointImage]
+    rest: KeypointImage
+
+
+def assign_keypoints(
+    item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDArray[np.float64]]]
+) -> AssignedKeypoints:
+    """Assign the keypoints of an image to persons jointly, by the distances of their rays from the predicted sites.
+
+    Args:
+        item: the image.
+        predicted: id of a person -> site -> predicted position (3,) [m], root frame.
+    """
+    numbers = list(predicted)
+    costs = np.array([[_away(item, rows, predicted[number]) for rows in item.people] for number in numbers])
+    of: dict[int, KeypointImage] = {}
+    taken: set[int] = set()
+    if costs.size:
+        # A forbidden pair gets a cost above all possible ones.
+        for row, column in _core.linear_sum_assignment(np.where(costs < WRONG_M, costs, 1e3)):
+            if costs[row, column] < WRONG_M:
+                of[numbers[row]] = replace(item, people=(item.people[column],))
+                taken.add(column)
+    rest = tuple(rows for index, rows in enumerate(item.people) if index not in taken)
+    return AssignedKeypoints(of, replace(item, people=rest))
+
+
+def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, npt.NDArray[np.float64]]) -> float:
+    """Median distance [m] of the rays of keypoints from the predicted sites; infinite with too few keypoints."""
+    observed = [site for site in site_pixels(rows, layout=item.layout)[0] if site.site in predicted]
+    if len(observed) < _FEWEST:
+        return float("inf")
+    origin, directions = world_rays(item.camera, item.root_from_sensor, [site.pixel for site in observed])
+    places = np.array([predicted[site.site] for site in observed])
+    away = ray_distance(origin, directions, places)
+    away = away[np.isfinite(away)]
+    return float(np.median(away)) if len(away) >= _FEWEST else float("inf")
