@@ -13,6 +13,8 @@ import numpy.typing as npt
 from voodoo.model.camera import Camera
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+ByteImage: TypeAlias = npt.NDArray[np.uint8]
+DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 _LARGEST = float(np.finfo(np.float64).max)
 
 
@@ -31,7 +33,7 @@ class DepthImage:
 
     sensor: str
     stamp: float
-    image: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+    image: DepthArray
     meters_per_unit: float
     camera: Camera
     root_from_sensor: FloatArray
@@ -112,12 +114,12 @@ class ColorImage:
 
     sensor: str
     stamp: float
-    decode: Callable[[], npt.NDArray[np.uint8]]
+    decode: Callable[[], ByteImage]
     camera: Camera
     root_from_sensor: FloatArray
 
     @cached_property
-    def image(self) -> npt.NDArray[np.uint8]:
+    def image(self) -> ByteImage:
         """The image, (H, W, 3) BGR uint8.
 
         Raises:

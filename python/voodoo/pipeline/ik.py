@@ -15,7 +15,7 @@ from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette
 from voodoo.ik.options import Options
 from voodoo.ik.solve import Follower, Posture, solve
-from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
 from voodoo.sensors.silhouettes.color import StillBackground
@@ -24,7 +24,6 @@ from voodoo.sensors.silhouettes.masks import surroundings
 from voodoo.sensors.silhouettes.regions import RegionSilhouettes
 from voodoo.tracker import Tracker
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pictures: TypeAlias = Literal["depth", "color", "regions", "none"]
 
 KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")

@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading, utf8_name
-from voodoo.measurements import ColorImage, FloatArray, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml
 from voodoo.recordings.empty_scene import FOLDER, PICTURES, EmptyScene
@@ -27,8 +26,6 @@ from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, nu
 from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_beside
 from voodoo.stored import MOST_RECORDED, check_stored, read_stored
-
-ByteImage: TypeAlias = npt.NDArray[np.uint8]
 
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v")
 _PADDING_PX = 16

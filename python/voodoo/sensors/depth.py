@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import DepthImage
+from voodoo.measurements import DepthArray, DepthImage
 from voodoo.model.projection import transform
 from voodoo.sensors.pixels import FloatArray, in_sensor
-
-DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 
 _BOX_STEPS, _BOX_MARGIN_PX, _BOX_NEAREST_M = 5, 8, 0.1
 """Points on each edge of a box, whose straight edges a lens bends, pixels around them, and how near they may be to be used."""

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.measurements import ByteImage
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
@@ -20,7 +21,6 @@ from voodoo.sensors.skin.settings import SkinSettings
 
 Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two opposite corners [m], the lower one first."""
-ByteImage: TypeAlias = npt.NDArray[np.uint8]
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 WHOLE_BODY = ("depth", "points", "keypoints", "markers")

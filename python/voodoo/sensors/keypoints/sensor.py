@@ -5,30 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
 from voodoo.errors import MeasurementError
+from voodoo.measurements import DepthArray, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.gating import SiteGate
-from voodoo.sensors.keypoints.sites import (
-    MIN_CONFIDENCE,
-    DepthArray,
-    check_confidence,
-    checked_rows,
-    compiled,
-    window_depth,
-)
+from voodoo.sensors.keypoints.sites import MIN_CONFIDENCE, check_confidence, checked_rows, compiled, window_depth
 from voodoo.sensors.model import PixelNoise, SensorModel
 from voodoo.sensors.pixels import checked_camera
 from voodoo.sensors.rays import SiteRay, add_rays
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 POINT_SIGMA_M = 0.03
 """Least standard deviation of a 3-D point from depth: the uncertainty of `BEHIND_SURFACE_M`."""

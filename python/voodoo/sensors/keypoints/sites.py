@@ -7,21 +7,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo.errors import MeasurementError
-from voodoo.measurements import KeypointImage
+from voodoo.measurements import DepthArray, KeypointImage
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
-
-DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
-
 
 EDGE_M = 0.10
 """Depths in a window that differ by more than this belong to different surfaces."""

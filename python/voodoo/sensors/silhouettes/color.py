@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.measurements import ByteImage
 from voodoo.sensors.silhouettes.masks import Mask, without_specks
-
-ByteImage: TypeAlias = npt.NDArray[np.uint8]
 
 _SMOOTH_PX = 1.5
 _INPAINT_PX = 5

@@ -4,19 +4,15 @@ near them. Masks from color images are in voodoo.sensors.silhouettes.color."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import DepthImage
+from voodoo.measurements import DepthImage, FloatArray
 from voodoo.model.projection import CameraView
 from voodoo.sensors.depth import depth_points, meters
 from voodoo.sensors.silhouettes.masks import Mask, filled, known_place, without_specks
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 _STEP = 0.03
 """Two neighbors whose depths differ by more than this fraction lie on different objects."""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
-from voodoo.measurements import DepthImage
+from voodoo.measurements import ByteImage, DepthImage
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
@@ -22,7 +22,6 @@ from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.tracker import Tracker
 
 Mask = npt.NDArray[np.bool_]
-ByteImage = npt.NDArray[np.uint8]
 
 _NOWHERE = np.full(3, np.nan)
 
