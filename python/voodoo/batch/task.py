@@ -287,10 +287,8 @@ def _parts(items: Iterable[T], limit_s: float | None) -> Iterator[list[T]]:
 
 def joined(parts: Sequence[Track]) -> Track:
     """Concatenates tracks of one body; limbs and joint angles are left out."""
-    none = [np.empty((len(part), 0, 4, 4)) for part in parts]
-    kept = zip(parts, none, strict=True)
     return Track.joined(
-        [Track(p.stamps, p.status, p.residual, p.joint_names, p.joints, (), limbs) for p, limbs in kept]
+        [Track(p.stamps, p.status, p.residual, p.joint_names, p.joints, (), np.empty((len(p), 0, 4, 4))) for p in parts]
     )
 
 

@@ -12,7 +12,7 @@ from voodoo.export.skeleton import mean_interval
 from voodoo.export.table import cells
 from voodoo.export.track import Track
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 
 def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:
@@ -51,5 +51,4 @@ def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = N
     # OpenSim starts its clock near zero; Unix times would lose their fraction in it.
     for index, (stamp, row) in enumerate(zip(track.stamps - track.stamps[0], positions, strict=True), start=1):
         lines.append(f"{index}\t{stamp:.6f}\t" + "\t".join(cells(np.ravel(row))))
-    with appearing_whole(path) as place:
-        place.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n")

@@ -6,13 +6,13 @@ docs/how-to/inverse-kinematics.md explains the method; the solver is in the comp
 from voodoo.ik.chain import Chain as Chain
 from voodoo.ik.image import Silhouette as Silhouette
 from voodoo.ik.image import signed_distance as signed_distance
-from voodoo.ik.options import Options as Options
 from voodoo.ik.solve import Follower as Follower
 from voodoo.ik.solve import Posture as Posture
 from voodoo.ik.solve import Postures as Postures
 from voodoo.ik.solve import Rest as Rest
 from voodoo.ik.solve import solve as solve
 from voodoo.ik.solve import solve_many as solve_many
-from voodoo.ik.targets import Target as Target
-from voodoo.ik.targets import Targets as Targets
 from voodoo.ik.values import Bone as Bone
+from voodoo.ik.values import Options as Options
+from voodoo.ik.values import Target as Target
+from voodoo.ik.values import Targets as Targets

@@ -13,9 +13,20 @@ import numpy.typing as npt
 from voodoo.errors import BodyError, MeasurementError
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette, core_views
-from voodoo.ik.options import Options, chosen_options
-from voodoo.ik.targets import Target, Targets, target_parts
-from voodoo.ik.values import FloatArray, base_pose, listed_bones, listed_poses, named, numbers, vector
+from voodoo.ik.values import (
+    FloatArray,
+    Options,
+    Target,
+    Targets,
+    base_pose,
+    chosen_options,
+    listed_bones,
+    listed_poses,
+    named,
+    numbers,
+    target_parts,
+    vector,
+)
 from voodoo.model.body import Body
 
 

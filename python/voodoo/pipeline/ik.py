@@ -13,8 +13,8 @@ from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette
-from voodoo.ik.options import Options
 from voodoo.ik.solve import Follower, Posture, solve
+from voodoo.ik.values import Options
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
