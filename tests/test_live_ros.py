@@ -16,12 +16,11 @@ from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
 from voodoo.live.ros2.dds import Offer, dds_name, ros_name
 from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
-from voodoo.live.ros2.listing import listing
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import RESET, Ros2Sink
 from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
-from voodoo.live.sources.ros2 import Ros2Source
+from voodoo.live.sources.ros2 import Ros2Source, listing
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
 from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.front_end import nobody

@@ -15,8 +15,7 @@ import numpy.typing as npt
 from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
-from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png
-from voodoo.recordings.rvl import decode_rvl
+from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png, decode_rvl
 
 T = TypeVar("T")
 Message: TypeAlias = Any

@@ -1,4 +1,4 @@
-"""ROS 2 topics as a live source."""
+"""ROS 2 topics as a live source, and a list of them for those who do not know the name of theirs."""
 
 from __future__ import annotations
 
@@ -152,3 +152,35 @@ class Ros2Source(Source):
     def about(self) -> dict[str, Any]:
         """See Source."""
         return {"name": self.name, "kind": "ros2", "topics": self._topics, "root_frame": self.root_frame}
+
+
+_DISCOVERY_S, _LISTEN_S, _POLL_S = 1.0, 2.0, 0.05
+
+
+def listing(node: Node | None = None, *, seconds: float = _LISTEN_S) -> list[str]:
+    """A line for each topic that is published: name, type, and rate of those that voodoo reads.
+
+    Args:
+        node: None: one of its own.
+        seconds: how long messages are counted [s].
+
+    Raises:
+        VoodooError: see Node.
+    """
+    node = Node() if node is None else node
+    found = time.monotonic() + _DISCOVERY_S
+    while not node.offers() and time.monotonic() < found:
+        time.sleep(_POLL_S)
+    offers = node.offers()
+    read = {topic: offer for topic, offer in offers.items() if offer.kind in (*MEASURED, CAMERA_INFO, TF)}
+    subscriptions = {topic: node.subscribe(topic, offer, depth=100) for topic, offer in read.items()}
+    counts, began = dict.fromkeys(read, 0), time.monotonic()
+    while (waited := time.monotonic() - began) < seconds:
+        node.wait(_POLL_S)
+        for topic, subscription in subscriptions.items():
+            counts[topic] += len(subscription.take())
+    lines = []
+    for topic, offer in sorted(offers.items(), key=lambda item: (item[1].kind not in MEASURED, item[0])):
+        rate = f"  {counts[topic] / waited:.1f} Hz" if topic in counts else ""
+        lines.append(f"{topic}  {offer.kind or 'no ROS type'}{rate}")
+    return lines
