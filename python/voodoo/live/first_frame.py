@@ -36,11 +36,11 @@ class FirstFrame(Recording):
 
     def info(self) -> RecordingInfo:
         """The sensors with measurements."""
-        sensors = tuple(
-            SensorInfo.during(0.0, sensor, kind, self.root_frame, 1, "live")
-            for sensor, kind in self._live.kinds.items()
-        )
-        return self._described("live", sensors, start=self._frame.stamp, duration=0.0)
+        stamps = [self._frame.stamp]
+        sensors = [
+            SensorInfo.of(name, kind, self.root_frame, stamps, "live") for name, kind in self._live.kinds.items()
+        ]
+        return self._described("live", sensors, stamps)
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""

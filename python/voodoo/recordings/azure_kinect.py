@@ -135,10 +135,8 @@ class AzureKinectRecording(Recording):
         for sensor, stamps in self._stamps.items():
             camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
             detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
-            span = stamps[-1] - stamps[0] if stamps else 0.0
-            sensors.append(SensorInfo.during(span, sensor, sensor, frame, len(stamps), detail))
-        first, last = self._stamps["depth"][0], self._stamps["depth"][-1]
-        return self._described("azure-kinect", sensors, start=first, duration=last - first, unused=self._unused)
+            sensors.append(SensorInfo.of(sensor, sensor, frame, stamps, detail))
+        return self._described("azure-kinect", sensors, self._stamps["depth"], unused=self._unused)
 
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV

@@ -135,10 +135,8 @@ class FolderRecording(Recording):
         sensors = [_sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)]
         if self._color and self._calibration.color is not None:
             sensors.append(_sensor("color", "pictures", self._color, self._calibration.color))
-        first, last = self._depth[0][0], self._depth[-1][0]
-        return self._described(
-            "folder", sensors, start=first, duration=last - first, unused=self._unused, notes=self.assumed
-        )
+        stamps = [stamp for stamp, _ in self._depth]
+        return self._described("folder", sensors, stamps, unused=self._unused, notes=self.assumed)
 
 
 class FrameClock:
@@ -264,7 +262,6 @@ def color_image(stamp: float, file: Path, color: PlacedCamera) -> ColorImage:
 
 
 def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: PlacedCamera) -> SensorInfo:
-    span = entries[-1][0] - entries[0][0]
     detail = f"{calibration.camera.width}x{calibration.camera.height} {words}"
     name = "rgb" if kind == "color" else kind
-    return SensorInfo.during(span, name, kind, calibration.name, len(entries), detail)
+    return SensorInfo.of(name, kind, calibration.name, [stamp for stamp, _ in entries], detail)

@@ -166,8 +166,7 @@ class MarkerRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize."""
-        duration = float(self._stamps[-1] - self._stamps[0])
         detail = f"{len(self._sites)} markers"
-        sensor = SensorInfo.during(duration, self.path.name, "markers", FRAME, len(self), detail)
+        sensor = SensorInfo.of(self.path.name, "markers", FRAME, self._stamps, detail)
         notes = (f"up is {self._up} of the file", *self.assumed)
-        return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration, notes=notes)
+        return self._described("markers", [sensor], self._stamps, notes=notes)

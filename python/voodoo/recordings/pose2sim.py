@@ -147,23 +147,16 @@ class Pose2SimRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize."""
-        duration = (len(self) - 1) / self.rate
-        sensors = (
-            SensorInfo.during(
-                duration,
-                one.name,
-                "keypoints",
-                one.name,
-                len(self),
-                f"{self.layout} keypoints of {folder.relative_to(self.path)}",
-            )
+        stamps, detail = np.arange(len(self)) / self.rate, f"{self.layout} keypoints of"
+        sensors = [
+            SensorInfo.of(one.name, "keypoints", one.name, stamps, f"{detail} {folder.relative_to(self.path)}")
             for one, folder in zip(self.cameras, self._folders, strict=True)
-        )
+        ]
         notes = (*self.assumed, *self._notes)
         if self.reference is not None:
             kind = "the same keypoints: it tests consistency, not accuracy"
             notes = (*notes, f"the reference is triangulated from {kind}")
-        return self._described("pose2sim", sensors, duration=duration, notes=notes)
+        return self._described("pose2sim", sensors, stamps, notes=notes)
 
 
 def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:
@@ -185,18 +178,14 @@ def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | Non
         raise RecordingError(
             f"{path}: expected as many keypoint files for every camera, or numbers in their names, found {sorted(counts)} files"
         )
-    if len(numbers) < len(files):
-        said = (
-            ()
-            if counts == {1}
-            else ("the names of keypoint files have no numbers: they are taken in the order of names",)
-        )
-        return list(zip(*files, strict=True)), said
     gapless = all(max(each) - min(each) + 1 == len(each) for each in numbers if each)
-    if len(counts) == 1 and (gapless or not common or all(each == numbers[0] for each in numbers)):
-        differ = any(each != numbers[0] for each in numbers)
-        said = ("the cameras' keypoint files have different numbers: they are paired in their order",) if differ else ()
-        return list(zip(*files, strict=True)), said
+    differ = any(each != numbers[0] for each in numbers)
+    if len(numbers) < len(files) or (len(counts) == 1 and (gapless or not common or not differ)):
+        said = "the cameras' keypoint files have different numbers: they are paired in their order" if differ else ""
+        if len(numbers) < len(files):
+            unnumbered = "the names of keypoint files have no numbers: they are taken in the order of names"
+            said = "" if counts == {1} else unnumbered
+        return list(zip(*files, strict=True)), (said,) if said else ()
     of = [dict(zip(each, own, strict=True)) for each, own in zip(numbers, files, strict=True)]
     lacking = ", ".join(f"{folder.name} {len(union) - len(own)}" for folder, own in zip(folders, files, strict=True))
     return [tuple(each.get(number) for each in of) for number in union], (

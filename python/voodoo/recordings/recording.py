@@ -79,9 +79,10 @@ class SensorInfo:
     detail: str
 
     @classmethod
-    def during(cls, seconds: float, name: str, kind: str, frame: str, messages: int, detail: str) -> SensorInfo:
-        """A source whose last message was so long after the first one."""
-        return cls(name, kind, frame, messages, mean_rate(messages, seconds), detail)
+    def of(cls, name: str, kind: str, frame: str, stamps: Sequence[float] | FloatArray, detail: str) -> SensorInfo:
+        """A source with messages at these stamps [s]."""
+        span = stamps[-1] - stamps[0] if len(stamps) else 0.0
+        return cls(name, kind, frame, len(stamps), mean_rate(len(stamps), span), detail)
 
 
 @dataclass(frozen=True)
@@ -192,13 +193,13 @@ class Recording(ABC):
         self,
         loader: str,
         sensors: Iterable[SensorInfo],
+        stamps: Sequence[float] | FloatArray,
         *,
-        duration: float,
-        start: float = 0.0,
         unused: tuple[tuple[str, str], ...] = (),
         notes: tuple[str, ...] = (),
     ) -> RecordingInfo:
-        """The summary, with the entries that follow from the recording itself."""
+        """The summary, with the entries that follow from the recording itself; `stamps`: of the first and the last frame [s]."""
+        start, duration = float(stamps[0]), float(stamps[-1] - stamps[0])
         return RecordingInfo(
             name=self.name,
             path=self.path,

@@ -17,7 +17,7 @@ from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option, refuse_blank
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, refuse_blank
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
@@ -190,13 +190,14 @@ class RosRecording(Recording):
                 span = stamp_of(last, where) - source.first_stamp
             if source is self._driver:
                 duration = span
-            about = source.topic, source.kind, source.frame, source.messages, source.detail
-            sensors.append(SensorInfo.during(span, *about))
+            count = source.messages
+            sensors.append(
+                SensorInfo(source.topic, source.kind, source.frame, count, mean_rate(count, span), source.detail)
+            )
         return self._described(
             self.loader,
             sensors,
-            start=self._driver.first_stamp,
-            duration=duration,
+            (self._driver.first_stamp, self._driver.first_stamp + duration),
             unused=tuple(self._unused),
             notes=(*self.assumed, *self._scene.words),
         )

@@ -85,11 +85,11 @@ class UtdMhadRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize."""
-        duration = (len(self) - 1) / RATE_HZ
+        stamps = np.arange(len(self)) / RATE_HZ
         return self._described(
             "utd-mhad",
-            [SensorInfo.during(duration, "depth", "depth", FRAME, len(self), "320x240 16UC1, person cut out")],
-            duration=duration,
+            [SensorInfo.of("depth", "depth", FRAME, stamps, "320x240 16UC1, person cut out")],
+            stamps,
             notes=(
                 "stamps are nominal (30 Hz); the true rate may be near 19 Hz",
                 "the reference leads the depth by one or two frames",

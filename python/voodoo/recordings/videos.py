@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading, utf8_name
-from voodoo.measurements import ByteImage, ColorImage, FloatArray, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml
 from voodoo.recordings.empty_scene import FOLDER, PICTURES, EmptyScene
@@ -260,15 +260,14 @@ class VideosRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize."""
-        stamps: FloatArray = np.array(self._cameras[0].stamps)
-        duration = float(stamps[-1] - stamps[0])
-        sensors = []
-        for one in self._cameras:
-            words = f"{one.camera.width}x{one.camera.height} pictures"
-            span = one.stamps[-1] - one.stamps[0]
-            sensors.append(SensorInfo.during(span, one.sensor, "color", one.placed.name, len(one.stamps), words))
+        sensors = [
+            SensorInfo.of(
+                one.sensor, "color", one.placed.name, one.stamps, f"{one.camera.width}x{one.camera.height} pictures"
+            )
+            for one in self._cameras
+        ]
         notes = (*self.assumed, *self._notes, *self._scene.words)
-        return self._described("videos", sensors, start=float(stamps[0]), duration=duration, notes=notes)
+        return self._described("videos", sensors, self._cameras[0].stamps, notes=notes)
 
 
 def picture_sources(path: Path, *, anywhere: bool = True) -> list[Path]:

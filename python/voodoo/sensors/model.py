@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar, overload
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -58,13 +58,7 @@ class SensorModel:
         _check("reference_sigma", self.reference_sigma, zero=False)
         _check("max_weight", self.max_weight, zero=False)
 
-    @overload
-    def weight(self, sigma: float, *, sharing: float = 1.0) -> float: ...
-    @overload
-    def weight(self, sigma: npt.NDArray[np.float64], *, sharing: float = 1.0) -> npt.NDArray[np.float64]: ...
-    def weight(
-        self, sigma: float | npt.NDArray[np.float64], *, sharing: float = 1.0
-    ) -> float | npt.NDArray[np.float64]:
+    def weight(self, sigma: N, *, sharing: float = 1.0) -> N:
         """Weight of a datum.
 
         Args:
@@ -82,8 +76,8 @@ class SensorModel:
         values = np.asarray(sigma, dtype=np.float64)
         if not np.isfinite(values).all() or (values <= 0.0).any():
             raise MeasurementError(f"sigma: expected finite meters > 0, found {sigma!r}")
-        weights = np.minimum((self.reference_sigma / values) ** 2 / sharing, self.max_weight)
-        return float(weights) if weights.ndim == 0 else weights
+        weights: Any = np.minimum((self.reference_sigma / values) ** 2 / sharing, self.max_weight)
+        return weights if weights.ndim else weights.item()
 
     def sigma(self, weight: float) -> float:
         """Returns the standard deviation [m] that corresponds to a weight, such as those of K06."""
