@@ -12,16 +12,15 @@ from pathlib import Path
 
 from voodoo.errors import VoodooError, reason
 from voodoo.export.bvh import write_bvh
-from voodoo.export.c3d_file import write_c3d
 from voodoo.export.foxglove import SUFFIX as FOXGLOVE
 from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
+from voodoo.export.markers import write_c3d, write_trc
 from voodoo.export.opensim import write_mot, write_sto
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import person_id, write_people_bag
 from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
-from voodoo.export.trc import write_trc
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
 from voodoo.whole import appearing_whole

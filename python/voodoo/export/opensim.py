@@ -1,6 +1,6 @@
 """Motions for OpenSim: joint angles (.mot) and orientations of bodies as OpenSense reads them (.sto).
 
-A frame without a pose has no row. Times are those of `voodoo.export.trc`, from the track's first frame.
+A frame without a pose has no row. Times are those of `voodoo.export.markers`, from the track's first frame.
 """
 
 from __future__ import annotations

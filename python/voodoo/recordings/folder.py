@@ -13,8 +13,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
-from voodoo.recordings.calibration import FolderCalibration, read_calibration
-from voodoo.recordings.camera_files import PlacedCamera
+from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read_calibration
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png

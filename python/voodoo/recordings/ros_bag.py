@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import weakref
 import zipfile
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -219,36 +219,40 @@ class Bag:
         Raises:
             RecordingError: damage, or no message although the index has some.
         """
-        problem: RecordingError | None = None
-        for _, message in self._messages([topic]):
+        problems: list[RecordingError] = []
+        for message in self._usable(topic, problems, good=good):
+            return message
+        raise (problems or [self._without(topic)])[0]
+
+    def _usable(
+        self,
+        topic: str,
+        problems: list[RecordingError],
+        start: int | None = None,
+        good: Callable[[Message], object] | None = None,
+    ) -> Iterator[Message]:
+        """The messages of a topic; if damage is left out, those that can be used, and `problems` get the others."""
+        for _, message in self._messages([topic], start):
             try:
                 if isinstance(message, RecordingError):
                     raise message
                 if good is not None and self._left_out is not None:
                     good(message)
-                return message
             except RecordingError as error:
                 if self._left_out is None:
                     raise
-                problem = problem or error
-        raise problem or self._without(topic)
+                problems.append(error)
+            else:
+                yield message
 
     def last(self, topic: str) -> Message:
         """The last message of `topic`; reads the end of the bag first."""
-        problem: RecordingError | None = None
+        problems: list[RecordingError] = []
         for seconds in (1, 10, None):
             start = None if seconds is None else self.end_time - seconds * 1_000_000_000
-            found = None
-            for _, message in self._messages([topic], start):
-                if not isinstance(message, RecordingError):
-                    found = message
-                elif self._left_out is None:
-                    raise message
-                else:
-                    problem = problem or message
-            if found is not None:
-                return found
-        raise problem or self._without(topic)
+            if found := deque(self._usable(topic, problems, start), maxlen=1):
+                return found[0]
+        raise (problems or [self._without(topic)])[0]
 
     def _without(self, topic: str) -> RecordingError:
         return RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")

@@ -21,7 +21,7 @@ from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import pose_of
-from voodoo.recordings.calibration import read_calibration
+from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.pictures import decode_color
 
 Vendor: TypeAlias = Any

@@ -15,7 +15,7 @@ from voodoo.live.ros2.dds import Node, Offer, Subscription
 from voodoo.live.ros2.feed import CAMERA_INFO, COMPRESSED, IMAGE, MEASURED, TF, RosFeed
 from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import FloatArray
-from voodoo.recordings.calibration import read_calibration
+from voodoo.recordings.camera_files import read_calibration
 
 _DISCOVERY_S = 3.0
 _POLL_S = 0.05
