@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import DepthArray, DepthImage
+from voodoo.measurements import DepthArray, DepthImage, FloatArray
 from voodoo.model.projection import transform
-from voodoo.sensors.pixels import FloatArray, in_sensor
+from voodoo.sensors.pixels import in_sensor
 
 _BOX_STEPS, _BOX_MARGIN_PX, _BOX_NEAREST_M = 5, 8, 0.1
 """Points on each edge of a box, whose straight edges a lens bends, pixels around them, and how near they may be to be used."""

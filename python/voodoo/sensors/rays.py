@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Frame
+from voodoo.measurements import FloatArray
 from voodoo.sensors.model import SensorModel
-from voodoo.sensors.pixels import FloatArray
 
 _STEPS = 20
 _MOVED_M = 1e-4

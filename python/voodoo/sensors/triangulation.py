@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.sensors.pixels import FloatArray
+from voodoo.measurements import FloatArray
 from voodoo.sensors.rays import SiteRay
 
 AGREE_M = 0.08

@@ -13,8 +13,7 @@ from voodoo.drawing.rerun_log import Log
 from voodoo.measurements import DepthImage, KeypointImage
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
-from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
-from voodoo.sensors.keypoints.sites import assign_keypoints, nearest_person
+from voodoo.sensors.keypoints.sites import KeypointReport, KeypointSensor, assign_keypoints, nearest_person
 
 KEYPOINT = (255, 120, 255)
 """Color in overlays, BGR."""
