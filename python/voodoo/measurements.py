@@ -38,6 +38,11 @@ class DepthImage:
     camera: Camera
     root_from_sensor: FloatArray
 
+    def meters(self) -> FloatArray:
+        """Depths (H, W) [m]; NaN where there is no return."""
+        z = self.image.astype(np.float64) * self.meters_per_unit
+        return np.asarray(np.where(np.isfinite(z) & (z > 0.0), z, np.nan))
+
     def __repr__(self) -> str:
         """One line with size and type instead of the pixels."""
         height, width = self.image.shape

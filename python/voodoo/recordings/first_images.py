@@ -137,9 +137,8 @@ def depth_range(recording: Recording) -> DepthRange | None:
         for recorded in islice(recording, _IMAGES):
             for item in recorded.measurements:
                 if isinstance(item, DepthImage):
-                    meters = item.image.astype(np.float64).ravel() * item.meters_per_unit
-                    meters = meters[np.isfinite(meters) & (meters > 0.0)]
-                    if meters.size:
+                    meters = item.meters()
+                    if (meters := meters[np.isfinite(meters)]).size:
                         near, middle, far = (float(value) for value in np.percentile(meters, (5.0, 50.0, 95.0)))
                         return DepthRange(near, middle, far)
     except VoodooError:

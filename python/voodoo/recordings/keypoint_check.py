@@ -337,9 +337,8 @@ def _standing_out(views: Sequence[tuple[KeypointImage, FloatArray]], change: Cha
 
 def _nearest(image: KeypointImage, depth: DepthImage) -> FloatArray:
     """The nearest depth [m] in cells of the keypoints' picture; infinite where nothing is seen."""
-    z = depth.image.astype(np.float64) * depth.meters_per_unit
-    rays = depth.camera.rays().astype(np.float64)
-    valid = np.isfinite(z) & (z > 0.0) & np.isfinite(rays).all(axis=2)
+    z, rays = depth.meters(), depth.camera.rays().astype(np.float64)
+    valid = np.isfinite(z) & np.isfinite(rays).all(axis=2)
     points = np.column_stack([rays[valid] * z[valid][:, None], z[valid]])
     pose = np.linalg.inv(image.root_from_sensor) @ depth.root_from_sensor
     points = points @ pose[:3, :3].T + pose[:3, 3]

@@ -9,8 +9,9 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader
@@ -20,6 +21,7 @@ from voodoo.recordings.set_back import BACK_S, falls
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
 
+T = TypeVar("T")
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
 _ATTACHMENT, _METADATA = 0x09, 0x0C
@@ -38,6 +40,21 @@ DAMAGED = "in a damaged chunk"
 
 Item = tuple[Connection, int, bytes | RecordingError]
 """Connection, time [ns] and bytes of a message, or why it cannot be read."""
+
+
+def or_error(read: Callable[[], T], where: object, expected: str, *, reason: str = "") -> T | RecordingError:
+    """What `read` returns, or the error by which it fails.
+
+    Args:
+        read: reads a part of a file.
+        where, expected: see voodoo.errors.reading.
+        reason: of the error; "": its own.
+    """
+    try:
+        with reading(where, expected):
+            return read()
+    except RecordingError as error:
+        return RecordingError(str(error), reason=reason or error.reason)
 
 
 class McapFile(McapReader):

@@ -13,6 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -24,6 +25,7 @@ from voodoo.errors import RecordingError, reading
 from voodoo.recordings import realsense
 from voodoo.recordings.bag_files import BagFile, BagFolder, bag_file
 from voodoo.recordings.left_out import LeftOut, leave_out
+from voodoo.recordings.mcap_file import or_error
 from voodoo.recordings.ros_messages import Message, frame_of
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
@@ -333,13 +335,13 @@ class Bag:
     def _message(self, connection: Connection, data: bytes | RecordingError) -> Message | RecordingError:
         if isinstance(data, RecordingError):
             return self._named(data)
-        try:
-            with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
-                if self.realsense and connection.topic.endswith("/image/data"):
-                    data = data[: -realsense.EXTRA_BYTES]
-                return self._types.deserialize(data, connection.msgtype)
-        except RecordingError as error:
-            return error
+        if self.realsense and connection.topic.endswith("/image/data"):
+            data = data[: -realsense.EXTRA_BYTES]
+        read, where = (
+            partial(self._types.deserialize, data, connection.msgtype),
+            f"{self.path}, topic {connection.topic}",
+        )
+        return or_error(read, where, f"a {connection.msgtype} message")
 
 
 class _Stopped(RecordingError):

@@ -38,12 +38,11 @@ _TYPES: dict[TopicKind, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class TopicSource:
-    """A topic that is read: kind, message type, number of messages, and from its first message the frame id, the
+    """A topic that is read: kind, number of messages, and from its first message the frame id, the
     stamp [s] and a description of the format. `camera` and the topic it came from are set for images."""
 
     topic: str
     kind: TopicKind
-    type: str
     messages: int
     frame: str
     first_stamp: float
@@ -219,7 +218,7 @@ class TopicFinder:
             else:
                 detail = f"scan of {len(message.ranges)} rays"
             stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), self.bag.frame_of(name, message)
-        return TopicSource(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
+        return TopicSource(name, kind, topic.messages, frame, stamp, detail, camera, info_topic)
 
     def _calibration(self, name: str, kind: TopicKind, frame: str) -> tuple[str, Camera]:
         """CameraInfo beside the image (its name with the last part replaced), or the one chosen for depth."""

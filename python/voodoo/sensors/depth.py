@@ -125,9 +125,3 @@ def _window(depth: DepthImage, box: tuple[FloatArray, FloatArray]) -> tuple[slic
     low, high = pixels.min(axis=0) - _BOX_MARGIN_PX, pixels.max(axis=0) + _BOX_MARGIN_PX
     (left, top), (right, bottom) = np.clip([low, high], 0, depth.image.shape[::-1]).astype(int)
     return slice(top, bottom), slice(left, right), near, far
-
-
-def meters(depth: DepthImage) -> FloatArray:
-    """Depths (height, width) [m], NaN where there is no return."""
-    z = depth.image.astype(np.float64) * depth.meters_per_unit
-    return np.asarray(np.where(z > 0.0, z, np.nan))

@@ -11,7 +11,7 @@ import numpy as np
 from voodoo.errors import MeasurementError
 from voodoo.measurements import DepthImage, FloatArray
 from voodoo.model.projection import CameraView
-from voodoo.sensors.depth import depth_points, meters
+from voodoo.sensors.depth import depth_points
 from voodoo.sensors.silhouettes.masks import Mask, filled, known_place, without_specks
 
 _STEP = 0.03
@@ -38,7 +38,7 @@ class StillScene:
         """
         if not images or len({image.image.shape for image in images}) != 1:
             raise MeasurementError(f"images: expected some of one size, found {len(images)}")
-        depths = np.sort(np.stack([meters(image) for image in images]), axis=0)  # NaN comes last
+        depths = np.sort(np.stack([image.meters() for image in images]), axis=0)  # NaN comes last
         last = np.isfinite(depths).sum(axis=0)[None] - 1
         # The second-farthest depth, since the farthest may be an outlier; then the median of all depths near it.
         deep = np.take_along_axis(depths, np.maximum(last - 1, 0), axis=0)
@@ -83,7 +83,7 @@ def from_depth(
     points, valid = depth_points(depth)
     solid = valid.copy()
     solid[valid] = points[:, 2] > _FLOOR_M if level else True
-    z = np.where(solid.reshape(height, width), meters(depth), np.nan)
+    z = np.where(solid.reshape(height, width), depth.meters(), np.nan)
     view = CameraView(depth.camera, depth.root_from_sensor)
     seeds = []
     for place in places.values():
