@@ -7,17 +7,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
+from voodoo.measurements import DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PeopleTruth
+
+M = TypeVar("M", bound=Measurement)
 
 
 class Start(TypedDict, total=False):
@@ -254,8 +256,8 @@ def refuse_blank(item: DepthImage, where: object) -> None:
         )
 
 
-def usable(make: Callable[[], DepthImage], number: int, where: object, left_out: LeftOut | None) -> DepthImage | None:
-    """A depth image by its number; of a damaged recording, in which also blank ones are left out, None for one that is.
+def usable(make: Callable[[], M], number: int, where: object, left_out: LeftOut | None) -> M | None:
+    """A measurement by its number; of a damaged recording, in which also blank depth images are left out, None for one that is.
 
     Raises:
         RecordingError: without `left_out`, that of `make`.
@@ -263,7 +265,8 @@ def usable(make: Callable[[], DepthImage], number: int, where: object, left_out:
     with leaving_out(left_out):
         item = make()
         if left_out is not None:
-            refuse_blank(item, where)
+            if isinstance(item, DepthImage):
+                refuse_blank(item, where)
             left_out.numbers[item.sensor, item.stamp] = number
         return item
     return None

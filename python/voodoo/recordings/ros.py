@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading
-from voodoo.measurements import DepthImage, FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import FloatArray, Measurement, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, refuse_blank
+from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
@@ -94,10 +94,9 @@ class RosRecording(Recording):
         scale = number_option(path, "meters_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
-        given = (
-            None if unpacked_gb is None else number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
-        )
-        self._bag = Bag(path, left_out=left_out, unpacked=None if given is None else int(given * 1e9))
+        if unpacked_gb is not None:
+            unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
+        self._bag = Bag(path, left_out=left_out, unpacked=None if unpacked_gb is None else int(unpacked_gb * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices = dict(zip(TOPIC_KINDS, (depth_topic, points_topic, scan_topic, color_topic), strict=True))
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
@@ -120,7 +119,12 @@ class RosRecording(Recording):
         if not bare:
             find, first = partial(find_beside, place), self._driver.first_stamp
             read_beside(self, find, root=self._own_root, first=first, left_out=left_out)
-        self._scene = EmptyScene(place, background, self._names_of_cameras())
+        names = {
+            s.topic: (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame"))
+            for s in self._sources.values()
+            if s.kind == "color"
+        }
+        self._scene = EmptyScene(place, background, names)
 
     def __len__(self) -> int:
         """Number of messages on the topic that defines the frames."""
@@ -142,15 +146,13 @@ class RosRecording(Recording):
                     self._check_calibration(topic, message)
                 continue
             numbers[topic] += 1
-            measured = None
-            with leaving_out(self._left_out):
-                measured = None if message is None else self._measured(topic, message, last, clock)
-            if measured is None:
-                continue
-            if self._left_out is not None:
-                self._left_out.numbers[topic, measured.stamp] = numbers[topic]
-                self._left_out.notes |= dict.fromkeys(clock.words)
-            yield measured
+            make = partial(self._measured, topic, message, last, clock)
+            where = f"{self.path}, topic {topic}"
+            if message is not None and (item := usable(make, numbers[topic], where, self._left_out)):
+                last[topic] = item.stamp
+                if self._left_out is not None:
+                    self._left_out.notes |= dict.fromkeys(clock.words)
+                yield item
 
     def _measured(self, topic: str, message: Message, last: dict[str, float], clock: SetBack) -> Measurement:
         """The measurement of a message that is not older than the `last` of its topic."""
@@ -168,11 +170,7 @@ class RosRecording(Recording):
             source = self._sources[topic]
             pose = self._tree.lookup(self.root_frame, self._bag.frame_of(topic, message), stamp)
             sensed = Sensed(topic, stamp, pose, source.camera, (self._units[topic], self._float_unit))
-            measured = sensed.of(source.kind, message, f"{where}, stamp {stamp:.6f}")
-            if self._left_out is not None and isinstance(measured, DepthImage):
-                refuse_blank(measured, where)
-        last[topic] = stamp
-        return measured
+            return sensed.of(source.kind, message, f"{where}, stamp {stamp:.6f}")
 
     def info(self) -> RecordingInfo:
         """Summarize; reads the first and last message of every topic in use, once."""
@@ -181,23 +179,18 @@ class RosRecording(Recording):
 
     @cached_property
     def _summary(self) -> RecordingInfo:
-        sensors = []
-        duration = 0.0
+        sensors, stamps = [], {}
         for source in self._sources.values():
-            where = f"{self.path}, topic {source.topic}"
+            where, count = f"{self.path}, topic {source.topic}", source.messages
             last = self._bag.last(source.topic)
             with reading(where, "a readable message"):
-                span = stamp_of(last, where) - source.first_stamp
-            if source is self._driver:
-                duration = span
-            count = source.messages
-            sensors.append(
-                SensorInfo(source.topic, source.kind, source.frame, count, mean_rate(count, span), source.detail)
-            )
+                stamps[source.topic] = first, end = source.first_stamp, stamp_of(last, where)
+            rate = mean_rate(count, end - first)
+            sensors.append(SensorInfo(source.topic, source.kind, source.frame, count, rate, source.detail))
         return self._described(
             self.loader,
             sensors,
-            (self._driver.first_stamp, self._driver.first_stamp + duration),
+            stamps[self._driver.topic],
             unused=tuple(self._unused),
             notes=(*self.assumed, *self._scene.words),
         )
@@ -260,14 +253,6 @@ class RosRecording(Recording):
         left = [topic for topic, _ in self._unused]
         if left:
             self.assumed = (*self.assumed, f"not used: {', '.join(left)}; voodoo info says why")
-
-    def _names_of_cameras(self) -> dict[str, tuple[str, ...]]:
-        """Topic -> possible names of images of its empty scene."""
-        return {
-            s.topic: (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame"))
-            for s in self._sources.values()
-            if s.kind == "color"
-        }
 
     def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
         """See Recording."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import cv2
@@ -32,6 +32,7 @@ _PADDING_PX = 16
 """Video codecs crop or pad images at the right and bottom to a multiple of 16 pixels, or leave that to the player."""
 
 
+@dataclass(frozen=True, eq=False)
 class Pictures:
     """The images of one calibrated camera.
 
@@ -43,35 +44,33 @@ class Pictures:
         reader: makes a function that returns the image with a number; sequential access is fastest. It raises a RecordingError
             for a damaged one.
 
-    Attributes:
-        camera: calibration for the size of the images.
-
     Raises:
         RecordingError: the size of the images differs from the calibration.
     """
 
-    def __init__(
-        self,
-        sensor: str,
-        placed: PlacedCamera,
-        size: tuple[int, int],
-        stamps: Sequence[float],
-        reader: Callable[[], Callable[[int], ByteImage]],
-    ) -> None:
+    sensor: str
+    placed: PlacedCamera
+    size: tuple[int, int]
+    stamps: Sequence[float]
+    reader: Callable[[], Callable[[int], ByteImage]]
+
+    def __post_init__(self) -> None:
         """Check the size."""
-        calibrated = (placed.camera.width, placed.camera.height)
-        if max(abs(a - b) for a, b in zip(size, calibrated, strict=True)) >= _PADDING_PX:
+        (width, height), (wide, high) = self.size, (self.placed.camera.width, self.placed.camera.height)
+        if max(abs(width - wide), abs(height - high)) >= _PADDING_PX:
             raise RecordingError(
-                f"{sensor}: expected {calibrated[0]}x{calibrated[1]} px, as {placed.name} is calibrated, found "
-                f"{size[0]}x{size[1]}",
+                f"{self.sensor}: expected {wide}x{high} px, as {self.placed.name} is calibrated, found {width}x{height}",
                 reason="of another size than calibrated",
             )
-        self.sensor, self.placed, self.stamps, self._reader = sensor, placed, stamps, reader
-        self.camera: Camera = replace(placed.camera, width=size[0], height=size[1])
+
+    @cached_property
+    def camera(self) -> Camera:
+        """Calibration for the size of the images."""
+        return replace(self.placed.camera, width=self.size[0], height=self.size[1])
 
     def __iter__(self) -> Iterator[ColorImage]:
         """The images, each decoded on access."""
-        picture = self._reader()
+        picture = self.reader()
         for index, stamp in enumerate(self.stamps):
             yield ColorImage(
                 self.sensor, stamp, partial(picture, index), self.camera, np.array(self.placed.world_from_sensor)
