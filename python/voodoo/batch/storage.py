@@ -79,10 +79,7 @@ def _remote(url: str, only: Sequence[str]) -> list[str]:
 
     files, path = filesystem(url)
     with reading(url, "recordings"):
-        if "*" in path:
-            tops = sorted(files.glob(path))
-        else:
-            tops = [path.rstrip("/")]
+        tops = sorted(files.glob(path)) if "*" in path else [path.rstrip("/")]
         found: list[str] = []
         for top in tops:
             found += _in_folder(files, top) if files.isdir(top) else [top] if files.exists(top) else []
@@ -181,11 +178,8 @@ class Store:
         """
         files, top = self._at
         with reading(f"{self.url}/{name}", "a readable file", error=VoodooError):
-            return (
-                files.cat_file(f"{top}/{name}").decode("utf-8", errors="replace")
-                if files.exists(f"{top}/{name}")
-                else None
-            )
+            place = f"{top}/{name}"
+            return files.cat_file(place).decode("utf-8", errors="replace") if files.exists(place) else None
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file atomically.

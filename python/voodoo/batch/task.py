@@ -68,12 +68,9 @@ def encode(parts: Sequence[Columns], note: Mapping[str, Any]) -> bytes:
     pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
 
     def array(column: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - it has no types
-        words = column.dtype.kind == "U"
-        return (
-            pa.array([value or None for value in column.tolist()], pa.string())
-            if words
-            else pa.array(column, from_pandas=True)
-        )
+        if column.dtype.kind == "U":
+            return pa.array([value or None for value in column.tolist()], pa.string())
+        return pa.array(column, from_pandas=True)
 
     tables = [pa.table({name: array(column) for name, column in part.items()}) for part in parts or ({},)]
     table = pa.concat_tables(tables, promote_options="default").combine_chunks()

@@ -152,9 +152,8 @@ class Track:
             right = np.where(self.found.reshape(-1, *[1] * (array.ndim - 1)), right, np.isnan(array))
         if not right.all():
             where = tuple(int(index) for index in np.argwhere(~right)[0])
-            what = (
-                "NaN while searching" if self.status[where[0]] == SEARCHING and name != "stamps" else "finite numbers"
-            )
+            away = self.status[where[0]] == SEARCHING and name != "stamps"
+            what = "NaN while searching" if away else "finite numbers"
             raise VoodooError(f"{name}: expected {what}, found {array[where]} in frame {where[0]}")
 
     @property

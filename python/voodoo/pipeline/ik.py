@@ -15,7 +15,7 @@ from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette
 from voodoo.ik.solve import Follower, Posture, solve
 from voodoo.ik.values import Options
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
 from voodoo.sensors.silhouettes.color import StillBackground
@@ -197,7 +197,7 @@ def _scenes(
     """Background image of each camera, from images spread over the recording; cameras are assumed to be static."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
     depths: dict[str, list[DepthImage]] = {}
-    colors: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}
+    colors: dict[str, list[tuple[ByteImage, npt.NDArray[np.bool_]]]] = {}
     for index, recorded in enumerate(recording):
         if index not in chosen:
             continue

@@ -9,11 +9,8 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from voodoo.errors import RecordingError
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
 from voodoo.recordings.keypoint_check import check_keypoints, check_on_depth, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
@@ -43,7 +40,7 @@ class Around(Recording):
         """See Recording."""
         return self._recording.root_from(frame, stamp)
 
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+    def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """See Recording."""
         return self._recording.empty_scene()
 
@@ -98,7 +95,7 @@ class Joined(Around):
             # The measurement that defines the frame stays last.
             yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
 
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+    def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Images of the empty scene of all recordings."""
         return {
             name: observed for one in (*self._others, self._recording) for name, observed in one.empty_scene().items()

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import TypedDict, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import DepthImage, FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
 from voodoo.recordings.left_out import LeftOut, leaving_out
@@ -167,7 +166,7 @@ class Recording(ABC):
     people: PeopleTruth | None = None
     complete: bool = False
 
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+    def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Sensor -> images (H, W, 3) BGR uint8 of the empty scene; {}: there are none.
 
         Raises:

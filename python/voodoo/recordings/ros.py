@@ -8,11 +8,8 @@ from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from voodoo.errors import RecordingError, reading
-from voodoo.measurements import FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, FloatArray, Measurement, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
@@ -254,7 +251,7 @@ class RosRecording(Recording):
         if left:
             self.assumed = (*self.assumed, f"not used: {', '.join(left)}; voodoo info says why")
 
-    def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+    def empty_scene(self) -> dict[str, tuple[ByteImage, ...]]:
         """See Recording."""
         cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
         return self._scene.read(cameras, left_out=self._left_out)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import CameraError, RecordingError, naming, reading
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
 from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png, decode_rvl
 
@@ -156,7 +156,7 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
     return image
 
 
-def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+def _raw_color(message: Message, camera: Camera, source: str) -> ByteImage:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image.
 
     Raises:
@@ -170,7 +170,7 @@ def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.
     return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
 
 
-def color_image(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+def color_image(message: Message, camera: Camera, source: str) -> ByteImage:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image, or of a JPEG or PNG sensor_msgs/CompressedImage.
 
     Raises:
@@ -269,7 +269,7 @@ class Sensed:
         return DepthImage(self.topic, self.stamp, image, unit, self.camera, self.pose)
 
 
-def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:
+def _rows(message: Message, pixel_bytes: int, source: str) -> ByteImage:
     """(H, W * pixel_bytes) bytes without the padding at the end of the rows."""
     height, width, step = int(message.height), int(message.width), int(message.step)
     expected = width * pixel_bytes

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading, utf8_name
 from voodoo.measurements import ByteImage, ColorImage, RecordedFrame
@@ -252,7 +251,7 @@ class VideosRecording(Recording):
         pictures = heapq.merge(*self._cameras, key=lambda item: item.stamp)
         return together(pictures, self._cameras[0].sensor)
 
-    def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+    def empty_scene(self) -> dict[str, tuple[ByteImage, ...]]:
         """See Recording."""
         cameras = {one.sensor: one.camera for one in self._cameras}
         return self._scene.read(cameras, left_out=self._left_out)

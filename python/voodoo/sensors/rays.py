@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Frame
@@ -19,9 +18,7 @@ _MOVED_M = 1e-4
 SiteRay = _core.SiteRay
 
 
-def agreed(
-    rays: Sequence[SiteRay], *, predicted: Mapping[str, npt.NDArray[np.float64]], scale: float = 0.08
-) -> list[SiteRay]:
+def agreed(rays: Sequence[SiteRay], *, predicted: Mapping[str, FloatArray], scale: float = 0.08) -> list[SiteRay]:
     """Returns the rays with a trust that measures how well those of one site agree.
 
     With three rays or more to a site, its position is found by reweighted least squares from the predicted position;

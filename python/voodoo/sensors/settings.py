@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import ByteImage
+from voodoo.measurements import ByteImage, FloatArray
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
@@ -125,7 +125,7 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
     return tuple(kind for kind in inputs() if kind != "skin")
 
 
-def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
+def within_boxes(places: FloatArray, boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
     """Which positions (N, 3) [m] lie in one of the boxes."""
     inside = np.zeros(len(places), dtype=bool)
     for low, high in boxes:

@@ -101,7 +101,7 @@ def site_pixels(
     return observed, [part.site for part, of in zip(parts, found, strict=True) if of is None]
 
 
-def checked_rows(keypoints: npt.ArrayLike, layout: str) -> npt.NDArray[np.float64]:
+def checked_rows(keypoints: npt.ArrayLike, layout: str) -> FloatArray:
     """Keypoints (K, 3) of a layout, contiguous.
 
     Raises:
@@ -140,13 +140,13 @@ def check_confidence(least: object) -> None:
 
 
 def nearest_person(
-    people: Sequence[npt.NDArray[np.float64]],
+    people: Sequence[FloatArray],
     *,
     layout: str,
     camera: Camera,
     world_from_sensor: npt.ArrayLike,
-    predicted: Mapping[str, npt.NDArray[np.float64]],
-) -> npt.NDArray[np.float64] | None:
+    predicted: Mapping[str, FloatArray],
+) -> FloatArray | None:
     """The person (K, 3) whose keypoints lie nearest to the predicted sites in the image, by the median distance; None
     if none.
 
@@ -182,9 +182,7 @@ class AssignedKeypoints:
     rest: KeypointImage
 
 
-def assign_keypoints(
-    item: KeypointImage, predicted: Mapping[int, Mapping[str, npt.NDArray[np.float64]]]
-) -> AssignedKeypoints:
+def assign_keypoints(item: KeypointImage, predicted: Mapping[int, Mapping[str, FloatArray]]) -> AssignedKeypoints:
     """Assign the keypoints of an image to persons jointly, by the distances of their rays from the predicted sites.
 
     Args:
@@ -205,7 +203,7 @@ def assign_keypoints(
     return AssignedKeypoints(of, replace(item, people=rest))
 
 
-def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, npt.NDArray[np.float64]]) -> float:
+def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, FloatArray]) -> float:
     """Median distance [m] of the rays of keypoints from the predicted sites; infinite with too few keypoints."""
     observed = [site for site in site_pixels(rows, layout=item.layout)[0] if site.site in predicted]
     if len(observed) < _FEWEST:
@@ -280,7 +278,7 @@ class KeypointSensor:
         frame: Frame,
         keypoints: npt.ArrayLike,
         *,
-        predicted: Mapping[str, npt.NDArray[np.float64]],
+        predicted: Mapping[str, FloatArray],
         gate: SiteGate | None = None,
         depth: DepthArray | None = None,
         meters_per_unit: float = 0.001,
@@ -308,7 +306,7 @@ class KeypointSensor:
         keypoints: npt.ArrayLike,
         *,
         stamp: float,
-        predicted: Mapping[str, npt.NDArray[np.float64]],
+        predicted: Mapping[str, FloatArray],
         gate: SiteGate | None = None,
         depth: DepthArray | None = None,
         meters_per_unit: float = 0.001,

@@ -9,15 +9,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import ConfigError, MeasurementError, RecordingError
-from voodoo.measurements import ColorImage, KeypointImage, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, KeypointImage, Measurement, RecordedFrame
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.keypoints.sites import checked_rows
 
-Detect: TypeAlias = Callable[[npt.NDArray[np.uint8]], Iterable[npt.ArrayLike]]
+Detect: TypeAlias = Callable[[ByteImage], Iterable[npt.ArrayLike]]
 """Takes an image (H, W, 3) BGR uint8; returns one array (K, 3) of (u, v, confidence) for each person: pixels, the center of the
 first one is (0, 0), and a number from 0 to 1; rows of zeros were not detected."""
 NETWORKS = {"mediapipe": "MediaPipe", "rtmpose": "RtmPose"}
