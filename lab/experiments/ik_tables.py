@@ -24,7 +24,7 @@ import voodoo
 from voodoo import ik
 from voodoo.model.projection import CameraView, body_mask
 from voodoo.recordings import DepthImage
-from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.still import StillScene, from_depth
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
 SIDE_CAMERA = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)

@@ -18,10 +18,9 @@ from voodoo.ik.values import Options
 from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
-from voodoo.sensors.silhouettes.color import StillBackground
-from voodoo.sensors.silhouettes.depth import StillScene, from_depth
 from voodoo.sensors.silhouettes.masks import surroundings
 from voodoo.sensors.silhouettes.regions import RegionSilhouettes
+from voodoo.sensors.silhouettes.still import StillBackground, StillScene, from_depth
 from voodoo.tracker import Tracker
 
 Pictures: TypeAlias = Literal["depth", "color", "regions", "none"]

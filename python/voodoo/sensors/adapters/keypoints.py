@@ -70,8 +70,8 @@ class KeypointsAdapter(Adapter[KeypointImage]):
 
     def shares(self, item: KeypointImage, persons: Mapping[int, Context]) -> Mapping[int, KeypointImage]:
         """The detected people are assigned to the persons jointly."""
-        assigned = assign_keypoints(item, {number: context.predicted for number, context in persons.items()})
-        return {**assigned.of, NOBODY: assigned.rest}
+        of, rest = assign_keypoints(item, {number: context.predicted for number, context in persons.items()})
+        return {**of, NOBODY: rest}
 
     def forget(self, memory: Memory) -> None:
         """Nobody's keypoints are used."""

@@ -169,25 +169,17 @@ WRONG_M = 0.3
 _FEWEST = 4
 
 
-@dataclass(frozen=True, eq=False)
-class AssignedKeypoints:
-    """The keypoints of one image by person.
-
-    Args:
-        of: id of a person -> the image with only that person's keypoints.
-        rest: the image with the keypoints that were assigned to no person.
-    """
-
-    of: Mapping[int, KeypointImage]
-    rest: KeypointImage
-
-
-def assign_keypoints(item: KeypointImage, predicted: Mapping[int, Mapping[str, FloatArray]]) -> AssignedKeypoints:
+def assign_keypoints(
+    item: KeypointImage, predicted: Mapping[int, Mapping[str, FloatArray]]
+) -> tuple[dict[int, KeypointImage], KeypointImage]:
     """Assign the keypoints of an image to persons jointly, by the distances of their rays from the predicted sites.
 
     Args:
         item: the image.
         predicted: id of a person -> site -> predicted position (3,) [m], root frame.
+
+    Returns:
+        Id of a person -> the image with only that person's keypoints, and the image with those of no person.
     """
     numbers = list(predicted)
     costs = np.array([[_away(item, rows, predicted[number]) for rows in item.people] for number in numbers])
@@ -200,7 +192,7 @@ def assign_keypoints(item: KeypointImage, predicted: Mapping[int, Mapping[str, F
                 of[numbers[row]] = replace(item, people=(item.people[column],))
                 taken.add(column)
     rest = tuple(rows for index, rows in enumerate(item.people) if index not in taken)
-    return AssignedKeypoints(of, replace(item, people=rest))
+    return of, replace(item, people=rest)
 
 
 def _away(item: KeypointImage, rows: FloatArray, predicted: Mapping[str, FloatArray]) -> float:
