@@ -188,20 +188,18 @@ def cloud_points(message: Message, source: str) -> FloatArray:
     Raises:
         RecordingError: no x, y, z, an unknown field type, or inconsistent sizes.
     """
-    fields = {field.name: field for field in message.fields}
-    missing = [name for name in "xyz" if name not in fields]
-    if missing:
-        raise RecordingError(f"{source}: expected fields x, y, z, found {sorted(fields)}")
-    order = ">" if message.is_bigendian else "<"
+    fields = {field.name: (field.datatype, field.offset) for field in message.fields if field.name in ("x", "y", "z")}
     height, width, step = int(message.height), int(message.width), int(message.point_step)
-    formats = []
-    for name in "xyz":
-        code = _POINT_FIELDS.get(fields[name].datatype)
-        if code is None:
-            raise RecordingError(f"{source}: field {name}: expected datatype 1 to 8, found {fields[name].datatype}")
-        formats.append(np.dtype(order + code))
-        if fields[name].offset + formats[-1].itemsize > step:
-            raise RecordingError(f"{source}: field {name} at {fields[name].offset} leaves the point of {step} bytes")
+    order = ">" if message.is_bigendian else "<"
+    try:
+        formats, offsets = (
+            [order + _POINT_FIELDS[fields[name][0]] for name in "xyz"],
+            [fields[name][1] for name in "xyz"],
+        )
+        layout = np.dtype({"names": list("xyz"), "formats": formats, "offsets": offsets, "itemsize": step})
+    except (KeyError, ValueError, OverflowError):
+        expected = f"fields x, y, z of datatype 1 to 8, none of which leaves the point of {step} bytes"
+        raise RecordingError(f"{source}: expected {expected}, found {fields} as (datatype, offset)") from None
     if height * width == 0:
         return np.empty((0, 3))
     row_step = int(message.row_step) or width * step
@@ -210,9 +208,6 @@ def cloud_points(message: Message, source: str) -> FloatArray:
             f"{source}: expected {height} rows of {width} points of {step} bytes, found {len(message.data)} bytes "
             f"in rows of {row_step}"
         )
-    layout = np.dtype(
-        {"names": list("xyz"), "formats": formats, "offsets": [fields[n].offset for n in "xyz"], "itemsize": step}
-    )
     view = np.ndarray((height, width), layout, buffer=message.data.tobytes(), strides=(row_step, step))
     points = np.stack([view[name].astype(np.float64).ravel() for name in "xyz"], axis=1)
     kept: FloatArray = points[np.isfinite(points).all(axis=1)]

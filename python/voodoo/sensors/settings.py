@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -135,8 +134,8 @@ def within_boxes(places: FloatArray, boxes: Sequence[Box]) -> npt.NDArray[np.boo
 
 def _check_box(box: Box) -> None:
     """Raise an error for a box that excludes nothing."""
-    low, high = box
-    if not all(math.isfinite(value) for value in (*low, *high)) or not all(
-        a < b for a, b in zip(low, high, strict=True)
-    ):
-        raise MeasurementError(f"exclude: expected two corners in meters, the lower one first, found {low} and {high}")
+    low, high = corners = np.array(box, dtype=np.float64)
+    if not np.isfinite(corners).all() or not (low < high).all():
+        raise MeasurementError(
+            f"exclude: expected two corners in meters, the lower one first, found {box[0]} and {box[1]}"
+        )
