@@ -200,7 +200,7 @@ class MadeUpRecording(Recording):
             SensorInfo(name, kind, "camera_optical_frame", len(self), rate, f"{size} {words}")
             for name, kind, words in kinds
         )
-        return self._described("synthetic", sensors, (0.0, float(self._stamps[-1])))
+        return self._described("synthetic", sensors, stamps=(0.0, float(self._stamps[-1])))
 
 
 def paint(label: npt.NDArray[np.uint8], people: Sequence[Walker], seed: tuple[int, int]) -> npt.NDArray[np.uint8]:

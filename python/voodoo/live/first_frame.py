@@ -36,11 +36,11 @@ class FirstFrame(Recording):
 
     def info(self) -> RecordingInfo:
         """The sensors with measurements."""
-        stamps = [self._frame.stamp]
+        stamp = self._frame.stamp
         sensors = [
-            SensorInfo.of(name, kind, self.root_frame, stamps, "live") for name, kind in self._live.kinds.items()
+            SensorInfo.of(name, kind, self.root_frame, [stamp], "live") for name, kind in self._live.kinds.items()
         ]
-        return self._described("live", sensors, stamps)
+        return self._described("live", sensors, stamps=(stamp, stamp))
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""

@@ -87,10 +87,11 @@ class AzureKinectRecording(Recording):
                 mode = tags.get("K4A_COLOR_MODE", "").removeprefix("MJPG_")
                 self._color = _camera(path, cameras, _COLOR, mode)
                 self._depth_from_color = np.linalg.inv(_pose(path, cameras, _COLOR)).astype(np.float64)
-            self._stamps: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
+            self._times: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
+            self._stamps = self._times["depth"]
             for sensor, stamp, _ in self._packets(film):
-                self._stamps[sensor].append(stamp)
-        if not self._stamps["depth"]:
+                self._times[sensor].append(stamp)
+        if not self._stamps:
             raise RecordingError(f"{path}: expected depth images, found none")
 
     def _packets(self, film: Any) -> Iterator[tuple[str, float, Any]]:  # noqa: ANN401 - PyAV
@@ -99,10 +100,6 @@ class AzureKinectRecording(Recording):
             if packet.size and packet.pts is not None:
                 stamp = float(packet.pts * packet.time_base) + self._offset
                 yield self._tracks[packet.stream.index], stamp, packet
-
-    def __len__(self) -> int:
-        """Number of depth images."""
-        return len(self._stamps["depth"])
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
@@ -132,11 +129,11 @@ class AzureKinectRecording(Recording):
     def info(self) -> RecordingInfo:
         """Summarize from tracks and calibration."""
         sensors = []
-        for sensor, stamps in self._stamps.items():
+        for sensor, stamps in self._times.items():
             camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
             detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
             sensors.append(SensorInfo.of(sensor, sensor, frame, stamps, detail))
-        return self._described("azure-kinect", sensors, self._stamps["depth"], unused=self._unused)
+        return self._described("azure-kinect", sensors, unused=self._unused)
 
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV

@@ -100,6 +100,7 @@ class FolderRecording(Recording):
         self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)
         if not self._depth:
             raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
+        self._stamps = [stamp for stamp, _ in self._depth]
         file = path / "calibration.toml" if calibration is None else Path(calibration)
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
@@ -113,10 +114,6 @@ class FolderRecording(Recording):
             else:
                 self._color = _listing(path, "rgb", _PICTURES, clock, left_out, set_back)
         self.assumed = (*clock.notes, *set_back.words)
-
-    def __len__(self) -> int:
-        """Number of depth images."""
-        return len(self._depth)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
@@ -134,8 +131,7 @@ class FolderRecording(Recording):
         sensors = [_sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)]
         if self._color and self._calibration.color is not None:
             sensors.append(_sensor("color", "pictures", self._color, self._calibration.color))
-        stamps = [stamp for stamp, _ in self._depth]
-        return self._described("folder", sensors, stamps, unused=self._unused, notes=self.assumed)
+        return self._described("folder", sensors, unused=self._unused, notes=self.assumed)
 
 
 class FrameClock:

@@ -148,10 +148,6 @@ class MarkerRecording(Recording):
         words = f"{self._up} of the file is taken for up, but the body stands along its {likely}"
         return (f"{self.path.name}: {words}; if that is up, {remedy}",)
 
-    def __len__(self) -> int:
-        """Number of instants."""
-        return len(self._stamps)
-
     def __iter__(self) -> Iterator[RecordedFrame]:
         """The markers, instant by instant.
 
@@ -169,4 +165,4 @@ class MarkerRecording(Recording):
         detail = f"{len(self._sites)} markers"
         sensor = SensorInfo.of(self.path.name, "markers", FRAME, self._stamps, detail)
         notes = (f"up is {self._up} of the file", *self.assumed)
-        return self._described("markers", [sensor], self._stamps, notes=notes)
+        return self._described("markers", [sensor], notes=notes)

@@ -95,13 +95,10 @@ class Pose2SimRecording(Recording):
         self.cameras = tuple(camera for camera, _ in chosen)
         self._folders = tuple(folder for _, folder in chosen)
         self._files, self._notes = _rows_of(path, self._folders)
+        self._stamps = np.arange(len(self._files)) / self.rate
         self._check(layout)
         self.reference = None if bare else read_triangulation(path, self.rate)
         self.start = None if self.reference is None else self.reference.as_start()
-
-    def __len__(self) -> int:
-        """Number of images of each camera."""
-        return len(self._files)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Keypoints of all cameras, image by image; see Recording."""
@@ -147,16 +144,16 @@ class Pose2SimRecording(Recording):
 
     def info(self) -> RecordingInfo:
         """Summarize."""
-        stamps, detail = np.arange(len(self)) / self.rate, f"{self.layout} keypoints of"
+        detail = f"{self.layout} keypoints of"
         sensors = [
-            SensorInfo.of(one.name, "keypoints", one.name, stamps, f"{detail} {folder.relative_to(self.path)}")
+            SensorInfo.of(one.name, "keypoints", one.name, self._stamps, f"{detail} {folder.relative_to(self.path)}")
             for one, folder in zip(self.cameras, self._folders, strict=True)
         ]
         notes = (*self.assumed, *self._notes)
         if self.reference is not None:
             kind = "the same keypoints: it tests consistency, not accuracy"
             notes = (*notes, f"the reference is triangulated from {kind}")
-        return self._described("pose2sim", sensors, stamps, notes=notes)
+        return self._described("pose2sim", sensors, notes=notes)
 
 
 def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:

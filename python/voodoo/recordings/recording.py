@@ -165,6 +165,7 @@ class Recording(ABC):
     reference: Reference | None = None
     people: PeopleTruth | None = None
     complete: bool = False
+    _stamps: Sequence[float] | FloatArray
 
     def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Sensor -> images (H, W, 3) BGR uint8 of the empty scene; {}: there are none.
@@ -174,9 +175,9 @@ class Recording(ABC):
         """
         return {}
 
-    @abstractmethod
     def __len__(self) -> int:
         """Number of frames."""
+        return len(self._stamps)
 
     @abstractmethod
     def __iter__(self) -> Iterator[RecordedFrame]:
@@ -194,21 +195,21 @@ class Recording(ABC):
         self,
         loader: str,
         sensors: Iterable[SensorInfo],
-        stamps: Sequence[float] | FloatArray,
         *,
+        stamps: tuple[float, float] | None = None,
         unused: tuple[tuple[str, str], ...] = (),
         notes: tuple[str, ...] = (),
     ) -> RecordingInfo:
         """The summary, with the entries that follow from the recording itself; `stamps`: of the first and the last frame [s]."""
-        start, duration = float(stamps[0]), float(stamps[-1] - stamps[0])
+        start, end = stamps or (float(self._stamps[0]), float(self._stamps[-1]))
         return RecordingInfo(
             name=self.name,
             path=self.path,
             loader=loader,
             frames=len(self),
             start_stamp=start,
-            duration=duration,
-            rate_hz=mean_rate(len(self), duration),
+            duration=end - start,
+            rate_hz=mean_rate(len(self), end - start),
             root_frame=self.root_frame,
             sensors=tuple(sensors),
             unused=unused,

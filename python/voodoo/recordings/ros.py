@@ -187,7 +187,7 @@ class RosRecording(Recording):
         return self._described(
             self.loader,
             sensors,
-            stamps[self._driver.topic],
+            stamps=stamps[self._driver.topic],
             unused=tuple(self._unused),
             notes=(*self.assumed, *self._scene.words),
         )

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import RecordingError, reading
-from voodoo.measurements import DepthImage, RecordedFrame
+from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.recordings.recording import Recording, RecordingInfo, Reference, SensorInfo
 from voodoo.stored import read_stored
@@ -70,34 +70,23 @@ class UtdMhadRecording(Recording):
                 f"{path}: expected d_depth uint16 of shape (240, 320, N), found {depth.dtype} of {depth.shape}"
             )
         self._depth: npt.NDArray[np.uint16] = depth
+        self._stamps: FloatArray = np.arange(depth.shape[2]) / RATE_HZ
         skeleton = path.parent.parent / "Skeleton" / f"{self.name}_skeleton.mat"
         self.reference = _read_skeleton(skeleton, len(self)) if not bare and skeleton.is_file() else None
         # A body without feet has no toes.
         self.start = None if self.reference is None else self.reference.as_start(without=("_toe",))
 
-    def __len__(self) -> int:
-        """Number of depth images."""
-        return int(self._depth.shape[2])
-
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Depth images in order; see Recording."""
-        for index in range(len(self)):
+        for index, stamp in enumerate(self._stamps.tolist()):
             image = np.ascontiguousarray(self._depth[:, ::-1, index])
-            stamp = index / RATE_HZ
             yield RecordedFrame(stamp, (DepthImage("depth", stamp, image, 0.001, CAMERA, np.eye(4)),))
 
     def info(self) -> RecordingInfo:
         """Summarize."""
-        stamps = np.arange(len(self)) / RATE_HZ
-        return self._described(
-            "utd-mhad",
-            [SensorInfo.of("depth", "depth", FRAME, stamps, "320x240 16UC1, person cut out")],
-            stamps,
-            notes=(
-                "stamps are nominal (30 Hz); the true rate may be near 19 Hz",
-                "the reference leads the depth by one or two frames",
-            ),
-        )
+        sensor = SensorInfo.of("depth", "depth", FRAME, self._stamps, "320x240 16UC1, person cut out")
+        rate = "stamps are nominal (30 Hz); the true rate may be near 19 Hz"
+        return self._described("utd-mhad", [sensor], notes=(rate, "the reference leads the depth by one or two frames"))
 
 
 def _variable(path: Path, name: str) -> npt.NDArray[Any]:

@@ -229,6 +229,7 @@ class VideosRecording(Recording):
                 self._cameras.append(of_folder(pictures_in(source), sensor, camera, clock))
             else:
                 self._cameras.append(of_video(source, sensor, camera, rate))
+        self._stamps = self._cameras[0].stamps
         self.assumed = tuple(dict.fromkeys(clock.notes))
         self._notes: tuple[str, ...] = ()
         names = {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}
@@ -241,10 +242,6 @@ class VideosRecording(Recording):
         if self.reference is not None and not self.reference.exact:
             self._notes = ("the reference is triangulated from keypoints: another tracker's opinion",)
             self.start = self.start or self.reference.as_start()
-
-    def __len__(self) -> int:
-        """Number of images of the first camera."""
-        return len(self._cameras[0].stamps)
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Images of all cameras; see Recording."""
@@ -265,7 +262,7 @@ class VideosRecording(Recording):
             for one in self._cameras
         ]
         notes = (*self.assumed, *self._notes, *self._scene.words)
-        return self._described("videos", sensors, self._cameras[0].stamps, notes=notes)
+        return self._described("videos", sensors, notes=notes)
 
 
 def picture_sources(path: Path, *, anywhere: bool = True) -> list[Path]:

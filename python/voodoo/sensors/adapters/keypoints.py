@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from voodoo._core import Frame
-from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.canvas import Canvas, same_place
 from voodoo.drawing.rerun_log import Log
-from voodoo.measurements import DepthImage, KeypointImage
+from voodoo.measurements import KeypointImage
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
 from voodoo.sensors.keypoints.sites import KeypointReport, KeypointSensor, assign_keypoints, nearest_person
@@ -46,7 +46,7 @@ class KeypointsAdapter(Adapter[KeypointImage]):
             model=chosen.model,
             min_confidence=chosen.min_confidence,
         )
-        registered = next((depth for depth in context.depth_images if _same_camera(depth, item)), None)
+        registered = next((depth for depth in context.depth_images if same_place(depth, item)), None)
         with_depth: dict[str, Any] = {}
         if registered is not None:
             with_depth = {"depth": registered.image, "meters_per_unit": registered.meters_per_unit}
@@ -91,7 +91,3 @@ class KeypointsAdapter(Adapter[KeypointImage]):
         rows = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0)]
         rings = np.column_stack([np.full((len(rows), 3), KEYPOINT), 60 + 195 * rows[:, 2].clip(0.0, 1.0)])
         log.send(f"{path}/picture/keypoints", log.rr.Points2D(rows[:, :2], radii=4.0, colors=rings.astype(np.uint8)))
-
-
-def _same_camera(depth: DepthImage, item: KeypointImage) -> bool:
-    return depth.camera == item.camera and np.allclose(depth.root_from_sensor, item.root_from_sensor, atol=1e-6)
