@@ -21,7 +21,7 @@ from voodoo.model.joint import short
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, usable
+from voodoo.recordings.recording import Recording, SensorInfo, usable
 from voodoo.recordings.together import in_turn
 
 FRAME = "depth_camera_optical_frame"
@@ -59,6 +59,8 @@ class AzureKinectRecording(Recording):
         RecordingError: PyAV is not installed, no depth track, or a calibration that is missing or damaged.
     """
 
+    loader = "azure-kinect"
+
     def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
         """Read the tracks, the calibration and the stamps; see the class."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
@@ -78,7 +80,6 @@ class AzureKinectRecording(Recording):
             cameras = _calibration(path, film)
             self._offset = int(tags.get("K4A_START_OFFSET_NS", 0)) * 1e-9
             self._tracks = {tracks["DEPTH"][0]: "depth"}
-            self._unused: tuple[tuple[str, str], ...] = ()
             self._camera = _camera(path, cameras, _DEPTH, tags["K4A_DEPTH_MODE"])
             if "COLOR" in tracks and tracks["COLOR"][1] != "mjpeg":
                 self._unused = (("color", f"{tracks['COLOR'][1]}, expected MJPG"),)
@@ -126,14 +127,11 @@ class AzureKinectRecording(Recording):
         image = np.frombuffer(content, dtype=">u2").reshape(size).astype(np.uint16)
         return DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
 
-    def info(self) -> RecordingInfo:
-        """Summarize from tracks and calibration."""
-        sensors = []
+    def _sensors(self) -> Iterator[SensorInfo]:
         for sensor, stamps in self._times.items():
             camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
             detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
-            sensors.append(SensorInfo.of(sensor, sensor, frame, stamps, detail))
-        return self._described("azure-kinect", sensors, unused=self._unused)
+            yield SensorInfo.of(sensor, sensor, frame, stamps, detail)
 
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV

@@ -17,7 +17,7 @@ from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option, usable
+from voodoo.recordings.recording import Recording, SensorInfo, number_option, usable
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_beside
@@ -78,6 +78,8 @@ class FolderRecording(Recording):
         RecordingError: no images, no calibration, names that are not stamps, or stamps that do not increase.
     """
 
+    loader = "folder"
+
     def __init__(
         self,
         path: Path,
@@ -107,7 +109,6 @@ class FolderRecording(Recording):
         if not bare:
             read_beside(self, lambda name: path / name if (path / name).is_file() else None, root=self.root_frame)
         self._color: list[tuple[float, Path]] = []
-        self._unused: tuple[tuple[str, str], ...] = ()
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
             if self._calibration.color is None:
                 self._unused = (("rgb", "no [color] table in the calibration file"),)
@@ -126,12 +127,10 @@ class FolderRecording(Recording):
         )
         return in_turn(heapq.merge(colors, depths, key=lambda item: item.stamp), "depth")
 
-    def info(self) -> RecordingInfo:
-        """Summarize from names and calibration."""
-        sensors = [_sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)]
+    def _sensors(self) -> Iterator[SensorInfo]:
+        yield _sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)
         if self._color and self._calibration.color is not None:
-            sensors.append(_sensor("color", "pictures", self._color, self._calibration.color))
-        return self._described("folder", sensors, unused=self._unused, notes=self.assumed)
+            yield _sensor("color", "pictures", self._color, self._calibration.color)
 
 
 class FrameClock:

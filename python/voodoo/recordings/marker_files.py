@@ -17,7 +17,7 @@ from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
 from voodoo.recordings.pose2sim import SITES
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start
+from voodoo.recordings.recording import Recording, SensorInfo, Start
 
 FRAME = "world"
 _HIGH_M = 1.5
@@ -82,6 +82,8 @@ class MarkerRecording(Recording):
         RecordingError: the file is damaged.
     """
 
+    loader = "markers"
+
     def __init__(self, path: Path, markers: MarkerMap | None = None, *, bare: bool = False) -> None:
         """Read the file."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
@@ -99,6 +101,7 @@ class MarkerRecording(Recording):
             self._up, half_told = self._up_of(content)
         else:
             self._up, half_told = "+Y" if self.map.y_up else "+Z", ()
+        self._notes = (f"up is {self._up} of the file",)
         self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
         unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
@@ -160,9 +163,5 @@ class MarkerRecording(Recording):
             item = MarkerSet(self.path.name, float(stamp), self._at(index), self.map.sigma_m)
             yield RecordedFrame(float(stamp), (item,))
 
-    def info(self) -> RecordingInfo:
-        """Summarize."""
-        detail = f"{len(self._sites)} markers"
-        sensor = SensorInfo.of(self.path.name, "markers", FRAME, self._stamps, detail)
-        notes = (f"up is {self._up} of the file", *self.assumed)
-        return self._described("markers", [sensor], notes=notes)
+    def _sensors(self) -> Iterator[SensorInfo]:
+        yield SensorInfo.of(self.path.name, "markers", FRAME, self._stamps, f"{len(self._sites)} markers")

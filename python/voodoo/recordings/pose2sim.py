@@ -17,7 +17,7 @@ from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.order import in_order, matched, numbers_of
-from voodoo.recordings.recording import Recording, RecordingInfo, Reference, SensorInfo, number_option
+from voodoo.recordings.recording import Recording, Reference, SensorInfo, number_option
 
 SITES = {
     f"{side}{joint}": f"{side.lower()}_{site}"
@@ -59,6 +59,8 @@ class Pose2SimRecording(Recording):
         RecordingError: a part is missing or has another format, or keypoints and calibration do not fit.
     """
 
+    loader = "pose2sim"
+
     def __init__(
         self,
         path: Path,
@@ -98,7 +100,10 @@ class Pose2SimRecording(Recording):
         self._stamps = np.arange(len(self._files)) / self.rate
         self._check(layout)
         self.reference = None if bare else read_triangulation(path, self.rate)
-        self.start = None if self.reference is None else self.reference.as_start()
+        if self.reference is not None:
+            self.start = self.reference.as_start()
+            kind = "the same keypoints: it tests consistency, not accuracy"
+            self._notes = (*self._notes, f"the reference is triangulated from {kind}")
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Keypoints of all cameras, image by image; see Recording."""
@@ -142,18 +147,10 @@ class Pose2SimRecording(Recording):
         ]
         self.assumed = (*notes, *check_keypoints(self.path, instants))
 
-    def info(self) -> RecordingInfo:
-        """Summarize."""
-        detail = f"{self.layout} keypoints of"
-        sensors = [
-            SensorInfo.of(one.name, "keypoints", one.name, self._stamps, f"{detail} {folder.relative_to(self.path)}")
-            for one, folder in zip(self.cameras, self._folders, strict=True)
-        ]
-        notes = (*self.assumed, *self._notes)
-        if self.reference is not None:
-            kind = "the same keypoints: it tests consistency, not accuracy"
-            notes = (*notes, f"the reference is triangulated from {kind}")
-        return self._described("pose2sim", sensors, notes=notes)
+    def _sensors(self) -> Iterator[SensorInfo]:
+        for one, folder in zip(self.cameras, self._folders, strict=True):
+            detail = f"{self.layout} keypoints of {folder.relative_to(self.path)}"
+            yield SensorInfo.of(one.name, "keypoints", one.name, self._stamps, detail)
 
 
 def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:

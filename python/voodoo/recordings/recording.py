@@ -15,6 +15,7 @@ from voodoo.errors import RecordingError
 from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
+from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PeopleTruth
 
@@ -153,6 +154,7 @@ class Recording(ABC):
         start: pose of the body in the first frame, or None.
         reference: joint positions to compare with, or None.
         assumed: descriptions of assumptions that the recording does not confirm, and of unused data.
+        loader: which loader reads it.
         people: exact positions of all persons, if the recording has such a truth, or None.
         complete: whether each frame holds all measurements of its time, so that none of the next frame belongs to it.
     """
@@ -165,7 +167,12 @@ class Recording(ABC):
     reference: Reference | None = None
     people: PeopleTruth | None = None
     complete: bool = False
+    loader: str
     _stamps: Sequence[float] | FloatArray
+    _unused: Sequence[tuple[str, str]] = ()
+    _notes: tuple[str, ...] = ()
+    _scene: EmptyScene | None = None
+    _left_out: LeftOut | None = None
 
     def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Sensor -> images (H, W, 3) BGR uint8 of the empty scene; {}: there are none.
@@ -173,7 +180,7 @@ class Recording(ABC):
         Raises:
             RecordingError: a picture that cannot be read.
         """
-        return {}
+        return {} if self._scene is None else self._scene.read(left_out=self._left_out)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -187,35 +194,31 @@ class Recording(ABC):
             RecordingError: damage; the frames before it have been yielded.
         """
 
-    @abstractmethod
     def info(self) -> RecordingInfo:
         """Summarize without decoding the images."""
-
-    def _described(
-        self,
-        loader: str,
-        sensors: Iterable[SensorInfo],
-        *,
-        stamps: tuple[float, float] | None = None,
-        unused: tuple[tuple[str, str], ...] = (),
-        notes: tuple[str, ...] = (),
-    ) -> RecordingInfo:
-        """The summary, with the entries that follow from the recording itself; `stamps`: of the first and the last frame [s]."""
-        start, end = stamps or (float(self._stamps[0]), float(self._stamps[-1]))
+        start, end = self._span()
         return RecordingInfo(
             name=self.name,
             path=self.path,
-            loader=loader,
+            loader=self.loader,
             frames=len(self),
             start_stamp=start,
             duration=end - start,
             rate_hz=mean_rate(len(self), end - start),
             root_frame=self.root_frame,
-            sensors=tuple(sensors),
-            unused=unused,
+            sensors=tuple(self._sensors()),
+            unused=tuple(self._unused),
             reference=reference_words(self.reference, self.people),
-            notes=notes,
+            notes=(*self.assumed, *self._notes, *(() if self._scene is None else self._scene.words)),
         )
+
+    def _span(self) -> tuple[float, float]:
+        """Stamps of the first and the last frame [s]."""
+        return float(self._stamps[0]), float(self._stamps[-1])
+
+    def _sensors(self) -> Iterable[SensorInfo]:
+        """The sources that are yielded; the first one defines the frames."""
+        return ()
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) of a frame of the recording at a time [s].

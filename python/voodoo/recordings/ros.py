@@ -9,12 +9,12 @@ from functools import cached_property, partial
 from pathlib import Path
 
 from voodoo.errors import RecordingError, reading
-from voodoo.measurements import ByteImage, FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import FloatArray, Measurement, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, mean_rate, number_option, usable
+from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
@@ -116,12 +116,12 @@ class RosRecording(Recording):
         if not bare:
             find, first = partial(find_beside, place), self._driver.first_stamp
             read_beside(self, find, root=self._own_root, first=first, left_out=left_out)
-        names = {
-            s.topic: (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame"))
+        cameras = {
+            s.topic: (s.camera, (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame")))
             for s in self._sources.values()
-            if s.kind == "color"
+            if s.kind == "color" and s.camera is not None
         }
-        self._scene = EmptyScene(place, background, names)
+        self._scene = EmptyScene(place, background, cameras)
 
     def __len__(self) -> int:
         """Number of messages on the topic that defines the frames."""
@@ -169,28 +169,25 @@ class RosRecording(Recording):
             sensed = Sensed(topic, stamp, pose, source.camera, (self._units[topic], self._float_unit))
             return sensed.of(source.kind, message, f"{where}, stamp {stamp:.6f}")
 
-    def info(self) -> RecordingInfo:
-        """Summarize; reads the first and last message of every topic in use, once."""
-        with self._bag.kept_open():
-            return self._summary
-
     @cached_property
-    def _summary(self) -> RecordingInfo:
-        sensors, stamps = [], {}
+    def _ends(self) -> dict[str, tuple[float, float]]:
+        """Stamps of the first and the last message of every topic in use."""
+        ends = {}
+        with self._bag.kept_open():
+            for source in self._sources.values():
+                where, last = f"{self.path}, topic {source.topic}", self._bag.last(source.topic)
+                with reading(where, "a readable message"):
+                    ends[source.topic] = source.first_stamp, stamp_of(last, where)
+        return ends
+
+    def _span(self) -> tuple[float, float]:
+        return self._ends[self._driver.topic]
+
+    def _sensors(self) -> Iterator[SensorInfo]:
         for source in self._sources.values():
-            where, count = f"{self.path}, topic {source.topic}", source.messages
-            last = self._bag.last(source.topic)
-            with reading(where, "a readable message"):
-                stamps[source.topic] = first, end = source.first_stamp, stamp_of(last, where)
-            rate = mean_rate(count, end - first)
-            sensors.append(SensorInfo(source.topic, source.kind, source.frame, count, rate, source.detail))
-        return self._described(
-            self.loader,
-            sensors,
-            stamps=stamps[self._driver.topic],
-            unused=tuple(self._unused),
-            notes=(*self.assumed, *self._scene.words),
-        )
+            first, end = self._ends[source.topic]
+            rate = mean_rate(source.messages, end - first)
+            yield SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail)
 
     def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
         """Scale of 16-bit depth in meters: the value of librealsense's recorder, unless the user sets one."""
@@ -251,15 +248,10 @@ class RosRecording(Recording):
         if left:
             self.assumed = (*self.assumed, f"not used: {', '.join(left)}; voodoo info says why")
 
-    def empty_scene(self) -> dict[str, tuple[ByteImage, ...]]:
-        """See Recording."""
-        cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
-        return self._scene.read(cameras, left_out=self._left_out)
-
     def _connected(self, source: TopicSource, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver
         if optional and not self._tree.reaches(self.root_frame, source.frame):
-            self._unused.append((source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
+            self._unused = (*self._unused, (source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
             return False
         self._tree.path(self.root_frame, source.frame)
         return True

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from voodoo.errors import RecordingError, reading
 from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
 from voodoo.model.camera import Camera
-from voodoo.recordings.recording import Recording, RecordingInfo, Reference, SensorInfo
+from voodoo.recordings.recording import Recording, Reference, SensorInfo
 from voodoo.stored import read_stored
 from voodoo.unpacking import Unpacking
 
@@ -59,6 +59,12 @@ class UtdMhadRecording(Recording):
         RecordingError: damaged, or not in the format of the data set.
     """
 
+    loader = "utd-mhad"
+    _notes = (
+        "stamps are nominal (30 Hz); the true rate may be near 19 Hz",
+        "the reference leads the depth by one or two frames",
+    )
+
     def __init__(self, path: Path, *, bare: bool = False) -> None:
         """Read depth and skeleton; see the class."""
         self.path = path
@@ -82,11 +88,8 @@ class UtdMhadRecording(Recording):
             image = np.ascontiguousarray(self._depth[:, ::-1, index])
             yield RecordedFrame(stamp, (DepthImage("depth", stamp, image, 0.001, CAMERA, np.eye(4)),))
 
-    def info(self) -> RecordingInfo:
-        """Summarize."""
-        sensor = SensorInfo.of("depth", "depth", FRAME, self._stamps, "320x240 16UC1, person cut out")
-        rate = "stamps are nominal (30 Hz); the true rate may be near 19 Hz"
-        return self._described("utd-mhad", [sensor], notes=(rate, "the reference leads the depth by one or two frames"))
+    def _sensors(self) -> Iterator[SensorInfo]:
+        yield SensorInfo.of("depth", "depth", FRAME, self._stamps, "320x240 16UC1, person cut out")
 
 
 def _variable(path: Path, name: str) -> npt.NDArray[Any]:

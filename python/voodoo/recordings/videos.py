@@ -21,7 +21,7 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.order import in_order, matched
 from voodoo.recordings.pictures import decode_color, picture_size
 from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, number_option
+from voodoo.recordings.recording import Recording, SensorInfo, number_option
 from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_beside
 from voodoo.stored import MOST_RECORDED, check_stored, read_stored
@@ -198,6 +198,7 @@ class VideosRecording(Recording):
     """
 
     complete = True
+    loader = "videos"
 
     def __init__(
         self,
@@ -231,8 +232,7 @@ class VideosRecording(Recording):
                 self._cameras.append(of_video(source, sensor, camera, rate))
         self._stamps = self._cameras[0].stamps
         self.assumed = tuple(dict.fromkeys(clock.notes))
-        self._notes: tuple[str, ...] = ()
-        names = {one.sensor: (one.placed.name, Path(one.sensor).stem) for one in self._cameras}
+        names = {one.sensor: (one.camera, (one.placed.name, Path(one.sensor).stem)) for one in self._cameras}
         self._scene = EmptyScene(path, background, names)
         if bare:
             return
@@ -248,21 +248,10 @@ class VideosRecording(Recording):
         pictures = heapq.merge(*self._cameras, key=lambda item: item.stamp)
         return together(pictures, self._cameras[0].sensor)
 
-    def empty_scene(self) -> dict[str, tuple[ByteImage, ...]]:
-        """See Recording."""
-        cameras = {one.sensor: one.camera for one in self._cameras}
-        return self._scene.read(cameras, left_out=self._left_out)
-
-    def info(self) -> RecordingInfo:
-        """Summarize."""
-        sensors = [
-            SensorInfo.of(
-                one.sensor, "color", one.placed.name, one.stamps, f"{one.camera.width}x{one.camera.height} pictures"
-            )
-            for one in self._cameras
-        ]
-        notes = (*self.assumed, *self._notes, *self._scene.words)
-        return self._described("videos", sensors, notes=notes)
+    def _sensors(self) -> Iterator[SensorInfo]:
+        for one in self._cameras:
+            detail = f"{one.camera.width}x{one.camera.height} pictures"
+            yield SensorInfo.of(one.sensor, "color", one.placed.name, one.stamps, detail)
 
 
 def picture_sources(path: Path, *, anywhere: bool = True) -> list[Path]:
