@@ -213,17 +213,15 @@ def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
     one_only = chosen.people == 1
     columns: list[Columns] = []
     found: dict[int, list[Track]] = {}
-    whole: dict[int, list[Track]] = {}
     for part in _tracks(job, recording, settings, config, left_out):
         columns.append(columns_of(part))
         for one, own in part.items():
-            found.setdefault(one, []).append(joined([own]))
-            if job.report:
-                whole.setdefault(one, []).append(replace(own, left_out={} if left_out is None else left_out.counts))
+            found.setdefault(one, []).append(own if job.report else joined([own]))  # what only a page shows is large
     if one_only and not columns:
         raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
     if job.report:
-        shown = {f"person {one}": Track.joined(own) for one, own in whole.items()}
+        counts = {} if left_out is None else left_out.counts
+        shown = {f"person {one}": replace(Track.joined(own), left_out=counts) for one, own in found.items()}
         Store(job.out).write(f"{REPORTS}/{job.name}.html", report_page(job.name, shown).encode())
     tracks = {one: joined(own) for one, own in found.items()}
     error = _error(recording, tracks[1]) if one_only else float("nan")

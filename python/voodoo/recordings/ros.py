@@ -191,7 +191,7 @@ class RosRecording(Recording):
 
     def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
         """Scale of 16-bit depth in meters: the value of librealsense's recorder, unless the user sets one."""
-        units = realsense.units_topic(topic)
+        units = realsense.beside(topic, realsense.UNITS)
         if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
         with reading(f"{self.path}, topic {units}", "a readable message"):

@@ -19,19 +19,15 @@ from voodoo.recordings.ros_messages import (
     DEPTH_ENCODINGS,
     Message,
     Sensed,
-    base_topic,
     camera_of,
     frame_of,
     is_depth,
     stamp_of,
 )
+from voodoo.recordings.ros_topics import CAMERA_INFO, CLOUD, COMPRESSED, IMAGES, MEASURED, SCAN, info_topic
 from voodoo.recordings.transforms import TransformTree
 
-IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
-CLOUD, SCAN = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan"
-CAMERA_INFO, TF = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
-MEASURED = (IMAGE, COMPRESSED, CLOUD, SCAN)
-"""Message types of measurements."""
+TF = "tf2_msgs/msg/TFMessage"
 STANDING = ("odom", "map", "base_link", "world")
 """Root frames, best first: the first two are fixed to the room while a robot moves."""
 _KEPT_S = 10.0
@@ -89,10 +85,6 @@ class RosFeed:
         """The target frame of `root_from_sensor`; "" until it is known."""
         return self._root or ""
 
-    def info_topic(self, topic: str) -> str:
-        """Topic of the calibration of an image topic."""
-        return f"{base_topic(topic).rsplit('/', 1)[0]}/camera_info"
-
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) at a time [s].
 
@@ -146,7 +138,7 @@ class RosFeed:
 
     def _take_calibration(self, topic: str, message: Message) -> None:
         for image in self._topics:
-            if self.info_topic(image) != topic:
+            if info_topic(image) != topic:
                 continue
             try:
                 with faulty("calibration unusable"):
@@ -194,8 +186,8 @@ class RosFeed:
         where = f"{topic}, stamp {stamp:.6f}"
         pose = self._root_from_sensor(topic, frame, stamp)
         camera = self._cameras.get(topic)
-        if camera is None and kind in (IMAGE, COMPRESSED):
-            expected = f"a calibration on {self.info_topic(topic)}"
+        if camera is None and kind in IMAGES:
+            expected = f"a calibration on {info_topic(topic)}"
             raise Fault("calibration missing", f"{where}: expected {expected}, found none")
         with faulty("damaged picture" if kind == COMPRESSED else _cut(message)):
             return Sensed(topic, stamp, pose, camera, self._units).of(measured, message, where)
@@ -207,10 +199,8 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     Raises:
         Fault: an image of neither depth nor color.
     """
-    if kind == CLOUD:
-        return "points"
-    if kind == SCAN:
-        return "scan"
+    if kind in (CLOUD, SCAN):
+        return "points" if kind == CLOUD else "scan"
     if kind == COMPRESSED:
         return "depth" if is_depth(topic, message) else "color"
     if message.encoding in DEPTH_ENCODINGS:

@@ -12,10 +12,11 @@ from voodoo.errors import VoodooError
 from voodoo.live.clock import Clock, HostClock
 from voodoo.live.faults import Faults
 from voodoo.live.ros2.dds import Node, Offer, Subscription
-from voodoo.live.ros2.feed import CAMERA_INFO, COMPRESSED, IMAGE, MEASURED, TF, RosFeed
+from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import FloatArray
 from voodoo.recordings.camera_files import read_calibration
+from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, info_topic
 
 _DISCOVERY_S = 3.0
 _POLL_S = 0.05
@@ -105,8 +106,8 @@ class Ros2Source(Source):
                 raise VoodooError(
                     f"{topic}: expected one of {', '.join(MEASURED)}, found {offer.kind or 'no ROS type'}"
                 )
-            if offer.kind in (IMAGE, COMPRESSED):
-                info = self._feed.info_topic(topic)
+            if offer.kind in IMAGES:
+                info = info_topic(topic)
                 offered = offers.get(info, Offer(CAMERA_INFO, reliable=False, latched=False))
                 self._subscribe(info, Offer(CAMERA_INFO, offered.reliable, offered.latched), _DEPTH)
             self._subscribe(topic, offer, _DEPTH)
