@@ -1,12 +1,14 @@
 """Keypoints of networks as rays and points."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import voodoo
 from voodoo import Camera, MeasurementError, RecordingError
+from voodoo.measurements import KeypointImage
 from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.gating import SiteGate
@@ -187,9 +189,9 @@ def test_the_person_nearest_to_the_prediction_is_chosen():
     joints = dict(tracker().estimate.joints)
     mine = keypoints_of(joints, "body25")
     other = mine + np.array([150.0, 0.0, 0.0])
-    chosen = nearest_person([other, mine], layout="body25", camera=CAMERA, world_from_sensor=POSE, predicted=joints)
-    assert chosen is mine
-    assert nearest_person([], layout="body25", camera=CAMERA, world_from_sensor=POSE, predicted=joints) is None
+    image = KeypointImage("camera", 0.0, (other, mine), "body25", CAMERA, POSE)
+    assert nearest_person(image, predicted=joints) is mine
+    assert nearest_person(replace(image, people=()), predicted=joints) is None
 
 
 def test_other_programs_of_the_same_keypoints(tmp_path):

@@ -157,6 +157,11 @@ class KeypointImage:
     camera: Camera
     root_from_sensor: FloatArray
 
+    @classmethod
+    def of(cls, item: ColorImage | DepthImage, people: tuple[FloatArray, ...], layout: str) -> KeypointImage:
+        """The people in an image, as of the sensor "NAME/keypoints"."""
+        return cls(f"{item.sensor}/keypoints", item.stamp, people, layout, item.camera, item.root_from_sensor)
+
     def __repr__(self) -> str:
         """One line with the number of people."""
         return f"KeypointImage({self.sensor!r}, stamp={self.stamp:.6f}, {len(self.people)} people, {self.layout})"

@@ -209,19 +209,10 @@ class WithKeypoints(Around):
                         # The numbers of images count those that were left out.
                         number = self._left_out.numbers.get((item.sensor, item.stamp), number)
                     count[item.sensor] = number + 1
-                    items.append(self._keypoints(item, number))
+                    people = read_people(self._files[item.sensor][number], layout=self._layout, left_out=self._left_out)
+                    items.append(KeypointImage.of(item, people, self._layout))
                 items.append(item)
             yield RecordedFrame(recorded.stamp, tuple(items))
-
-    def _keypoints(self, item: ColorImage | DepthImage, number: int) -> KeypointImage:
-        return KeypointImage(
-            sensor=f"{item.sensor}/keypoints",
-            stamp=item.stamp,
-            people=read_people(self._files[item.sensor][number], layout=self._layout, left_out=self._left_out),
-            layout=self._layout,
-            camera=item.camera,
-            root_from_sensor=item.root_from_sensor,
-        )
 
     def info(self) -> RecordingInfo:
         """The summary of the recording, with the keypoints."""

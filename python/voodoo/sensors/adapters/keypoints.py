@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -30,26 +29,21 @@ class KeypointsAdapter(Adapter[KeypointImage]):
     def add(self, frame: Frame, item: KeypointImage, context: Context) -> None:
         """As rays, or with depth as positions; `Memory` keeps the report of each sensor under "keypoints"."""
         chosen = context.settings
-        place: dict[str, Any] = {
-            "layout": item.layout,
-            "camera": item.camera,
-            "world_from_sensor": item.root_from_sensor,
-        }
-        person = nearest_person(item.people, predicted=context.predicted, **place)
+        person = nearest_person(item, predicted=context.predicted)
         if person is None:
             context.memory.put(self.kind, item.sensor, KeypointReport())
             return
         sensor = KeypointSensor(
-            **place,
+            item.layout,
+            item.camera,
+            item.root_from_sensor,
             source=item.sensor,
             noise=chosen.keypoint_noise,
             model=chosen.model,
             min_confidence=chosen.min_confidence,
         )
         registered = next((depth for depth in context.depth_images if same_place(depth, item)), None)
-        with_depth: dict[str, Any] = {}
-        if registered is not None:
-            with_depth = {"depth": registered.image, "meters_per_unit": registered.meters_per_unit}
+        depth, unit = (None, 1.0) if registered is None else (registered.image, registered.meters_per_unit)
         # As lists: rows of an array, one by one, are slower.
         joints = dict(zip(context.estimate.joint_names, context.estimate.joint_positions.tolist(), strict=True))
         sites = [part.site for part in layout_of(item.layout).parts if part.site in joints]
@@ -61,7 +55,8 @@ class KeypointsAdapter(Adapter[KeypointImage]):
             predicted=context.predicted,
             gate=context.gate,
             before=dict(zip(sites, hidden.tolist(), strict=True)),
-            **with_depth,
+            depth=depth,
+            meters_per_unit=unit,
         )
         context.memory.put(self.kind, item.sensor, report)
         context.rays.extend(rays)

@@ -4,7 +4,7 @@ people in arbitrary order), rays, and robust 3-D points from registered depth.""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -139,29 +139,21 @@ def check_confidence(least: object) -> None:
         raise MeasurementError(f"min_confidence: expected a finite number, found {least!r}")
 
 
-def nearest_person(
-    people: Sequence[FloatArray],
-    *,
-    layout: str,
-    camera: Camera,
-    world_from_sensor: npt.ArrayLike,
-    predicted: Mapping[str, FloatArray],
-) -> FloatArray | None:
+def nearest_person(item: KeypointImage, *, predicted: Mapping[str, FloatArray]) -> FloatArray | None:
     """The person (K, 3) whose keypoints lie nearest to the predicted sites in the image, by the median distance; None
     if none.
 
     Raises:
         MeasurementError: wrong shapes, or an unknown layout.
     """
-    pose = rigid(world_from_sensor)
-    nearest = compiled(layout).nearest(
-        [checked_rows(person, layout) for person in people],
+    nearest = compiled(item.layout).nearest(
+        [checked_rows(person, item.layout) for person in item.people],
         predicted,
-        world_from_sensor=pose,
-        camera=camera,
+        world_from_sensor=rigid(item.root_from_sensor),
+        camera=item.camera,
         least=MIN_CONFIDENCE,
     )
-    return None if nearest is None else people[nearest]
+    return None if nearest is None else item.people[nearest]
 
 
 WRONG_M = 0.3

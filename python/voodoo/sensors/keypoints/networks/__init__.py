@@ -57,8 +57,7 @@ class KeypointNetwork:
         except Exception as error:
             found = error if isinstance(error, MeasurementError) else f"{type(error).__name__}: {error}"
             raise MeasurementError(f"{self.name}: {found}") from error
-        sensor = f"{item.sensor}/keypoints"
-        return KeypointImage(sensor, item.stamp, people, self.layout, item.camera, item.root_from_sensor)
+        return KeypointImage.of(item, people, self.layout)
 
     def added_to(
         self, frame: RecordedFrame, *, refused: Callable[[RecordingError], None] | None = None
