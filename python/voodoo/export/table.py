@@ -49,22 +49,13 @@ _STATUSES = ("tracking", "degraded", "lost", "searching")
 _EXPECTED = "a result of voodoo track"
 
 
-def write_result(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
-    """Write consecutive parts of a result as .csv or .npz; a part is in memory at a time.
+def save_result(path: str | Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
+    """Write consecutive parts of a result as .csv or .npz; a part is in memory at a time. The file appears when it is complete.
 
     Args:
         path: the file.
         parts: returns their arrays, from the first part on.
         fixed: arrays of the whole result, in place of those of its parts; not in .csv.
-    """
-    if path.suffix == ".csv":
-        _write_csv(path, parts)
-    else:
-        _write_arrays(path, parts, fixed or {})
-
-
-def save_result(path: str | Path, arrays: Arrays) -> None:
-    """Write a result as .csv or .npz; the file appears only when it is complete.
 
     Raises:
         VoodooError: another suffix.
@@ -72,8 +63,11 @@ def save_result(path: str | Path, arrays: Arrays) -> None:
     """
     path = Path(path)
     check_suffix(path)
-    with appearing_whole(path) as part:
-        write_result(part, lambda: iter([arrays]))
+    with appearing_whole(path) as place:
+        if path.suffix == ".csv":
+            _write_csv(place, parts)
+        else:
+            _write_arrays(place, parts, fixed or {})
 
 
 @contextmanager

@@ -258,7 +258,7 @@ class Track:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        save_result(path, arrays_of(self))
+        save_result(path, lambda: iter([arrays_of(self)]))
 
     @classmethod
     def load(cls, path: str | Path) -> Track:
