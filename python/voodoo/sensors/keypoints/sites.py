@@ -334,7 +334,7 @@ class KeypointSensor:
             place_sigma=POINT_SIGMA_M,
             least=self.min_confidence,
             only=self.sites,
-            gate=None if gate is None else gate.core,
+            gate=gate,
             surface=None
             if depth is None
             else lambda pixel: window_depth(depth, pixel, meters_per_unit=meters_per_unit),
