@@ -42,6 +42,7 @@ class FolderRecording(Recording):
         rgb/, rgb.txt                 optional: the same for color (PNG or JPEG)
         calibration.toml              the camera
         truth.csv                     optional: exact joint positions in the root frame, as beside a rendered bag
+        truth_people.csv              optional: those of several persons
         init.json                     optional: pose of the person in the first frame, as read by --init
 
     There is one frame for each depth image, holding the color images since the previous one. A groundtruth.txt (the

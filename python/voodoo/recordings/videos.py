@@ -177,7 +177,7 @@ class VideosRecording(Recording):
         Calib_*.toml                 cameras, see read_camera_toml; world Z up, meters; or in calibration/, or ../calibration/
         videos/cam01.mp4             one video per camera; or folders of PNG or JPEG files: videos/cam01/, images/cam01/, cam01/
         background/cam01_0.png       optional: images of the empty scene
-        init.json, truth.csv, *.trc  optional: first pose, truth, triangulated joints to compare with
+        init.json, truth.csv, *.trc  optional: first pose, truth, triangulated joints to compare with; truth_people.csv
 
     Videos and cameras are paired by name (`cam01` is `cam_1`), else by number, else, if there are as many of both, in the order
     of names.
