@@ -36,32 +36,58 @@ def agreed(rays: Sequence[SiteRay], *, predicted: Mapping[str, FloatArray], scal
         origins = np.array([rays[index].origin for index in members])
         directions = np.array([rays[index].direction for index in members])
         information = np.array([rays[index].trust / rays[index].sigma ** 2 for index in members])
-        start = np.asarray(predicted[site], dtype=np.float64)
-        for index, trust in zip(members, _trust(origins, directions, information, start, scale), strict=True):
+        # The prediction is a weak prior, so that the position is determined for parallel rays too.
+        prior = 0.01 * float(information.max())
+        found = met(origins, directions, information, predicted[site], scale=scale, prior=prior)
+        for index, trust in zip(members, found[1], strict=True) if found else ():
             result[index] = result[index].trusted(result[index].trust * float(trust))
     return result
 
 
-def _trust(
-    origins: FloatArray, directions: FloatArray, information: FloatArray, start: FloatArray, scale: float
-) -> FloatArray:
-    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    offsets = np.einsum("nij,nj->ni", across, origins)
-    # The prediction is a weak prior, so that the position is determined for parallel rays too.
-    prior = 0.01 * float(information.max())
-    point = start
+def across(directions: FloatArray) -> FloatArray:
+    """Projections (N, 3, 3) onto the planes perpendicular to unit directions (N, 3)."""
+    return np.asarray(np.eye(3) - directions[:, :, None] * directions[:, None, :])
+
+
+def trust_at(point: FloatArray, origins: FloatArray, directions: FloatArray, *, scale: float) -> FloatArray:
+    """The Geman-McClure weights (N,) of the distances of rays from a point; 0 of rays that lead away from it."""
+    towards = point - origins
+    along = (towards * directions).sum(axis=1)
+    distance2 = np.square(towards - along[:, None] * directions).sum(axis=1)
+    return np.where(along > 0.0, (scale**2 / (scale**2 + distance2)) ** 2, 0.0)
+
+
+def met(
+    origins: FloatArray,
+    directions: FloatArray,
+    information: FloatArray,
+    start: FloatArray,
+    *,
+    scale: float,
+    prior: float = 0.0,
+) -> tuple[FloatArray, FloatArray] | None:
+    """Where rays meet, by reweighted least squares, and the trust of each; None if they do not determine a point.
+
+    Args:
+        origins, directions: (N, 3) of the rays.
+        information: (N,) inverse variances [1/m^2].
+        start: the first position (3,) [m].
+        scale: see `agreed`.
+        prior: information of `start` [1/m^2].
+    """
+    planes, point = across(directions), start
+    offsets = np.einsum("nij,nj->ni", planes, origins)
     for _ in range(_STEPS):
-        distance2 = (np.einsum("nij,j->ni", across, point) - offsets) ** 2
-        trust = (scale**2 / (scale**2 + distance2.sum(axis=1))) ** 2
-        weights = information * trust
-        matrix = (weights[:, None, None] * across).sum(axis=0) + prior * np.eye(3)
-        moved = np.linalg.solve(matrix, (weights[:, None] * offsets).sum(axis=0) + prior * start)
+        weights = information * trust_at(point, origins, directions, scale=scale)
+        matrix = (weights[:, None, None] * planes).sum(axis=0) + prior * np.eye(3)
+        if not prior and float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
+            return None
+        moved = np.linalg.solve(matrix, weights @ offsets + prior * start)
         done = float(np.linalg.norm(moved - point)) < _MOVED_M
         point = moved
         if done:
             break
-    distance2 = (np.einsum("nij,j->ni", across, point) - offsets) ** 2
-    return np.asarray((scale**2 / (scale**2 + distance2.sum(axis=1))) ** 2)
+    return point, trust_at(point, origins, directions, scale=scale)
 
 
 def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_trust: float = 0.05) -> int:

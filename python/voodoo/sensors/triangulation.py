@@ -10,14 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.measurements import FloatArray
-from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.rays import SiteRay, across, met, trust_at
 
 AGREE_M = 0.08
 """A ray at this distance from a position has a quarter of the weight of a ray through it; networks have errors of 2 to 6 cm."""
 TRUSTED = 0.25
 """A ray with less trust does not support the position."""
-_STEPS = 20
-_MOVED_M = 1e-4
 _PARALLEL = 1e-3
 """Rays whose directions differ by less than 2 degrees (sine squared) do not determine a position."""
 
@@ -52,50 +50,33 @@ def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Triangulated
         return None
     origins = np.array([ray.origin for ray in rays])
     directions = np.array([ray.direction for ray in rays])
-    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    planes = across(directions)
     information = np.array([1.0 / ray.sigma**2 for ray in rays])
     best: tuple[float, FloatArray] | None = None
     for pair in combinations(range(len(rays)), 2):
-        point = _meeting(origins[list(pair)], directions[list(pair)], across[list(pair)])
+        point = _meeting(origins[list(pair)], directions[list(pair)], planes[list(pair)])
         if point is not None:
-            total = float(_trust(point, origins, directions, across, scale).sum())
+            total = float(trust_at(point, origins, directions, scale=scale).sum())
             if best is None or total > best[0]:
                 best = total, point
     if best is None:
         return None
-    point = best[1]
-    for _ in range(_STEPS):
-        weights = information * _trust(point, origins, directions, across, scale)
-        matrix = (weights[:, None, None] * across).sum(axis=0)
-        if float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
-            return None
-        moved = np.linalg.solve(matrix, np.einsum("n,nij,nj->i", weights, across, origins))
-        done = float(np.linalg.norm(moved - point)) < _MOVED_M
-        point = moved
-        if done:
-            break
-    trust = _trust(point, origins, directions, across, scale)
+    found = met(origins, directions, information, best[1], scale=scale)
+    if found is None:
+        return None
+    point, trust = found
     seeing = trust >= TRUSTED
     if seeing.sum() < 2:
         return None
-    matrix = (information[seeing, None, None] * across[seeing]).sum(axis=0)
+    matrix = (information[seeing, None, None] * planes[seeing]).sum(axis=0)
     least = float(np.linalg.eigvalsh(matrix)[0])
     return TriangulatedSite(point, least**-0.5, trust) if least > 0.0 else None
 
 
-def _meeting(origins: FloatArray, directions: FloatArray, across: FloatArray) -> FloatArray | None:
+def _meeting(origins: FloatArray, directions: FloatArray, planes: FloatArray) -> FloatArray | None:
     """The point nearest to two rays; None for parallel ones, and behind a camera."""
     if 1.0 - float(directions[0] @ directions[1]) ** 2 < _PARALLEL:
         return None
-    point = np.linalg.solve(across.sum(axis=0), np.einsum("nij,nj->i", across, origins))
+    point = np.linalg.solve(planes.sum(axis=0), np.einsum("nij,nj->i", planes, origins))
     ahead = np.einsum("nj,nj->n", point - origins, directions)
     return np.asarray(point) if (ahead > 0.0).all() else None
-
-
-def _trust(
-    point: FloatArray, origins: FloatArray, directions: FloatArray, across: FloatArray, scale: float
-) -> FloatArray:
-    towards = point - origins
-    distance2 = (np.einsum("nij,nj->ni", across, towards) ** 2).sum(axis=1)
-    trust = (scale**2 / (scale**2 + distance2)) ** 2
-    return np.where(np.einsum("nj,nj->n", towards, directions) > 0.0, trust, 0.0)
