@@ -114,8 +114,7 @@ def follow(
     regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
     options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
-    chosen = {name: getattr(options, name) for name in Options.__dataclass_fields__}
-    follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
+    follower = Follower(chain, start=start, rest="mean" if rest else None, **vars(options))
     others = [name for name in there if name not in known]
     level = recording.root_frame in LEVEL_FRAMES
 

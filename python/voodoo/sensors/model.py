@@ -33,7 +33,8 @@ POINTS_SHARING = 25.0
 """Neighboring pixels of a depth image that share one error."""
 
 
-def _check(name: str, value: float, *, zero: bool = True) -> None:
+def check_number(name: str, value: float, *, zero: bool = True) -> None:
+    """Raise an error for a number that is not finite, negative, or zero if that is not allowed."""
     if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not zero):
         raise MeasurementError(f"{name}: expected a finite number {'>=' if zero else '>'} 0, found {value!r}")
 
@@ -55,8 +56,8 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         """Check both."""
-        _check("reference_sigma", self.reference_sigma, zero=False)
-        _check("max_weight", self.max_weight, zero=False)
+        check_number("reference_sigma", self.reference_sigma, zero=False)
+        check_number("max_weight", self.max_weight, zero=False)
 
     def weight(self, sigma: N, *, sharing: float = 1.0) -> N:
         """Weight of a datum.
@@ -81,7 +82,7 @@ class SensorModel:
 
     def sigma(self, weight: float) -> float:
         """Returns the standard deviation [m] that corresponds to a weight, such as those of K06."""
-        _check("weight", weight, zero=False)
+        check_number("weight", weight, zero=False)
         return self.reference_sigma / math.sqrt(weight)
 
 
@@ -105,7 +106,7 @@ class RangeNoise:
     def __post_init__(self) -> None:
         """Check all three."""
         for name in ("constant", "linear", "quadratic"):
-            _check(f"range noise {name}", getattr(self, name))
+            check_number(f"range noise {name}", getattr(self, name))
         if self.constant == self.linear == self.quadratic == 0.0:
             raise MeasurementError("range noise: expected one coefficient above zero, found none")
 
@@ -134,7 +135,7 @@ def stereo_noise(*, focal: float, baseline: float, disparity_sigma: float = 0.5)
         MeasurementError: a number that is not above zero.
     """
     for name, value in (("focal", focal), ("baseline", baseline), ("disparity_sigma", disparity_sigma)):
-        _check(name, value, zero=False)
+        check_number(name, value, zero=False)
     return RangeNoise(quadratic=disparity_sigma / (focal * baseline))
 
 
@@ -159,8 +160,8 @@ class PixelNoise:
 
     def __post_init__(self) -> None:
         """Check both."""
-        _check("pixel noise", self.pixels, zero=False)
-        _check("spread", self.spread)
+        check_number("pixel noise", self.pixels, zero=False)
+        check_number("spread", self.spread)
 
     def sigma(self, z: float, focal: float, *, confidence: float = 1.0, spread: float | None = None) -> float:
         """Standard deviation [m] perpendicular to the ray.
@@ -175,6 +176,6 @@ class PixelNoise:
             MeasurementError: depth, focal length or confidence not above zero.
         """
         for name, value in (("depth", z), ("focal length", focal), ("confidence", confidence)):
-            _check(name, value, zero=False)
+            check_number(name, value, zero=False)
         across = self.pixels / min(confidence, 1.0) * z / focal
         return math.hypot(across, self.spread if spread is None else spread)
