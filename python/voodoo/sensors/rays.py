@@ -9,12 +9,11 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-import voodoo._core as _core
 from voodoo._core import Frame
+from voodoo._core import SiteRay as SiteRay
 from voodoo.measurements import FloatArray
 from voodoo.sensors.model import SensorModel
 
-SiteRay = _core.SiteRay
 AGREE_M = 0.08
 """A ray at this distance from a position has a quarter of the weight of a ray through it; networks have errors of 2 to 6 cm."""
 TRUSTED = 0.25

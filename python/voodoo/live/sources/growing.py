@@ -103,9 +103,6 @@ class GrowingSource(Source):
             return []
         return [Arrival("depth", "depth", stamp, lambda: item, drives=True)]
 
-    def close(self) -> None:
-        """See Source."""
-
     def about(self) -> dict[str, Any]:
         """See Source."""
         return {"name": self.name, "kind": "folder", "path": str(self._path)}

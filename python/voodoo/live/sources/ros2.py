@@ -143,9 +143,6 @@ class Ros2Source(Source):
             self._feed.faults.log(f"{self.name}: it is there again")
         self._gone = gone
 
-    def close(self) -> None:
-        """See Source."""
-
     def root_from(self, frame: str, stamp: float) -> FloatArray | None:
         """See Source."""
         return self._feed.root_from(frame, stamp)
