@@ -69,11 +69,6 @@ def is_folder(path: Path) -> bool:
     return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
 
 
-def is_foxglove(path: Path) -> bool:
-    """Whether a name is that of an .mcap file with the schemas of Foxglove."""
-    return path.name.endswith(FOXGLOVE)
-
-
 def is_table(path: Path) -> bool:
     """Whether a name is that of arrays or rows in the root frame: .csv, .npz, or STDOUT."""
     return path == STDOUT or path.suffix in SUFFIXES
@@ -176,7 +171,7 @@ def save(
         )
         return [path]
     own = {person_id(one): track for one, track in tracks.items()}
-    if is_foxglove(path):
+    if path.name.endswith(FOXGLOVE):
         write_foxglove(path, own, root_frame=root_frame, turn=turn)
     else:
         with appearing_whole(path) as place, bag_folder(place) as folder:

@@ -207,7 +207,10 @@ class RosRecording(Recording):
         dynamic = [name for name in names if name not in static]
         for topics, is_static in ((static, True), (dynamic, False)):
             for _, message in self._bag.read(topics):
-                self._add_transforms(message, static=is_static)
+                unread = leaving_out(self._left_out, "transforms that cannot be read")
+                with unread, reading(self.path, "a readable transform"):
+                    if message is not None:
+                        self._tree.add(message, static=is_static)
         known = {*self._tree.frames, *(source.frame for source in sources)}
         self._own_root = next((name for name in OWN_ROOTS if name in known), sources[0].frame)
         if asked is not None:
@@ -219,11 +222,6 @@ class RosRecording(Recording):
         return next(
             (frame for frame in moving if all(self._tree.reaches(frame, s.frame) for s in sources)), self._own_root
         )
-
-    def _add_transforms(self, message: Message | None, *, static: bool) -> None:
-        with leaving_out(self._left_out, "transforms that cannot be read"), reading(self.path, "a readable transform"):
-            if message is not None:
-                self._tree.add(message, static=static)
 
     def _read_recorders_transforms(self) -> None:
         """Read the transforms of librealsense's recorder: the pose of each stream relative to the common reference."""
