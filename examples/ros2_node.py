@@ -19,7 +19,8 @@ from voodoo.export.ros2 import cdr, instant
 from voodoo.live import Faults, Follower
 from voodoo.live.assembly import Assembler
 from voodoo.live.clock import HostClock
-from voodoo.live.ros2.feed import CAMERA_INFO, IMAGE, TF, RosFeed
+from voodoo.live.ros2.feed import TF, RosFeed
+from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGE, info_topic
 
 PERSON, CLOCK = "p1", HostClock()
 BODY = f"/humans/bodies/{PERSON}"
@@ -37,7 +38,7 @@ class Skeletons(Node):
         types = {"/tf": TFMessage, f"{BODY}/joint_states": JointState, f"{BODY}/markers": MarkerArray}
         self.outputs = {name: self.create_publisher(kind, name, 10) for name, kind in types.items() if kind}
         self.on_message(depth, Image, IMAGE, qos_profile_sensor_data)
-        self.on_message(self.feed.info_topic(depth), CameraInfo, CAMERA_INFO, qos_profile_sensor_data)
+        self.on_message(info_topic(depth), CameraInfo, CAMERA_INFO, qos_profile_sensor_data)
         if TFMessage is not None:
             self.on_message("/tf", TFMessage, TF, 100)
             self.on_message(

@@ -268,7 +268,7 @@ def install(monkeypatch):
     import voodoo.export.spool
     import voodoo.pipeline.front_end
     import voodoo.pipeline.start
-    from voodoo.export import collected as results
+    from voodoo.export import track as results
 
     # The fake body has no joints to take angles from.
     monkeypatch.setattr(results, "Chain", lambda body: body)

@@ -24,8 +24,7 @@ from voodoo.batch import task
 from voodoo.batch.run import Batch
 from voodoo.batch.storage import Store, find_sources, name_of, named, on_disk
 from voodoo.batch.summary import COLUMNS, DONE, FAILED, Row, read_table, write_index, write_table
-from voodoo.batch.table import columns_of, encode, note_of
-from voodoo.batch.task import Job, Settings, do, row_of
+from voodoo.batch.task import Job, Settings, columns_of, do, encode, note_of, row_of
 from voodoo.cli import app
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.export.track import Track

@@ -311,7 +311,7 @@ def test_ctrl_c_before_the_first_frame_leaves_nothing(run):
 
 
 def test_demo(run, monkeypatch):
-    monkeypatch.setattr("voodoo.recordings.sample.sample_path", lambda: Path("sample"))
+    monkeypatch.setattr("voodoo.recordings.loaders.sample_path", lambda: Path("sample"))
     run.tracker.offset, run.tracker.found_at = (0.0, 0.03, 0.0), 1
     result = run("demo", "--out", "here")
     assert result.exit_code == 0, result.stderr

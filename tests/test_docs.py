@@ -21,8 +21,7 @@ from pages import headings, links, prose
 from voodoo.cli import app
 from voodoo.model.toml_io import parse_toml
 from voodoo.pipeline.start import Init
-from voodoo.recordings.calibration import read_calibration
-from voodoo.recordings.camera_files import read_camera_toml
+from voodoo.recordings.camera_files import read_calibration, read_camera_toml
 from voodoo.recordings.marker_files import MarkerMap
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -16,7 +16,7 @@ from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation.report import markdown
 from voodoo.evaluation.score import Score
 from voodoo.recordings import sample_path
-from voodoo.recordings.films import _opened
+from voodoo.recordings.videos import _opened
 from voodoo.visualization.image_writer import PictureWriter, save_picture
 
 

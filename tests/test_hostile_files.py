@@ -18,10 +18,9 @@ from voodoo.errors import BodyError, ConfigError, RecordingError, VoodooError
 from voodoo.export.track import Track
 from voodoo.pipeline.start import Init
 from voodoo.recordings import open_recording, ros_bag, sample_path
-from voodoo.recordings.matlab import read_mat
-from voodoo.recordings.people_truth import read_people_truth
 from voodoo.recordings.pictures import decode_color, decode_depth_png, picture_size
-from voodoo.recordings.truth import read_start, read_truth
+from voodoo.recordings.truth import read_people_truth, read_start, read_truth
+from voodoo.recordings.utd_mhad import read_mat
 
 M = Messages()
 

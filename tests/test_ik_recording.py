@@ -21,8 +21,8 @@ from voodoo.export.track import Track
 from voodoo.pipeline.ik import KNOWN, known_positions
 from voodoo.pipeline.ik import follow as follow_frames
 from voodoo.pipeline.start import start_tracker
+from voodoo.recordings.loaders import sample_path
 from voodoo.recordings.recording import Reference
-from voodoo.recordings.sample import sample_path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from test_exports import read_bvh

@@ -1,18 +1,19 @@
 """Keypoints of networks as rays and points."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import voodoo
 from voodoo import Camera, MeasurementError, RecordingError
+from voodoo.measurements import KeypointImage
 from voodoo.recordings.keypoint_files import read_openpose_json
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints import KeypointSensor
-from voodoo.sensors.keypoints.sites import nearest_person, site_pixels
-from voodoo.sensors.keypoints.surface import window_depth
+from voodoo.sensors.keypoints.sites import nearest_person, site_pixels, window_depth
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, (-0.1, 0.02, 0.0, 0.0))
 # 3 m in front of the person, 1 m high, looking along world y
@@ -188,9 +189,9 @@ def test_the_person_nearest_to_the_prediction_is_chosen():
     joints = dict(tracker().estimate.joints)
     mine = keypoints_of(joints, "body25")
     other = mine + np.array([150.0, 0.0, 0.0])
-    chosen = nearest_person([other, mine], layout="body25", camera=CAMERA, world_from_sensor=POSE, predicted=joints)
-    assert chosen is mine
-    assert nearest_person([], layout="body25", camera=CAMERA, world_from_sensor=POSE, predicted=joints) is None
+    image = KeypointImage("camera", 0.0, (other, mine), "body25", CAMERA, POSE)
+    assert nearest_person(image, predicted=joints) is mine
+    assert nearest_person(replace(image, people=()), predicted=joints) is None
 
 
 def test_other_programs_of_the_same_keypoints(tmp_path):

@@ -11,10 +11,9 @@ import voodoo
 from live_rig import ByHand, Rig, arrival_of, wall
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.live import FAULTS, Faults, SourceEnded, SourceGone
-from voodoo.live.assembly import Assembler
+from voodoo.live.assembly import Assembler, HostTime, Stamps
 from voodoo.live.latencies import Latencies
 from voodoo.live.mailbox import Inbox, Mailbox
-from voodoo.live.stamps import HostTime, Stamps
 from voodoo.measurements import ColorImage, LaserScan
 
 

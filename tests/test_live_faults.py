@@ -14,8 +14,9 @@ from voodoo.evaluation.metrics import JOINTS
 from voodoo.export.ros2 import cdr
 from voodoo.live import FAULTS
 from voodoo.live.recorder import _depth, _header, camera_info, transforms
-from voodoo.live.ros2.feed import CAMERA_INFO, IMAGE, TF, RosFeed
+from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGE
 
 DEPTH, INFO, FRAME = "/camera/depth/image_raw", "/camera/depth/camera_info", "camera"
 RIGHT_M = 0.06

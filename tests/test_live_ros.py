@@ -14,20 +14,19 @@ from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
-from voodoo.live.ros2.dds import Offer
-from voodoo.live.ros2.feed import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, ROOT_PATIENCE_S, SCAN, TF, RosFeed
-from voodoo.live.ros2.listing import listing
-from voodoo.live.ros2.types import dds_name, ros_name
+from voodoo.live.ros2.dds import Offer, dds_name, ros_name
+from voodoo.live.ros2.feed import ROOT_PATIENCE_S, TF, RosFeed
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks.ros2 import RESET, Ros2Sink
 from voodoo.live.source import SourceGone
 from voodoo.live.sources.played import PlayedSource
-from voodoo.live.sources.ros2 import Ros2Source
+from voodoo.live.sources.ros2 import Ros2Source, listing
 from voodoo.measurements import ColorImage, DepthImage, LaserScan, PointCloud
 from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.front_end import nobody
 from voodoo.pipeline.run import start_tracker, track
 from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings.ros_topics import CAMERA_INFO, CLOUD, COMPRESSED, IMAGE, SCAN, info_topic
 from voodoo.recordings.transforms import TransformTree
 
 DEPTH, INFO = "/camera/depth/image_raw", "/camera/depth/camera_info"
@@ -142,7 +141,7 @@ def test_every_type_becomes_its_measurement():
     )
     feed, _, faults = feed_of(*topics, root_frame="camera")
     camera = wall(1.0).camera
-    for info in {feed.info_topic(topic) for topic in topics[:4]}:
+    for info in {info_topic(topic) for topic in topics[:4]}:
         send(feed, info, CAMERA_INFO, camera_info(_header(1.0, "camera"), camera))
     header = _header(1.0, "camera")
     depth = wall(1.0)

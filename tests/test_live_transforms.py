@@ -9,8 +9,9 @@ from live_rig import wall
 from voodoo.export.ros2 import cdr
 from voodoo.live import Live, Source
 from voodoo.live.recorder import _depth, _header, camera_info, transforms
-from voodoo.live.ros2.feed import CAMERA_INFO, IMAGE, TF, RosFeed
+from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.live.source import SourceEnded
+from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGE
 
 DEPTH = "/camera/depth/image_raw"
 SECONDS, IMAGES_HZ, ON_THE_WAY_S = 1.2, 30, 0.003

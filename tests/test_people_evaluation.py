@@ -16,7 +16,8 @@ from voodoo.evaluation.people_evaluate import read_rows
 from voodoo.evaluation.people_report import people_markdown
 from voodoo.export.table import save_result
 from voodoo.recordings.loaders import open_recording
-from voodoo.recordings.people_truth import PeopleTruth, read_people_truth
+from voodoo.recordings.people_truth import PeopleTruth
+from voodoo.recordings.truth import read_people_truth
 
 pytest.importorskip("motmetrics")
 NAMES = ("humanoid_root", *metrics.JOINTS)
@@ -164,7 +165,7 @@ def test_recordings_add_up():
 def test_rows_are_read_as_they_are_written(tmp_path):
     rows = {**result({1: [0.5, N, 0.7], 12: [1.0, 1.1, 1.2]}), "residual": np.array([0.01, N, 0.02, 0.03, 0.04])}
     rows["joints"][2, 1:] = np.nan
-    save_result(tmp_path / "r.csv", rows)
+    save_result(tmp_path / "r.csv", lambda: iter([rows]))
     assert (tmp_path / "r.csv").read_text().startswith("stamp_s,person,status,residual_m,humanoid_root_x,")
     again = read_rows(tmp_path / "r.csv")
     assert again["person"].tolist() == rows["person"].tolist() == [1, 12, 12, 1, 12]
@@ -242,9 +243,8 @@ def test_any_result_can_be_judged_by_the_command_line(voodoo_data, tmp_path):
     frame, person = np.nonzero(known.in_view >= 0.3)
     count = len(frame)
     places = known.positions[frame, person] + [0.03, 0.0, 0.0]
-    save_result(
-        tmp_path / "theirs.csv", rows_of(known.stamps[frame], known.persons[person] + 6, places, names=known.names)
-    )
+    rows = rows_of(known.stamps[frame], known.persons[person] + 6, places, names=known.names)
+    save_result(tmp_path / "theirs.csv", lambda: iter([rows]))
     command = ["eval", str(path), "--result", str(tmp_path / "theirs.csv"), "--out", str(tmp_path / "out")]
     message = CliRunner().invoke(app, command)
     assert message.exit_code == 0, message.output

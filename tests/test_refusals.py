@@ -15,11 +15,12 @@ from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
 from voodoo.pipeline.start import Init, start_tracker
 from voodoo.recordings import open_recording, sample_path
-from voodoo.recordings.joint_table import read_positions
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
+from voodoo.recordings.truth import read_positions
 from voodoo.sensors.depth import DepthFilter
+from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints import KeypointSensor
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker
@@ -109,6 +110,11 @@ def skin(image, camera=CAMERA):
             lambda: sensor().observe("seen", stamp=0.0, predicted={}),
             MeasurementError,
             "keypoints: expected numbers (u, v, confidence), found 'seen'",
+        ),
+        (
+            lambda: SiteGate(radius=0.5),
+            MeasurementError,
+            "gate: expected 0 < radius <= widest and growth >= 0, found radius",
         ),
         (lambda: skin([[1]]), MeasurementError, "image: expected an array (H, W, 3) of uint8, found list"),
         (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a Camera"),

@@ -6,10 +6,8 @@ import pytest
 
 from voodoo import Camera, MeasurementError
 from voodoo.recordings import DepthImage
-from voodoo.sensors.silhouettes.color import StillBackground
-from voodoo.sensors.silhouettes.depth import StillScene, from_depth
-from voodoo.sensors.silhouettes.masks import filled
-from voodoo.sensors.silhouettes.surroundings import surroundings
+from voodoo.sensors.silhouettes.masks import filled, surroundings
+from voodoo.sensors.silhouettes.still import StillBackground, StillScene, from_depth
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 POSE = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])

@@ -24,9 +24,8 @@ from voodoo.pipeline.starts.markers import MarkersStart
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.pixels import in_sensor
-from voodoo.sensors.rays import SiteRay
+from voodoo.sensors.rays import SiteRay, place_of
 from voodoo.sensors.settings import FrontEndSettings
-from voodoo.sensors.triangulation import place_of
 
 BODY = voodoo.Body.human(1.75)
 CAMERA = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)

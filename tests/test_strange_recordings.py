@@ -15,9 +15,9 @@ from commands import run
 from voodoo.errors import CameraError, RecordingError
 from voodoo.export.track import Track
 from voodoo.recordings import ColorImage, DepthImage, open_recording
-from voodoo.recordings.calibration import read_calibration
+from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.left_out import LeftOut
-from voodoo.recordings.rvl import decode_rvl
+from voodoo.recordings.pictures import decode_rvl
 
 REALSENSE = Path(__file__).parent / "data" / "realsense"
 M = Messages()

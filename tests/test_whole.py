@@ -231,7 +231,7 @@ def test_a_disk_that_fills_during_a_session_costs_no_pose_before(tmp_path, monke
 def test_the_poses_of_a_session_are_kept_where_its_files_cannot_be_written(tmp_path, monkeypatch):
     command = ["live", str(sample_path()), "--rate", "8", "--duration", "2", "--out", str(tmp_path / "pose.csv")]
     with monkeypatch.context() as patch:
-        patch.setattr("voodoo.export.spool.write_result", full)
+        patch.setattr("voodoo.export.spool.save_result", full)
         done = run(app, command)
     (folder,) = tmp_path.iterdir()
     assert done.exit_code != 0 and str(folder) in done.stderr

@@ -73,13 +73,7 @@ def triangulated(recording: Recording, seed: int, outliers: float) -> float:
         places = dict(zip(reference.names, reference.positions[index], strict=True))
         normal = {name: (np.zeros((3, 3)), np.zeros(3)) for name in JOINTS}
         for item in recorded.measurements:
-            person = nearest_person(
-                item.people,
-                layout=item.layout,
-                camera=item.camera,
-                world_from_sensor=item.root_from_sensor,
-                predicted=places,
-            )
+            person = nearest_person(item, predicted=places)
             if person is None:
                 continue
             observed = [part for part in site_pixels(person, layout=item.layout)[0] if part.site in normal]

@@ -18,9 +18,8 @@ from voodoo import ik
 from voodoo.model.projection import CameraView
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.pose2sim import SITES
-from voodoo.sensors.silhouettes.color import StillBackground
-from voodoo.sensors.silhouettes.masks import filled
-from voodoo.sensors.silhouettes.surroundings import surroundings
+from voodoo.sensors.silhouettes.masks import filled, surroundings
+from voodoo.sensors.silhouettes.still import StillBackground
 
 SCALE = 0.25
 LEARN_EVERY = 2

@@ -24,8 +24,7 @@ import voodoo
 from voodoo import ik
 from voodoo.model.projection import CameraView, body_mask
 from voodoo.recordings import DepthImage
-from voodoo.sensors.depth import meters
-from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.still import StillScene, from_depth
 
 KNOWN = [f"{s}_{j}" for s in "lr" for j in ("shoulder", "wrist", "hand", "hip", "ankle")] + ["head_center", "vc7"]
 SIDE_CAMERA = voodoo.Camera(320, 240, 290.0, 290.0, 159.5, 119.5)
@@ -63,7 +62,7 @@ class Rendered:
         depth = self.depths[frame]
         known = {name: self.truth[name][frame] for name in KNOWN}
         mask = from_depth(depth, {**known, **last}, scene=self.scene)
-        observed = meters(depth) if deep else None
+        observed = depth.meters() if deep else None
         return ik.Silhouette(mask, camera=depth.camera, world_from_camera=depth.root_from_sensor, depth=observed)
 
     def solve(self, views: int, *, deep: bool = False, **options: Any) -> dict[str, np.ndarray]:

@@ -195,12 +195,27 @@ class KeypointLayout:
 
 @final
 class SiteGate:
-    """Gates around predicted sites that reject distant measurements; see voodoo.sensors.gating.SiteGate."""
+    """Accepts measurements near predicted sites, per site and source, and opens slowly while nothing is accepted.
 
-    def __new__(cls, radius: float, growth: float, widest: float) -> SiteGate: ...
+    With a fixed gate a tracker that has drifted could never recover. So the radius grows by `growth` for every second since
+    the last accepted measurement of the site, up to `widest`.
+
+    Args:
+        radius: [m].
+        growth: [m/s].
+        widest: [m].
+
+    Raises:
+        MeasurementError: a number is negative, or `widest` is less than `radius`.
+    """
+
+    def __new__(cls, radius: float = 0.15, growth: float = 0.5, widest: float = 0.40) -> SiteGate: ...
     def __copy__(self) -> SiteGate: ...
-    def limit(self, site: str, source: str, stamp: float) -> float: ...
-    def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool: ...
+    def limit(self, site: str, source: str, stamp: float) -> float:
+        """Radius [m] of a site's gate at `stamp` [s]."""
+
+    def accepts(self, site: str, distance: float, stamp: float, source: str) -> bool:
+        """Whether a measurement this far [m] from the predicted site is near enough."""
 
 @final
 class SiteRay:

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from voodoo.model.camera import Camera
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
+ByteImage: TypeAlias = npt.NDArray[np.uint8]
+DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
 _LARGEST = float(np.finfo(np.float64).max)
 
 
@@ -31,10 +33,15 @@ class DepthImage:
 
     sensor: str
     stamp: float
-    image: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+    image: DepthArray
     meters_per_unit: float
     camera: Camera
     root_from_sensor: FloatArray
+
+    def meters(self) -> FloatArray:
+        """Depths (H, W) [m]; NaN where there is no return."""
+        z = self.image.astype(np.float64) * self.meters_per_unit
+        return np.asarray(np.where(np.isfinite(z) & (z > 0.0), z, np.nan))
 
     def __repr__(self) -> str:
         """One line with size and type instead of the pixels."""
@@ -112,12 +119,12 @@ class ColorImage:
 
     sensor: str
     stamp: float
-    decode: Callable[[], npt.NDArray[np.uint8]]
+    decode: Callable[[], ByteImage]
     camera: Camera
     root_from_sensor: FloatArray
 
     @cached_property
-    def image(self) -> npt.NDArray[np.uint8]:
+    def image(self) -> ByteImage:
         """The image, (H, W, 3) BGR uint8.
 
         Raises:
@@ -149,6 +156,11 @@ class KeypointImage:
     layout: str
     camera: Camera
     root_from_sensor: FloatArray
+
+    @classmethod
+    def of(cls, item: ColorImage | DepthImage, people: tuple[FloatArray, ...], layout: str) -> KeypointImage:
+        """The people in an image, as of the sensor "NAME/keypoints"."""
+        return cls(f"{item.sensor}/keypoints", item.stamp, people, layout, item.camera, item.root_from_sensor)
 
     def __repr__(self) -> str:
         """One line with the number of people."""

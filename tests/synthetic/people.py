@@ -17,7 +17,7 @@ from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.recordings.people_truth import PeopleTruth
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
+from voodoo.recordings.recording import Recording, SensorInfo
 from voodoo.synthetic.render import render_depth
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -128,6 +128,8 @@ class MadeUpRecording(Recording):
         scene: is rendered once.
     """
 
+    loader = "synthetic"
+
     def __init__(self, scene: Scene) -> None:
         """Render all frames."""
         self.path, self.name, self.root_frame = Path(scene.name), scene.name, scene.root_frame
@@ -192,15 +194,11 @@ class MadeUpRecording(Recording):
         """Colors (H, W, 3) BGR of a frame: clothes, skin and gray furniture, with noise."""
         return paint(self._labels[index], self.scene.people, (self.scene.seed, index))
 
-    def info(self) -> RecordingInfo:
-        """The summary."""
+    def _sensors(self) -> Iterator[SensorInfo]:
         size, rate = f"{CAMERA.width}x{CAMERA.height}", self.scene.rate_hz
         kinds = [(DEPTH, "depth", "16UC1"), *([(COLOR, "color", "bgr8")] if self.scene.color else [])]
-        sensors = tuple(
-            SensorInfo(name, kind, "camera_optical_frame", len(self), rate, f"{size} {words}")
-            for name, kind, words in kinds
-        )
-        return self._described("synthetic", sensors, duration=float(self._stamps[-1]))
+        for name, kind, words in kinds:
+            yield SensorInfo(name, kind, "camera_optical_frame", len(self), rate, f"{size} {words}")
 
 
 def paint(label: npt.NDArray[np.uint8], people: Sequence[Walker], seed: tuple[int, int]) -> npt.NDArray[np.uint8]:

@@ -7,7 +7,7 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::sites::{SiteGate, SiteRay};
 
 use crate::arrays::vector;
-use crate::errors::IntoPy;
+use crate::errors::{IntoPy, exception};
 use crate::people::TrackedBody;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -56,18 +56,26 @@ pub struct PySiteGate(pub SiteGate);
 #[pymethods]
 impl PySiteGate {
     #[new]
-    fn new(radius: f64, growth: f64, widest: f64) -> Self {
-        Self(SiteGate::new(radius, growth, widest))
+    #[pyo3(signature = (radius=0.15, growth=0.5, widest=0.40))]
+    fn new(py: Python<'_>, radius: f64, growth: f64, widest: f64) -> PyResult<Self> {
+        if !(radius > 0.0 && growth >= 0.0 && widest >= radius) {
+            let found = format!("found radius {radius:?}, growth {growth:?}, widest {widest:?}");
+            let text = format!("gate: expected 0 < radius <= widest and growth >= 0, {found}");
+            return Err(exception(py, "MeasurementError", text));
+        }
+        Ok(Self(SiteGate::new(radius, growth, widest)))
     }
 
     fn __copy__(&self) -> Self {
         Self(self.0.clone())
     }
 
+    #[doc = stub!("SiteGate.limit")]
     fn limit(&mut self, site: &str, source: &str, stamp: f64) -> f64 {
         self.0.limit(site, source, stamp)
     }
 
+    #[doc = stub!("SiteGate.accepts")]
     fn accepts(&mut self, site: &str, distance: f64, stamp: f64, source: &str) -> bool {
         self.0.accepts(site, distance, stamp, source)
     }

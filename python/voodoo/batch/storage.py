@@ -79,10 +79,7 @@ def _remote(url: str, only: Sequence[str]) -> list[str]:
 
     files, path = filesystem(url)
     with reading(url, "recordings"):
-        if "*" in path:
-            tops = sorted(files.glob(path))
-        else:
-            tops = [path.rstrip("/")]
+        tops = sorted(files.glob(path)) if "*" in path else [path.rstrip("/")]
         found: list[str] = []
         for top in tops:
             found += _in_folder(files, top) if files.isdir(top) else [top] if files.exists(top) else []
@@ -168,10 +165,12 @@ class Store:
     url: str
 
     @cached_property
-    def _at(self) -> tuple[Any, str]:
-        url = self.url if not is_local(self.url) else str(local_path(self.url).absolute())
-        files, path = filesystem(url)
-        return files, path.rstrip("/")
+    def _files(self) -> Any:  # noqa: ANN401 - fsspec has no types
+        """The file system below the folder."""
+        from fsspec.implementations.dirfs import DirFileSystem
+
+        files, path = filesystem(self.url if not is_local(self.url) else str(local_path(self.url).absolute()))
+        return DirFileSystem(path.rstrip("/"), files)
 
     def read(self, name: str) -> str | None:
         """The text of a file; None if it does not exist.
@@ -179,13 +178,9 @@ class Store:
         Raises:
             VoodooError: it cannot be read.
         """
-        files, top = self._at
+        files = self._files
         with reading(f"{self.url}/{name}", "a readable file", error=VoodooError):
-            return (
-                files.cat_file(f"{top}/{name}").decode("utf-8", errors="replace")
-                if files.exists(f"{top}/{name}")
-                else None
-            )
+            return files.cat_file(name).decode("utf-8", errors="replace") if files.exists(name) else None
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file atomically.
@@ -193,21 +188,20 @@ class Store:
         Raises:
             VoodooError: it cannot be written.
         """
-        files, top = self._at
+        files = self._files
         with reading(f"{self.url}/{name}", "a place that can be written to", error=VoodooError):
-            place = f"{top}/{name}"
-            files.makedirs(place.rsplit("/", 1)[0], exist_ok=True)
+            files.makedirs(name.rpartition("/")[0], exist_ok=True)
             if not is_local(self.url):
-                files.pipe_file(place, content)  # objects are written atomically
+                files.pipe_file(name, content)  # objects are written atomically
                 return
-            with appearing_whole(Path(place)) as part:
+            with appearing_whole(Path(files.path, name)) as part:
                 part.write_bytes(content)
 
     def rename(self, name: str, other: str) -> None:
         """Give a file another name."""
-        files, top = self._at
+        files = self._files
         with reading(f"{self.url}/{name}", "a file that can be renamed", error=VoodooError):
-            files.mv(f"{top}/{name}", f"{top}/{other}")
+            files.mv(name, other)
 
     def place_of(self, recording: str) -> str:
         """Path of a recording's table."""
@@ -215,16 +209,13 @@ class Store:
 
     def opened(self, recording: str) -> Any | None:  # noqa: ANN401 - a file of fsspec
         """A recording's table as a binary file; None if it does not exist."""
-        files, top = self._at
-        place = f"{top}/{self.place_of(recording)}"
-        return files.open(place, "rb") if files.exists(place) else None
+        place = self.place_of(recording)
+        return self._files.open(place, "rb") if self._files.exists(place) else None
 
     def names(self, folder: str) -> set[str]:
         """Names of the files in a folder."""
-        files, top = self._at
-        if not files.isdir(f"{top}/{folder}"):
-            return set()
-        return {str(name).rstrip("/").rsplit("/", 1)[-1] for name in files.ls(f"{top}/{folder}", detail=False)}
+        found = self._files.ls(folder, detail=False) if self._files.isdir(folder) else ()
+        return {str(name).rstrip("/").rsplit("/", 1)[-1] for name in found}
 
     def recordings(self) -> set[str]:
         """Names of recordings with a folder of results."""

@@ -11,6 +11,8 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
+from pydantic import TypeAdapter
+
 from voodoo.errors import VoodooError
 from voodoo.evaluation.tables import cell
 
@@ -58,17 +60,12 @@ class Row:
         """A row from a mapping of fields to text or numbers.
 
         Raises:
-            ValueError, TypeError: fields are missing or invalid.
+            ValueError: fields are missing or invalid.
         """
-        kinds: dict[str, tuple[type, object]] = {"int": (int, 0), "float": (float, math.nan)}
-        found: dict[str, Any] = {}
-        for field in fields(cls):
-            kind, unknown = kinds.get(str(field.type), (str, ""))
-            value = values.get(field.name)
-            found[field.name] = kind(unknown if value is None or value == "" else value)
-        return cls(**found)
+        return _ROW.validate_python({name: value for name, value in values.items() if value not in (None, "")})
 
 
+_ROW = TypeAdapter(Row)
 COLUMNS = tuple(field.name for field in fields(Row))
 
 
@@ -90,7 +87,7 @@ def read_table(text: str, source: object) -> dict[str, Row]:
     try:
         header, *rows = list(csv.reader(io.StringIO(text)))
         found = [Row.of(dict(zip(header, row, strict=True))) for row in rows]
-    except (ValueError, TypeError, csv.Error) as error:
+    except (ValueError, csv.Error) as error:
         raise VoodooError(f"{source}: expected a summary.csv of voodoo batch, found another file: {error}") from error
     if header[:5] != list(COLUMNS[:5]):
         raise VoodooError(f"{source}: expected the columns {', '.join(COLUMNS[:5])}, found {', '.join(header[:5])}")

@@ -1,26 +1,29 @@
-"""Task of a worker: track one recording and write its table."""
+"""Task of a worker: track one recording and write its Parquet table, with a row per frame and person."""
 
 from __future__ import annotations
 
 import faulthandler
+import io
+import json
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from voodoo.batch.storage import Store, on_disk
 from voodoo.batch.summary import DONE, FAILED, REPORTS, Row
-from voodoo.batch.table import Columns, columns_of, encode, note_of
 from voodoo.config import Config
-from voodoo.errors import RecordingError
+from voodoo.errors import RecordingError, installed
 from voodoo.evaluation import metrics
 from voodoo.evaluation.evaluate import compare
 from voodoo.export.people import PeopleTrack
+from voodoo.export.table import columns_of as columns_of_rows
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.people import PeopleEstimate, everybody
@@ -32,6 +35,67 @@ from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.visualization.report_page import report_page
+
+Columns: TypeAlias = dict[str, npt.NDArray[Any]]
+
+NOTE = b"voodoo"
+"""Key in the metadata of the file; the value is JSON with the recording's summary row and the settings."""
+
+
+def columns_of(tracks: Mapping[int, Track]) -> Columns:
+    """The columns of all persons, sorted by time and person.
+
+    `stamp_s` float64 [s], `person` int32, `status`, `residual_m`, NAME_x, NAME_y, NAME_z [m] and NAME_rad as float32 (a tenth of
+    a millimeter at a kilometer), LIMB_status, and NAME_sigma_m as in a result's .csv. NaN and "" mean unknown.
+
+    Args:
+        tracks: of each person, from 1; with the same joints.
+    """
+    rows = PeopleTrack(np.empty(0), tracks).arrays()
+    kinds = {"stamp_s": np.float64, "person": np.int32}
+    return {
+        name: column if column.dtype.kind == "U" else column.astype(kinds.get(name, np.float32))
+        for name, column in columns_of_rows(rows, sure=rows["covariance"].size > 0).items()
+    }
+
+
+def encode(parts: Sequence[Columns], note: Mapping[str, Any]) -> bytes:
+    """The bytes of a Parquet file of consecutive rows, with a note in its footer; a column that a part lacks is unknown there.
+
+    Raises:
+        VoodooError: pyarrow is not installed.
+    """
+    pa, pq = _pyarrow(), _pyarrow("pyarrow.parquet")
+
+    def array(column: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - it has no types
+        if column.dtype.kind == "U":
+            return pa.array([value or None for value in column.tolist()], pa.string())
+        return pa.array(column, from_pandas=True)
+
+    tables = [pa.table({name: array(column) for name, column in part.items()}) for part in parts or ({},)]
+    table = pa.concat_tables(tables, promote_options="default").combine_chunks()
+    words = [field.name for field in table.schema if pa.types.is_string(field.type)]
+    out = io.BytesIO()
+    # Neighboring frames have equal high bytes: splitting the numbers by byte improves compression.
+    split = {name: "BYTE_STREAM_SPLIT" for name in table.column_names if name not in (*words, "person")}
+    table = table.replace_schema_metadata({NOTE: json.dumps(note).encode()})
+    pq.write_table(table, out, compression="zstd", use_dictionary=[*words, "person"], column_encoding=split)
+    return out.getvalue()
+
+
+def note_of(file: Any) -> dict[str, Any] | None:  # noqa: ANN401 - a binary file of any kind
+    """The note in the footer of a Parquet file; None without one, or if the file is damaged."""
+    pq = _pyarrow("pyarrow.parquet")
+    try:
+        found = json.loads(pq.read_metadata(file).metadata[NOTE])
+    except Exception:  # a damaged file can cause any error in the reader; the file is written again
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _pyarrow(module: str = "pyarrow") -> Any:  # noqa: ANN401 - it has no types
+    return installed(module, "tables are written by pyarrow: pip install 'voodoo-tracker[batch]'")
+
 
 T = TypeVar("T")
 _TOGETHER = 500
@@ -149,17 +213,15 @@ def _track(job: Job, path: Path) -> tuple[Row, list[Columns]]:
     one_only = chosen.people == 1
     columns: list[Columns] = []
     found: dict[int, list[Track]] = {}
-    whole: dict[int, list[Track]] = {}
     for part in _tracks(job, recording, settings, config, left_out):
         columns.append(columns_of(part))
         for one, own in part.items():
-            found.setdefault(one, []).append(joined([own]))
-            if job.report:
-                whole.setdefault(one, []).append(replace(own, left_out={} if left_out is None else left_out.counts))
+            found.setdefault(one, []).append(own if job.report else joined([own]))  # what only a page shows is large
     if one_only and not columns:
         raise RecordingError(f"{job.source}: expected at least one frame that can be used, found none")
     if job.report:
-        shown = {f"person {one}": Track.joined(own) for one, own in whole.items()}
+        counts = {} if left_out is None else left_out.counts
+        shown = {f"person {one}": replace(Track.joined(own), left_out=counts) for one, own in found.items()}
         Store(job.out).write(f"{REPORTS}/{job.name}.html", report_page(job.name, shown).encode())
     tracks = {one: joined(own) for one, own in found.items()}
     error = _error(recording, tracks[1]) if one_only else float("nan")
@@ -220,10 +282,8 @@ def _parts(items: Iterable[T], limit_s: float | None) -> Iterator[list[T]]:
 
 def joined(parts: Sequence[Track]) -> Track:
     """Concatenates tracks of one body; limbs and joint angles are left out."""
-    none = [np.empty((len(part), 0, 4, 4)) for part in parts]
-    kept = zip(parts, none, strict=True)
     return Track.joined(
-        [Track(p.stamps, p.status, p.residual, p.joint_names, p.joints, (), limbs) for p, limbs in kept]
+        [Track(p.stamps, p.status, p.residual, p.joint_names, p.joints, (), np.empty((len(p), 0, 4, 4))) for p in parts]
     )
 
 

@@ -28,7 +28,7 @@ def demo_command(
     from voodoo.export.track import Track
     from voodoo.pipeline.run import track
     from voodoo.pipeline.start import AUTO, start_tracker
-    from voodoo.recordings.sample import sample_path
+    from voodoo.recordings.loaders import sample_path
     from voodoo.visualization.image_writer import save_picture
     from voodoo.visualization.overlay import legend
     from voodoo.visualization.sheet import contact_sheet

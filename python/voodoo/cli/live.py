@@ -119,7 +119,7 @@ def live_command(
         refuse_both("--body", body, **{"--height": height, "--model": model})
         refuse_both("--view", view or None, **{"--serve": serve})
         if list(sources) == ["ros2:"]:
-            from voodoo.live.ros2.listing import listing
+            from voodoo.live.sources.ros2 import listing
 
             print_text("\n".join(listing() or ["nothing is published on this network"]))
             return

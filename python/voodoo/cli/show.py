@@ -23,8 +23,7 @@ def info_command(
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
     camera size, bits, calibration, field of view and range of depths."""
     from voodoo.cli.running import opened
-    from voodoo.recordings.depth_range import depth_range
-    from voodoo.recordings.first_images import doubts, first_images
+    from voodoo.recordings.first_images import depth_range, doubts, first_images
     from voodoo.recordings.left_out import LeftOut
 
     with clear_errors():

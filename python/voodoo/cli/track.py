@@ -261,7 +261,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
     Raises:
         NoPoseError: nobody was found.
     """
-    from voodoo.recordings.depth_range import depth_range
+    from voodoo.recordings.first_images import depth_range
 
     if left_out is not None:
         for reason, count in left_out.counts.items():

@@ -18,9 +18,9 @@ from voodoo.names import HumanModel
 from voodoo.people import People
 from voodoo.pipeline.run import track
 from voodoo.recordings.loaders import open_recording
-from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, PeopleTruth
+from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording
-from voodoo.recordings.truth import find_beside
+from voodoo.recordings.truth import PEOPLE_TRUTH_FILE, find_beside
 from voodoo.sensors.settings import FrontEndSettings
 
 

@@ -12,7 +12,7 @@ from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, placed
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 
 def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.0) -> None:
@@ -49,8 +49,7 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     for shifts, turns in zip(places, angles, strict=True):
         row = [value for bone in order for value in (*(shifts[bone] if moving[bone] else ()), *turns[bone])]
         lines.append(" ".join(f"{value:.6f}" for value in row))
-    with appearing_whole(Path(path)) as place:
-        place.write_text("\n".join(lines) + "\n", encoding="ascii")
+    write_whole(Path(path), "\n".join(lines) + "\n")
 
 
 def _describe(

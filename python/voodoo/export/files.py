@@ -12,16 +12,15 @@ from pathlib import Path
 
 from voodoo.errors import VoodooError, reason
 from voodoo.export.bvh import write_bvh
-from voodoo.export.c3d_file import write_c3d
 from voodoo.export.foxglove import SUFFIX as FOXGLOVE
 from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
+from voodoo.export.markers import write_c3d, write_trc
 from voodoo.export.opensim import write_mot, write_sto
 from voodoo.export.people import PeopleTrack
-from voodoo.export.result_file import SUFFIXES
 from voodoo.export.ros2 import person_id, write_people_bag
+from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
-from voodoo.export.trc import write_trc
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
 from voodoo.whole import appearing_whole
@@ -68,11 +67,6 @@ def check_target(path: Path) -> None:
 def is_folder(path: Path) -> bool:
     """Whether a name is that of a bag folder: the part after its last dot, if any, is not a file suffix (run.2026-05-01)."""
     return path.suffix not in FORMATS and not path.suffix[1:].isalpha()
-
-
-def is_foxglove(path: Path) -> bool:
-    """Whether a name is that of an .mcap file with the schemas of Foxglove."""
-    return path.name.endswith(FOXGLOVE)
 
 
 def is_table(path: Path) -> bool:
@@ -177,7 +171,7 @@ def save(
         )
         return [path]
     own = {person_id(one): track for one, track in tracks.items()}
-    if is_foxglove(path):
+    if path.name.endswith(FOXGLOVE):
         write_foxglove(path, own, root_frame=root_frame, turn=turn)
     else:
         with appearing_whole(path) as place, bag_folder(place) as folder:

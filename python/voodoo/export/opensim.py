@@ -1,6 +1,6 @@
 """Motions for OpenSim: joint angles (.mot) and orientations of bodies as OpenSense reads them (.sto).
 
-A frame without a pose has no row. Times are those of `voodoo.export.trc`, from the track's first frame.
+A frame without a pose has no row. Times are those of `voodoo.export.markers`, from the track's first frame.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from voodoo.export.skeleton import FloatArray, mean_interval, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.rotations import quaternions
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 
 def write_mot(path: str | Path, track: Track, body: Body) -> None:
@@ -72,5 +72,4 @@ def write_sto(path: str | Path, track: Track, body: Body) -> None:
 def _write(path: Path, header: Sequence[str], columns: Sequence[str], times: FloatArray, rows: Iterable[str]) -> None:
     lines = [*header, "endheader", "\t".join(["time", *columns])]
     lines += [f"{time:.6f}\t{row}" for time, row in zip(times, rows, strict=True)]
-    with appearing_whole(path) as place:
-        place.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n")

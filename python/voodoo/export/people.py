@@ -81,7 +81,7 @@ class PeopleTrack:
             VoodooError: another suffix.
             OSError: the file cannot be written.
         """
-        save_result(path, self.arrays())
+        save_result(path, lambda: iter([self.arrays()]))
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """All data as arrays, see docs/reference/files.md; the rows of several persons by time and number."""

@@ -23,7 +23,7 @@ from voodoo.errors import NoPoseError, VoodooError, a_path, reading, reason
 from voodoo.export.cut_off import complete
 from voodoo.export.files import FORMATS, STDOUT, check_target, is_table, on_stdout, save, written
 from voodoo.export.people import PeopleTrack
-from voodoo.export.table import BODIES, BODY_OF, Arrays, write_result
+from voodoo.export.table import BODIES, BODY_OF, Arrays, save_result
 from voodoo.export.track import Track, arrays_of, left_out_arrays, rows_of
 from voodoo.export.upright import SUFFIX as ROOT_SUFFIX
 from voodoo.export.upright import UNTURNED, Turn, by_axes, by_feet, turned
@@ -32,7 +32,7 @@ from voodoo.names import SEARCHING
 from voodoo.people import ONE, PeopleEstimate, everybody
 from voodoo.stored import MOST_METADATA, read_stored_text
 from voodoo.unpacking import stored_arrays
-from voodoo.whole import KEPT, SUFFIX, Hidden, appearing_whole, locked, move_whole, naming, removed
+from voodoo.whole import KEPT, SUFFIX, Hidden, locked, move_whole, naming, removed
 
 _BODIES_S = 10.0
 """Time between two copies of the bodies, which take long to write [s]."""
@@ -253,8 +253,8 @@ def _write(
         contents = partial(_turned, contents, turn)
         root_frame, turn = f"{root_frame}{ROOT_SUFFIX}", UNTURNED
     if is_table(path):
-        with on_stdout(path) as file, appearing_whole(file) as place:
-            write_result(place, contents, left_out_arrays(left_out))
+        with on_stdout(path) as file:
+            save_result(file, contents, left_out_arrays(left_out))
         return [path]
     result = PeopleTrack.joined(list(map(PeopleTrack.of_arrays, contents())))
     return save(result if numbered else result.tracks[ONE], path, body=bodies, root_frame=root_frame, turn=turn)

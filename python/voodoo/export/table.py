@@ -14,10 +14,22 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError, a_path, columns_in, naming, reading
-from voodoo.export.result_file import check_suffix
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import appearing_whole
+
+SUFFIXES = (".csv", ".npz")
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse result files that are neither .csv nor .npz.
+
+    Raises:
+        VoodooError: names both.
+    """
+    if path.suffix not in SUFFIXES:
+        raise VoodooError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}, found {path.suffix!r}")
+
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Arrays: TypeAlias = Mapping[str, npt.NDArray[Any]]
@@ -37,22 +49,13 @@ _STATUSES = ("tracking", "degraded", "lost", "searching")
 _EXPECTED = "a result of voodoo track"
 
 
-def write_result(path: Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
-    """Write consecutive parts of a result as .csv or .npz; a part is in memory at a time.
+def save_result(path: str | Path, parts: Callable[[], Iterator[Arrays]], fixed: Arrays | None = None) -> None:
+    """Write consecutive parts of a result as .csv or .npz; a part is in memory at a time. The file appears when it is complete.
 
     Args:
         path: the file.
         parts: returns their arrays, from the first part on.
         fixed: arrays of the whole result, in place of those of its parts; not in .csv.
-    """
-    if path.suffix == ".csv":
-        _write_csv(path, parts)
-    else:
-        _write_arrays(path, parts, fixed or {})
-
-
-def save_result(path: str | Path, arrays: Arrays) -> None:
-    """Write a result as .csv or .npz; the file appears only when it is complete.
 
     Raises:
         VoodooError: another suffix.
@@ -60,8 +63,11 @@ def save_result(path: str | Path, arrays: Arrays) -> None:
     """
     path = Path(path)
     check_suffix(path)
-    with appearing_whole(path) as part:
-        write_result(part, lambda: iter([arrays]))
+    with appearing_whole(path) as place:
+        if path.suffix == ".csv":
+            _write_csv(place, parts)
+        else:
+            _write_arrays(place, parts, fixed or {})
 
 
 @contextmanager

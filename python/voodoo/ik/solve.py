@@ -1,22 +1,131 @@
-"""Solvers for one posture, many postures, and sequences (J10 eq. 4)."""
+"""Solvers for one posture, many postures, and sequences (J10 eq. 4): their results, and the rest posture towards which angles are
+pulled in directions that targets and images leave free."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import MeasurementError
+from voodoo.errors import BodyError, MeasurementError
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette, core_views
-from voodoo.ik.options import Options, chosen_options
-from voodoo.ik.posture import Posture, Postures
-from voodoo.ik.rest import Rest, named_rest, rest_parts
-from voodoo.ik.targets import Target, Targets, target_parts
-from voodoo.ik.values import FloatArray, base_pose, listed_bones, listed_poses, named, vector
+from voodoo.ik.values import (
+    FloatArray,
+    Options,
+    Target,
+    Targets,
+    base_pose,
+    chosen_options,
+    listed_bones,
+    listed_poses,
+    named,
+    numbers,
+    target_parts,
+    vector,
+)
 from voodoo.model.body import Body
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Posture:
+    """Result of `solve`; immutable. World frame, meters, radians.
+
+    Attributes:
+        angles: (n,) in the order of `angle_names`, within the limits.
+        angle_names: see Chain.angle_names.
+        joints: position (3,) of every site on the chain.
+        world_from_limb: pose (4, 4) of every limb of the chain.
+        residuals: distance of every target, in the order they were given [m].
+        h: image criterion [px] (J10 eq. 5); 0 without images.
+        steps: steps used.
+        converged: the angles, or the image criterion, stopped changing; the remaining residual is a local minimum.
+        images: number of silhouettes used; empty ones are not.
+    """
+
+    angles: FloatArray
+    angle_names: tuple[str, ...]
+    joints: Mapping[str, FloatArray]
+    world_from_limb: Mapping[str, FloatArray]
+    residuals: tuple[float, ...]
+    h: float
+    steps: int
+    converged: bool
+    images: int
+
+    def __repr__(self) -> str:
+        """Summary in numbers."""
+        worst = max(self.residuals, default=0.0)
+        return (
+            f"Posture({len(self.angles)} angles, worst residual {1e3 * worst:.3f} mm, h={self.h:.3f} px of {self.images} "
+            f"images, {self.steps} steps, {'converged' if self.converged else 'not converged'})"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Postures:
+    """N postures of `solve_many`: angles (N, n), joints (N, S, 3) [m] in the order of Chain.site_names, h (N,) [px],
+    steps (N,), number of evaluated postures (N,), of those compared with the images (N,), converged (N,)."""
+
+    angles: FloatArray
+    joints: FloatArray
+    h: FloatArray
+    steps: FloatArray
+    tried: FloatArray
+    compared: FloatArray
+    converged: npt.NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        """The counts."""
+        return f"Postures({len(self.angles)}, {int(self.converged.sum())} converged)"
+
+
+Rest: TypeAlias = Mapping[str, float] | npt.ArrayLike | Posture
+"""Angles (n,) or a posture of the chain, for all joint angles; or name of an angle -> value [rad, m], for these alone."""
+
+
+def rest_parts(chain: Chain, rest: Rest | None) -> list[tuple[int, float]]:
+    """Index and value of every angle with a rest value; for whole postures all but the pose of a free root.
+
+    Raises:
+        BodyError: a name that is not an angle of the chain.
+        MeasurementError: not finite, another number of angles than the chain has, or of another chain.
+    """
+    names = chain.angle_names
+    if rest is None:
+        return []
+    if isinstance(rest, Mapping):
+        unknown = [name for name in rest if name not in names]
+        if unknown:
+            raise BodyError(f"rest: expected some of {', '.join(names)}, found {', '.join(map(repr, unknown))}")
+        values = _finite(list(rest.values()), len(rest))
+        return [(names.index(name), value) for name, value in zip(rest, values, strict=True)]
+    if isinstance(rest, Posture) and rest.angle_names != names:
+        raise MeasurementError(f"rest: expected a posture of {chain!r}, found one of {', '.join(rest.angle_names)}")
+    values = _finite(rest.angles if isinstance(rest, Posture) else rest, len(names))
+    # The position of the root has no rest value.
+    joints = 6 if names[:1] == ("root_x",) else 0
+    return list(enumerate(values))[joints:]
+
+
+def named_rest(chain: Chain, rest: Rest | None) -> dict[str, float]:
+    """`rest_parts` by name."""
+    return {chain.angle_names[index]: value for index, value in rest_parts(chain, rest)}
+
+
+def _finite(values: npt.ArrayLike, count: int) -> list[float]:
+    """An array of this many numbers.
+
+    Raises:
+        MeasurementError: another number of them, or not finite.
+    """
+    found = numbers("rest", values)
+    if found.shape != (count,) or not np.isfinite(found).all():
+        raise MeasurementError(f"rest: expected {count} finite numbers, found {values!r}")
+    return [float(value) for value in found]
 
 
 def solve(

@@ -5,26 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from voodoo.live.assembly import LiveFrame
-from voodoo.live.faults import FAULTS, Faults
-from voodoo.live.follow import Follower, Step
-from voodoo.live.source import Arrival, Source, SourceEnded, SourceGone
+from voodoo.live.assembly import LiveFrame as LiveFrame
+from voodoo.live.faults import FAULTS as FAULTS
+from voodoo.live.faults import Faults as Faults
+from voodoo.live.follow import Follower as Follower
+from voodoo.live.follow import Step as Step
+from voodoo.live.source import Arrival as Arrival
+from voodoo.live.source import Source as Source
+from voodoo.live.source import SourceEnded as SourceEnded
+from voodoo.live.source import SourceGone as SourceGone
 from voodoo.live.sources.words import source_of
-from voodoo.live.stream import Live
-
-__all__ = [
-    "FAULTS",
-    "Arrival",
-    "Faults",
-    "Follower",
-    "Live",
-    "LiveFrame",
-    "Source",
-    "SourceEnded",
-    "SourceGone",
-    "Step",
-    "open",
-]
+from voodoo.live.stream import Live as Live
 
 
 def open(

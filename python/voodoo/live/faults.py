@@ -90,7 +90,7 @@ class Faults:
         self.counts: dict[str, int] = {}
         self.first: dict[str, str] = {}
         self._on_message = on_message
-        self._optional_fields: dict[str, tuple[float, int]] = {}
+        self._reported: dict[str, tuple[float, int]] = {}
         self._lock = threading.Lock()
 
     def add(self, kind: str, words: object, now: float, count: int = 1) -> None:
@@ -105,11 +105,11 @@ class Faults:
         with self._lock:
             self.counts[kind] = self.counts.get(kind, 0) + count
             self.first.setdefault(kind, str(words))
-            at, counted = self._optional_fields.get(kind, (float("-inf"), 0))
+            at, counted = self._reported.get(kind, (float("-inf"), 0))
             if now - at < _QUIET_S:
                 return
             since = self.counts[kind] - counted
-            self._optional_fields[kind] = (now, self.counts[kind])
+            self._reported[kind] = (now, self.counts[kind])
         self.log(f"{kind}: {words}" if since == 1 else f"{kind} ({since} times): {words}")
 
     def add_error(self, error: VoodooError, now: float, otherwise: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from voodoo.live.assembly import LiveFrame
 from voodoo.live.stream import Live
 from voodoo.measurements import FloatArray, RecordedFrame
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo
+from voodoo.recordings.recording import Recording, SensorInfo
 
 
 class FirstFrame(Recording):
@@ -19,12 +19,14 @@ class FirstFrame(Recording):
         frame: its first frame.
     """
 
+    loader = "live"
+
     def __init__(self, live: Live, frame: LiveFrame) -> None:
         """Store source and frame."""
         self.name = live.sources[0].name
         self.path = Path(self.name)
         self.root_frame = live.root_frame
-        self._live, self._frame = live, frame
+        self._live, self._stamps = live, [frame.stamp]
 
     def __len__(self) -> int:
         """No frames."""
@@ -34,13 +36,9 @@ class FirstFrame(Recording):
         """No frames."""
         return iter(())
 
-    def info(self) -> RecordingInfo:
-        """The sensors with measurements."""
-        sensors = tuple(
-            SensorInfo.during(0.0, sensor, kind, self.root_frame, 1, "live")
-            for sensor, kind in self._live.kinds.items()
-        )
-        return self._described("live", sensors, start=self._frame.stamp, duration=0.0)
+    def _sensors(self) -> Iterator[SensorInfo]:
+        for name, kind in self._live.kinds.items():
+            yield SensorInfo.of(name, kind, self.root_frame, self._stamps, "live")
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """See Recording."""

@@ -88,8 +88,7 @@ class Source(ABC):
             SourceEnded: there are no more measurements.
         """
 
-    @abstractmethod
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - some have nothing to close
         """Close the source; no effect if it is not open."""
 
     def root_from(self, frame: str, stamp: float) -> FloatArray | None:

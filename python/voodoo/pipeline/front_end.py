@@ -26,7 +26,7 @@ from voodoo.pipeline.starts.base import FoundStart, StartFrame
 from voodoo.pipeline.starts.chosen import Starts, automatic_starts
 from voodoo.sensors.adapters import NOBODY, Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
-from voodoo.sensors.keypoints.sensor import KeypointReport
+from voodoo.sensors.keypoints.sites import KeypointReport
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
 from voodoo.sensors.skin.tracker import SkinTracker

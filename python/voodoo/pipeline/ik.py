@@ -13,19 +13,16 @@ from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.ik.chain import Chain
 from voodoo.ik.image import Silhouette
-from voodoo.ik.options import Options
-from voodoo.ik.posture import Posture
-from voodoo.ik.solve import Follower, solve
-from voodoo.measurements import ColorImage, DepthImage, RecordedFrame
+from voodoo.ik.solve import Follower, Posture, solve
+from voodoo.ik.values import Options
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, RecordedFrame
 from voodoo.recordings.recording import Recording, Reference
 from voodoo.sensors.settings import LEVEL_FRAMES
-from voodoo.sensors.silhouettes.color import StillBackground
-from voodoo.sensors.silhouettes.depth import StillScene, from_depth
+from voodoo.sensors.silhouettes.masks import surroundings
 from voodoo.sensors.silhouettes.regions import RegionSilhouettes
-from voodoo.sensors.silhouettes.surroundings import surroundings
+from voodoo.sensors.silhouettes.still import StillBackground, StillScene, from_depth
 from voodoo.tracker import Tracker
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pictures: TypeAlias = Literal["depth", "color", "regions", "none"]
 
 KNOWN = ("head_center", "l_shoulder", "r_shoulder", "l_hand", "r_hand", "l_hip", "r_hip", "l_ankle", "r_ankle")
@@ -117,8 +114,7 @@ def follow(
     regions = RegionSilhouettes(tracker.body) if pictures == "regions" else None
     options = Options() if options is None else options
     start = chain.project(tracker.estimate.world_from_limb)
-    chosen = {name: getattr(options, name) for name in Options.__dataclass_fields__}
-    follower = Follower(chain, start=start, rest="mean" if rest else None, **chosen)
+    follower = Follower(chain, start=start, rest="mean" if rest else None, **vars(options))
     others = [name for name in there if name not in known]
     level = recording.root_frame in LEVEL_FRAMES
 
@@ -199,7 +195,7 @@ def _scenes(
     """Background image of each camera, from images spread over the recording; cameras are assumed to be static."""
     chosen = set(np.linspace(0, len(recording) - 1, _LEARN).round().astype(int).tolist())
     depths: dict[str, list[DepthImage]] = {}
-    colors: dict[str, list[tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_]]]] = {}
+    colors: dict[str, list[tuple[ByteImage, npt.NDArray[np.bool_]]]] = {}
     for index, recorded in enumerate(recording):
         if index not in chosen:
             continue

@@ -13,8 +13,8 @@ from voodoo._core import Estimate
 from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
 from voodoo.errors import VoodooError, a_path
-from voodoo.export.result_file import SUFFIXES
 from voodoo.export.skeleton import bones
+from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.joint import short, valid

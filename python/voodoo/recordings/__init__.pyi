@@ -10,11 +10,11 @@ from voodoo.measurements import PointCloud as PointCloud
 from voodoo.measurements import RecordedFrame as RecordedFrame
 from voodoo.recordings.loaders import LOADERS as LOADERS
 from voodoo.recordings.loaders import open_recording as open_recording
+from voodoo.recordings.loaders import sample_path as sample_path
 from voodoo.recordings.recording import Recording as Recording
 from voodoo.recordings.recording import RecordingInfo as RecordingInfo
 from voodoo.recordings.recording import Reference as Reference
 from voodoo.recordings.recording import SensorInfo as SensorInfo
 from voodoo.recordings.recording import Start as Start
-from voodoo.recordings.sample import sample_path as sample_path
 
 def __getattr__(name: str) -> Any: ...  # noqa: ANN401 - whatever the name stands for

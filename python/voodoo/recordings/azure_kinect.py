@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from voodoo.errors import CameraError, RecordingError, installed, naming, reading
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, RecordedFrame
+from voodoo.measurements import ColorImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
 from voodoo.model.transforms import pose_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, usable
+from voodoo.recordings.recording import Recording, SensorInfo, usable
+from voodoo.recordings.together import in_turn
 
 FRAME = "depth_camera_optical_frame"
 COLOR_FRAME = "rgb_camera_optical_frame"
@@ -58,6 +59,8 @@ class AzureKinectRecording(Recording):
         RecordingError: PyAV is not installed, no depth track, or a calibration that is missing or damaged.
     """
 
+    loader = "azure-kinect"
+
     def __init__(self, path: Path, *, left_out: LeftOut | None = None) -> None:
         """Read the tracks, the calibration and the stamps; see the class."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
@@ -77,7 +80,6 @@ class AzureKinectRecording(Recording):
             cameras = _calibration(path, film)
             self._offset = int(tags.get("K4A_START_OFFSET_NS", 0)) * 1e-9
             self._tracks = {tracks["DEPTH"][0]: "depth"}
-            self._unused: tuple[tuple[str, str], ...] = ()
             self._camera = _camera(path, cameras, _DEPTH, tags["K4A_DEPTH_MODE"])
             if "COLOR" in tracks and tracks["COLOR"][1] != "mjpeg":
                 self._unused = (("color", f"{tracks['COLOR'][1]}, expected MJPG"),)
@@ -86,10 +88,11 @@ class AzureKinectRecording(Recording):
                 mode = tags.get("K4A_COLOR_MODE", "").removeprefix("MJPG_")
                 self._color = _camera(path, cameras, _COLOR, mode)
                 self._depth_from_color = np.linalg.inv(_pose(path, cameras, _COLOR)).astype(np.float64)
-            self._stamps: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
+            self._times: dict[str, list[float]] = {sensor: [] for sensor in self._tracks.values()}
+            self._stamps = self._times["depth"]
             for sensor, stamp, _ in self._packets(film):
-                self._stamps[sensor].append(stamp)
-        if not self._stamps["depth"]:
+                self._times[sensor].append(stamp)
+        if not self._stamps:
             raise RecordingError(f"{path}: expected depth images, found none")
 
     def _packets(self, film: Any) -> Iterator[tuple[str, float, Any]]:  # noqa: ANN401 - PyAV
@@ -99,27 +102,23 @@ class AzureKinectRecording(Recording):
                 stamp = float(packet.pts * packet.time_base) + self._offset
                 yield self._tracks[packet.stream.index], stamp, packet
 
-    def __len__(self) -> int:
-        """Number of depth images."""
-        return len(self._stamps["depth"])
-
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
-        waiting: list[ColorImage] = []
+        return in_turn(self._measurements(), "depth")
+
+    def _measurements(self) -> Iterator[Measurement]:
         number = -1
         with reading(self.path, _EXPECTED), _opened(self.path) as film:
             for sensor, stamp, packet in self._packets(film):
                 if sensor == "color":
                     size = (self._color.width, self._color.height)
                     load = partial(decode_color, bytes(packet), f"{self.path}, color at {stamp:.6f}", size)
-                    waiting.append(ColorImage("color", stamp, load, self._color, self._depth_from_color))
+                    yield ColorImage("color", stamp, load, self._color, self._depth_from_color)
                     continue
                 number += 1
                 make = partial(self._depth_image, stamp, bytes(packet))
-                item = usable(make, number, f"{self.path}, depth", self._left_out)
-                if item is not None:
-                    yield RecordedFrame(stamp, (*waiting, item))
-                    waiting.clear()
+                if item := usable(make, number, f"{self.path}, depth", self._left_out):
+                    yield item
 
     def _depth_image(self, stamp: float, content: bytes) -> DepthImage:
         where, size = f"{self.path}, depth", (self._camera.height, self._camera.width)
@@ -128,16 +127,11 @@ class AzureKinectRecording(Recording):
         image = np.frombuffer(content, dtype=">u2").reshape(size).astype(np.uint16)
         return DepthImage("depth", stamp, image, 0.001, self._camera, np.eye(4))
 
-    def info(self) -> RecordingInfo:
-        """Summarize from tracks and calibration."""
-        sensors = []
-        for sensor, stamps in self._stamps.items():
+    def _sensors(self) -> Iterator[SensorInfo]:
+        for sensor, stamps in self._times.items():
             camera, frame = (self._camera, FRAME) if sensor == "depth" else (self._color, COLOR_FRAME)
             detail = f"{camera.width}x{camera.height} {'16UC1' if sensor == 'depth' else 'MJPG'}"
-            span = stamps[-1] - stamps[0] if stamps else 0.0
-            sensors.append(SensorInfo.during(span, sensor, sensor, frame, len(stamps), detail))
-        first, last = self._stamps["depth"][0], self._stamps["depth"][-1]
-        return self._described("azure-kinect", sensors, start=first, duration=last - first, unused=self._unused)
+            yield SensorInfo.of(sensor, sensor, frame, stamps, detail)
 
 
 def _opened(path: Path) -> Any:  # noqa: ANN401 - PyAV

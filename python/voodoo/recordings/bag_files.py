@@ -16,7 +16,7 @@ from rosbags.rosbag2.metadata import ReaderMetadata
 from rosbags.rosbag2.reader import DirectoryReader
 
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.mcap_file import DAMAGED, Item, McapFile, is_plain_yaml
+from voodoo.recordings.mcap_file import DAMAGED, Item, McapFile, is_plain_yaml, or_error
 from voodoo.recordings.set_back import falls
 from voodoo.recordings.sqlite_file import SqliteFile
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored, read_stored_text
@@ -85,13 +85,8 @@ class Ros1File(Reader):
         if not falls((one.id, entry.time) for entry, one in entries):
             entries.sort(key=lambda item: item[0].time)
         for entry, one in entries:
-            data: bytes | RecordingError
-            try:
-                with reading(self.path, f"a sound chunk at byte {entry.chunk_pos}"):
-                    data = self._message(entry)
-            except RecordingError as error:
-                data = RecordingError(str(error), reason=DAMAGED)
-            yield one, entry.time, data
+            sound = f"a sound chunk at byte {entry.chunk_pos}"
+            yield one, entry.time, or_error(partial(self._message, entry), self.path, sound, reason=DAMAGED)
 
     def _message(self, entry: IndexData) -> bytes:
         if self._last[0] != entry.chunk_pos:
@@ -162,15 +157,9 @@ class BagFolder(DirectoryReader):
             found: Iterator[Any] = storage.messages(own, start, stop) if own else iter(())
             for item, time, data in found:
                 if self.metadata.compression_mode == "message" and isinstance(data, bytes):
-                    data = self._unpacked(item.topic, data)
+                    unpack = partial(self._unpacking.unpack, data, "zstd")
+                    data = or_error(unpack, f"{self._folder}, topic {item.topic}", "a message compressed by zstd")
                 yield wanted[item.topic, item.msgtype], time, data
-
-    def _unpacked(self, topic: str, data: bytes) -> bytes | RecordingError:
-        try:
-            with reading(f"{self._folder}, topic {topic}", "a message compressed by zstd"):
-                return self._unpacking.unpack(data, "zstd")
-        except RecordingError as error:
-            return error
 
 
 BagFile: TypeAlias = Ros1File | BagFolder | McapFile | SqliteFile

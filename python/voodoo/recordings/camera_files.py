@@ -1,32 +1,41 @@
-"""Calibrated cameras from the TOML files of Pose2Sim, anipose, FreeMoCap and Caliscope, or YAML (OpenCV conventions)."""
+"""Calibrated cameras from files: the TOML of Pose2Sim, anipose, FreeMoCap and Caliscope, YAML (OpenCV conventions), and
+calibration.toml, the camera of a folder of images."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from ruamel.yaml import YAML
 
-from voodoo.errors import CameraError, RecordingError, naming
+from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_or_nan, short
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.model.transforms import is_rigid, pose_of
-from voodoo.recordings.camera_yaml import camera_tables
+from voodoo.recordings.mcap_file import is_plain_yaml
+from voodoo.recordings.pictures import picture_size
+from voodoo.stored import read_stored
 
+_TURNS = ("rotation", "R", "rvec", "rotation_vector", "rotation_matrix")
+_SHIFTS = ("translation", "T", "t", "tvec", "translation_vector")
 _KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedCamera:
-    """A camera with its name and its pose (4, 4) in the world."""
+    """A camera with its name and its pose (4, 4) in the world or root frame; whether its images are mirrored left to right."""
 
     name: str
     camera: Camera
     world_from_sensor: FloatArray
+    mirrored: bool = False
 
 
 def read_camera_toml(path: str | Path, *, meters_per_unit: float = 1.0) -> tuple[PlacedCamera, ...]:
@@ -50,7 +59,7 @@ def read_camera_toml(path: str | Path, *, meters_per_unit: float = 1.0) -> tuple
     tables = tables_of(path)
     if not tables:
         raise RecordingError(f"{path}: expected a table with a matrix for each camera, found none")
-    return tuple(_camera(f"{path}, [{key}]", key, table, meters_per_unit) for key, table in tables.items())
+    return tuple(_placed(f"{path}, [{key}]", key, table, meters_per_unit) for key, table in tables.items())
 
 
 def tables_of(path: Path) -> dict[str, dict[str, Any]]:
@@ -65,34 +74,35 @@ def tables_of(path: Path) -> dict[str, dict[str, Any]]:
     return {key: value for key, value in content.items() if isinstance(value, dict) and "matrix" in value}
 
 
-def _camera(where: str, key: str, table: dict[str, Any], meters_per_unit: float) -> PlacedCamera:
-    missing = [name for name in _KEYS if name not in table]
-    if missing:
-        raise RecordingError(f"{where}: expected the keys {', '.join(_KEYS)}, found no {', '.join(missing)}")
+def camera_of(where: str, table: dict[str, Any]) -> Camera:
+    """The camera of a table, by its `size`, `matrix`, `distortions` and `fisheye`.
+
+    Raises:
+        RecordingError: invalid numbers; `where` begins the message.
+    """
     size, matrix = _numbers(where, table, "size", (2,)), _numbers(where, table, "matrix", (3, 3))
     if matrix[0, 1] != 0.0 or (matrix[2] != (0.0, 0.0, 1.0)).any():
         raise RecordingError(f"{where}, matrix: expected no skew and a last row 0 0 1, found {matrix.tolist()}")
-    coefficients = tuple(float(value) for value in _numbers(where, table, "distortions", None))
-    fisheye = table.get("fisheye", False)
+    width, height = (round(float(value)) for value in size)
+    lens = tuple(_numbers(where, table, "distortions", None).tolist())
+    fisheye = table.get("fisheye", False) is True
+    model: Any = "equidistant" if fisheye else "plumb_bob" if len(lens) < 8 else "rational_polynomial"
     with naming(where, CameraError, error=RecordingError):
-        camera = Camera(
-            width=round(float(size[0])),
-            height=round(float(size[1])),
-            fx=float(matrix[0, 0]),
-            fy=float(matrix[1, 1]),
-            cx=float(matrix[0, 2]),
-            cy=float(matrix[1, 2]),
-            distortion=coefficients,
-            model="equidistant" if fisheye is True else "plumb_bob" if len(coefficients) < 8 else "rational_polynomial",
-        )
+        return Camera(width, height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], lens, model)
+
+
+def _placed(where: str, key: str, table: dict[str, Any], meters_per_unit: float) -> PlacedCamera:
+    missing = [name for name in _KEYS if name not in table]
+    if missing:
+        raise RecordingError(f"{where}: expected the keys {', '.join(_KEYS)}, found no {', '.join(missing)}")
+    camera = camera_of(where, table)
     turn = _numbers(where, table, "rotation", None)
     if turn.shape != (3, 3):
         turn = np.asarray(cv2.Rodrigues(_numbers(where, table, "rotation", (3,)))[0], dtype=np.float64)
     elif not is_rigid(pose_of(turn), off=1e-3):
         raise RecordingError(f"{where}, rotation: expected a rotation, found {short(table['rotation'])}")
     pose = pose_of(turn.T, -turn.T @ _numbers(where, table, "translation", (3,)) * meters_per_unit)
-    name = table.get("name", key)
-    return PlacedCamera(str(name), camera, pose)
+    return PlacedCamera(str(table.get("name", key)), camera, pose)
 
 
 def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int, ...] | None) -> FloatArray:
@@ -101,3 +111,208 @@ def _numbers(where: str, table: dict[str, Any], key: str, shape: tuple[int, ...]
         expected = "a list of" if shape is None else "x".join(map(str, shape))
         raise RecordingError(f"{where}, {key}: expected {expected} finite numbers, found {short(table[key])}")
     return values
+
+
+def camera_tables(path: Path) -> dict[str, dict[str, Any]]:
+    """Name -> table of every camera in the file; {} if there is none.
+
+    Raises:
+        RecordingError: not YAML, or numbers that are none; names the file.
+    """
+    text = read_text(path, error=RecordingError)
+    # OpenCV writes a directive and a tag that are no YAML.
+    text = re.sub(r"^%YAML[: ].*\n", "", text).replace("!!opencv-matrix", "")
+    if not is_plain_yaml(text):
+        raise RecordingError(f"{path}: expected YAML without references, and of some hundred numbers, found another")
+    with reading(path, "a calibration in YAML"):
+        content = YAML(typ="safe", pure=True).load(text)
+        if not isinstance(content, Mapping):
+            return {}
+        rows = {str(key): value for key, value in content.items() if isinstance(value, Mapping)}
+        if chain := {key: row for key, row in rows.items() if "intrinsics" in row and "resolution" in row}:
+            return _chain(chain)
+        cameras = {key: row for key, row in rows.items() if _matrix_key(row)}
+        if _matrix_key(content):
+            cameras = {str(content.get("camera_name", path.stem)): content}
+        return {name: _table(name, row) for name, row in cameras.items()}
+
+
+def _matrix_key(row: Mapping[str, Any]) -> str:
+    return next((key for key in ("camera_matrix", "K") if key in row), "")
+
+
+def _array(value: object) -> list[Any]:
+    """The numbers of a list, or of a matrix with rows, cols and data."""
+    if isinstance(value, Mapping):
+        shape = (int(value["rows"]), int(value["cols"]))
+        value = np.array(value["data"], dtype=np.float64).reshape(shape)
+        value = value.ravel() if 1 in shape else value
+    return np.array(value, dtype=np.float64).tolist()
+
+
+def _table(name: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    matrix = np.array(_array(row[_matrix_key(row)])).reshape(3, 3)
+    lens: object = next((row[key] for key in ("distortion_coefficients", "D") if key in row), [])
+    width, height = (row.get(f"image_{key}", row.get(key)) for key in ("width", "height"))
+    table: dict[str, Any] = {"name": name, "matrix": matrix.tolist(), "distortions": _array(lens)}
+    table["fisheye"] = row.get("distortion_model") in ("equidistant", "fisheye")
+    if width is not None and height is not None:
+        table["size"] = [width, height]
+    for key, names in (("rotation", _TURNS), ("translation", _SHIFTS)):
+        found = next((row[name] for name in names if name in row), None)
+        if found is not None:
+            table[key] = _array(found)
+    return table
+
+
+def _chain(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Kalibr's cameras; the world is the first one's optical frame."""
+    pose = np.eye(4)
+    tables: dict[str, dict[str, Any]] = {}
+    for name, row in rows.items():
+        if row.get("camera_model", "pinhole") != "pinhole":
+            raise ValueError(f"{name}: expected the camera_model pinhole, found {row['camera_model']}")
+        if tables:
+            pose = np.array(row["T_cn_cnm1"], dtype=np.float64).reshape(4, 4) @ pose
+        fx, fy, cx, cy = (float(value) for value in row["intrinsics"])
+        tables[name] = {
+            "name": name,
+            "size": list(row["resolution"]),
+            "matrix": [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]],
+            "distortions": _array(row.get("distortion_coeffs", [])),
+            "fisheye": row.get("distortion_model") == "equidistant",
+            "rotation": pose[:3, :3].tolist(),
+            "translation": pose[:3, 3].tolist(),
+        }
+    return tables
+
+
+T = TypeVar("T")
+_CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
+_OPTIONAL_KEYS = ("distortion", "model", "mirrored", "sensor_frame", "root_from_sensor")
+_ROUNDING, _TYPED = 1e-9, 2e-3
+"""Tolerances for the deviation of a matrix from a rotation: by rounding of doubles, and with three typed digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class FolderCalibration:
+    """Cameras of a folder, named by their frames; `depth_factor` is units per meter of the depth images."""
+
+    root_frame: str
+    depth_factor: float
+    depth: PlacedCamera
+    color: PlacedCamera | None
+
+
+_TEMPLATE = """\
+width = {width}
+height = {height}
+fx = 525.0              # pixels, from the maker's tools; by the field of view F across: width / (2 tan(F / 2))
+fy = 525.0
+cx = {cx}
+cy = {cy}
+depth_factor = 1000.0   # units per meter: 1000 where images are in millimeters, 5000 in the TUM RGB-D benchmark
+sensor_frame = "camera_depth_optical_frame"
+"""
+
+
+def template(like: Path | None) -> str:
+    """A template of calibration.toml with the size of an image."""
+    try:
+        width, height = (640, 480) if like is None else picture_size(read_stored(like, "a readable picture"), like)
+    except RecordingError:
+        width, height = 640, 480
+    return _TEMPLATE.format(width=width, height=height, cx=(width - 1) / 2, cy=(height - 1) / 2)
+
+
+def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibration:
+    """Read a calibration.toml; see FolderRecording for the format.
+
+    Args:
+        path: the file.
+        like: one of the images, whose size is used in the template if there is no such file.
+
+    Raises:
+        RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
+    """
+    if not path.is_file():
+        if path.parent.is_dir() and (found := _from_yaml(path.parent)):
+            return found
+        hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
+        raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
+    content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
+    tables = {"depth", "color"}
+    _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))
+    depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
+    factor = content.get("depth_factor", 5000.0)
+    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0.0 < factor < 1e9:
+        raise RecordingError(f"{path}: depth_factor: expected units per meter > 0, found {short(factor)}")
+    color = None
+    if "color" in content:
+        table = _entry(content, "color", dict, {}, "a table", str(path))
+        _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
+        color = _camera(table, "color", f"{path}, [color]")
+    unmoved = np.array_equal(depth.world_from_sensor, np.eye(4))
+    otherwise = depth.name if unmoved else "root"
+    root_frame = _entry(content, "root_frame", str, otherwise, "a name", str(path))
+    return FolderCalibration(root_frame, float(factor), depth, color)
+
+
+def _from_yaml(folder: Path) -> FolderCalibration | None:
+    """The only camera in the YAML files of a folder, with depth in millimeters; None: there is no such one."""
+    files = sorted((*folder.glob("*.yaml"), *folder.glob("*.yml")))
+    tables = [(f"{file}, [{name}]", table) for file in files for name, table in camera_tables(file).items()]
+    if len(tables) != 1 or "size" not in tables[0][1]:
+        return None
+    frame = "camera_depth_optical_frame"
+    return FolderCalibration(frame, 1000.0, PlacedCamera(frame, camera_of(*tables[0]), np.eye(4)), None)
+
+
+def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
+    unknown = sorted(set(table) - known)
+    missing = [key for key in _CAMERA_KEYS if key not in table]
+    if unknown or missing:
+        raise RecordingError(
+            f"{where}: expected the keys {', '.join(_CAMERA_KEYS)} and optionally "
+            f"{', '.join(sorted(known - set(_CAMERA_KEYS)))}; found missing {missing}, unknown {unknown}"
+        )
+
+
+def _entry(table: dict[str, Any], key: str, kind: type[T], otherwise: T, expected: str, where: str) -> T:
+    """An entry of a kind.
+
+    Raises:
+        RecordingError: it is of another one.
+    """
+    value = table.get(key, otherwise)
+    if not isinstance(value, kind):
+        raise RecordingError(f"{where}: {key}: expected {expected}, found {short(value)}")
+    return value
+
+
+def _camera(table: dict[str, Any], kind: str, where: str) -> PlacedCamera:
+    distortion = _entry(table, "distortion", list, [], "a list of numbers", where)
+    with naming(where, CameraError, error=RecordingError):
+        camera = Camera(
+            **{key: table[key] for key in _CAMERA_KEYS},
+            distortion=tuple(distortion),
+            model=table.get("model", "plumb_bob"),
+        )
+    frame = _entry(table, "sensor_frame", str, f"camera_{kind}_optical_frame", "a name", where)
+    mirrored = _entry(table, "mirrored", bool, False, "true or false", where)
+    return PlacedCamera(frame, camera, _pose(table.get("root_from_sensor"), where), mirrored)
+
+
+def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here
+    if rows is None:
+        return np.eye(4)
+    pose = numbers_or_nan(rows)
+    if not is_rigid(pose, off=_TYPED):
+        raise RecordingError(
+            f"{where}: root_from_sensor: expected four rows of a rigid 4x4 transform, found {short(rows)}"
+        )
+    # A matrix typed with three or four digits is only approximately a rotation, but the tracker needs an exact one.
+    if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), rtol=0.0, atol=_ROUNDING):
+        u, _, v = np.linalg.svd(pose[:3, :3])
+        pose[:3, :3] = u @ v
+    return pose

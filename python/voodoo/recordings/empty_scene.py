@@ -6,10 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from voodoo.errors import RecordingError
+from voodoo.measurements import ByteImage
 from voodoo.model.camera import Camera
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.order import in_order
@@ -47,13 +45,15 @@ def pictures_of(folder: Path, cameras: Mapping[str, Sequence[str]]) -> dict[str,
 class EmptyScene:
     """The images of the empty scene that belong to a recording: in a folder set by the user, else in `background/` beside it."""
 
-    def __init__(self, place: Path, given: str | Path | None, cameras: Mapping[str, Sequence[str]]) -> None:
+    def __init__(
+        self, place: Path, given: str | Path | None, cameras: Mapping[str, tuple[Camera, Sequence[str]]]
+    ) -> None:
         """List the files.
 
         Args:
             place: the recording; `background/` is beside it, in it, or one folder up.
             given: the folder set by the user.
-            cameras: see `pictures_of`.
+            cameras: sensor -> its camera, and the names that its images may have, see `pictures_of`.
 
         Raises:
             RecordingError: the folder set by the user has no camera's images.
@@ -61,9 +61,11 @@ class EmptyScene:
         beside = place if place.is_dir() else place.parent
         folders = (beside / FOLDER, beside.parent / FOLDER)
         self._folder = next((one for one in folders if one.is_dir()), None) if given is None else Path(given)
-        self._files = {} if self._folder is None else pictures_of(self._folder, cameras)
+        self._cameras = {sensor: camera for sensor, (camera, _) in cameras.items()}
+        told = {sensor: own for sensor, (_, own) in cameras.items()}
+        self._files = {} if self._folder is None else pictures_of(self._folder, told)
         if given is not None and not self._files:
-            names = [f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in cameras.items()]
+            names = [f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in told.items()]
             listed = "; ".join(names) or "no camera"
             raise RecordingError(
                 f"{given}: expected pictures NAME.png or NAME_0.png, ... by a camera's name ({listed}), found none"
@@ -79,13 +81,10 @@ class EmptyScene:
             f"pictures of the empty scene in {self._folder}: {', '.join(counts) or 'none that belongs to a camera'}",
         )
 
-    def read(
-        self, cameras: Mapping[str, Camera], *, left_out: LeftOut | None
-    ) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
+    def read(self, *, left_out: LeftOut | None) -> dict[str, tuple[ByteImage, ...]]:
         """Decode the images, at most MOST per camera.
 
         Args:
-            cameras: of each sensor.
             left_out: counts unreadable images, which are then left out; None: they are errors.
 
         Returns:
@@ -96,7 +95,7 @@ class EmptyScene:
         """
         read = {}
         for sensor, paths in self._files.items():
-            camera, pictures = cameras[sensor], []
+            camera, pictures = self._cameras[sensor], []
             for path in paths[:: -(-len(paths) // MOST)]:
                 with leaving_out(left_out, "pictures of the empty scene"):
                     pictures.append(decode_color(read_stored(path, "a picture"), path, (camera.width, camera.height)))

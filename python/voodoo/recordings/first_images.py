@@ -1,4 +1,5 @@
-"""The first image of every camera of a recording, as it is in the file, and what its summary does not show."""
+"""The first images of a recording: as they are in the file, the range of their depths, which reveals a wrong unit before it
+causes a lost body, and what its summary does not show."""
 
 from __future__ import annotations
 
@@ -17,6 +18,10 @@ _FRAMES = 10
 """Frames in which the first images are looked for."""
 _LEAST_DEG, _MOST_DEG = 30.0, 150.0
 """Fields of view that depth cameras have."""
+_IMAGES = 5
+"""Number of images at the start that are searched for valid depths."""
+_NEAR_M, _FAR_M = 1.2, 8.0
+"""Plausible depths of a camera that observes a person: some are beyond the first limit, and the median is below the second."""
 FIXED_FRAMES = ("odom", "map", "world")
 """Root frames that stay where they are while a robot drives."""
 
@@ -101,3 +106,41 @@ def doubts(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage]
             "needs odometry, or what stands still seems to move"
         )
     return found
+
+
+@dataclass(frozen=True)
+class DepthRange:
+    """Depths [m] of an image: the nearest 5 %, the middle, the farthest 5 %."""
+
+    near: float
+    middle: float
+    far: float
+
+    def __str__(self) -> str:
+        """Readable line."""
+        return f"{self.near:.2f} to {self.far:.2f} m (90 % of the first image, half of it before {self.middle:.2f} m)"
+
+    @property
+    def warning(self) -> str:
+        """Description of the problem if depths are too small or too large for a person; "" otherwise."""
+        if self.near < self.far < _NEAR_M or self.middle > _FAR_M:
+            return (
+                f"depths of {self.near:.2f} to {self.far:.2f} m leave no room for a person: is the unit right? "
+                "(depth_factor of calibration.toml: 1000 for millimeters; --option meters_per_unit=0.001 of a bag)"
+            )
+        return ""
+
+
+def depth_range(recording: Recording) -> DepthRange | None:
+    """The range of the first depth image with valid depths; None without one, or if it cannot be read."""
+    try:
+        for recorded in islice(recording, _IMAGES):
+            for item in recorded.measurements:
+                if isinstance(item, DepthImage):
+                    meters = item.meters()
+                    if (meters := meters[np.isfinite(meters)]).size:
+                        near, middle, far = (float(value) for value in np.percentile(meters, (5.0, 50.0, 95.0)))
+                        return DepthRange(near, middle, far)
+    except VoodooError:
+        return None  # reading the frames reports the error
+    return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -12,19 +13,14 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
-from voodoo.recordings.calibration import Calibration, FolderCalibration, read_calibration
+from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read_calibration
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    SensorInfo,
-    number_option,
-    usable,
-)
+from voodoo.recordings.recording import Recording, SensorInfo, number_option, usable
 from voodoo.recordings.set_back import SetBack
-from voodoo.recordings.truth import read_start, read_truth
+from voodoo.recordings.together import in_turn
+from voodoo.recordings.truth import read_beside
 from voodoo.stored import read_stored, read_stored_text
 
 _RATE = 30.0
@@ -46,6 +42,7 @@ class FolderRecording(Recording):
         rgb/, rgb.txt                 optional: the same for color (PNG or JPEG)
         calibration.toml              the camera
         truth.csv                     optional: exact joint positions in the root frame, as beside a rendered bag
+        truth_people.csv              optional: those of several persons
         init.json                     optional: pose of the person in the first frame, as read by --init
 
     There is one frame for each depth image, holding the color images since the previous one. A groundtruth.txt (the
@@ -82,6 +79,8 @@ class FolderRecording(Recording):
         RecordingError: no images, no calibration, names that are not stamps, or stamps that do not increase.
     """
 
+    loader = "folder"
+
     def __init__(
         self,
         path: Path,
@@ -104,13 +103,13 @@ class FolderRecording(Recording):
         self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)
         if not self._depth:
             raise RecordingError(f"{path}: expected depth images in depth/ or listed in depth.txt, found none")
+        self._stamps = [stamp for stamp, _ in self._depth]
         file = path / "calibration.toml" if calibration is None else Path(calibration)
         self._calibration = read_calibration(file, like=self._depth[0][1])
         self.root_frame = self._calibration.root_frame
         if not bare:
-            self._read_beside()
+            read_beside(self, lambda name: path / name if (path / name).is_file() else None, root=self.root_frame)
         self._color: list[tuple[float, Path]] = []
-        self._unused: tuple[tuple[str, str], ...] = ()
         if (path / "rgb").is_dir() or (path / "rgb.txt").is_file():
             if self._calibration.color is None:
                 self._unused = (("rgb", "no [color] table in the calibration file"),)
@@ -118,41 +117,21 @@ class FolderRecording(Recording):
                 self._color = _listing(path, "rgb", _PICTURES, clock, left_out, set_back)
         self.assumed = (*clock.notes, *set_back.words)
 
-    def _read_beside(self) -> None:
-        start, truth = self.path / "init.json", self.path / "truth.csv"
-        if start.is_file():
-            self.start = read_start(start, lambda frame: self.root_from(frame or self.root_frame, 0.0))
-        if truth.is_file():
-            self.reference = read_truth(truth, lambda stamp: np.eye(4))
-
-    def __len__(self) -> int:
-        """Number of depth images."""
-        return len(self._depth)
-
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the images; see Recording."""
         color = self._calibration.color
-        colors = iter(self._color)
-        upcoming = next(colors, None)
-        measurements: list[Measurement] = []
-        for number, (stamp, file) in enumerate(self._depth):
-            while color is not None and upcoming is not None and upcoming[0] <= stamp:
-                measurements.append(color_image(*upcoming, color))
-                upcoming = next(colors, None)
-            item = usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out)
-            if item is not None:
-                yield RecordedFrame(stamp, (*measurements, item))
-                measurements.clear()
-
-    def info(self) -> RecordingInfo:
-        """Summarize from names and calibration."""
-        sensors = [_sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)]
-        if self._color and self._calibration.color is not None:
-            sensors.append(_sensor("color", "pictures", self._color, self._calibration.color))
-        first, last = self._depth[0][0], self._depth[-1][0]
-        return self._described(
-            "folder", sensors, start=first, duration=last - first, unused=self._unused, notes=self.assumed
+        colors: Iterator[Measurement] = (color_image(*entry, color) for entry in self._color if color is not None)
+        depths: Iterator[Measurement] = (
+            item
+            for number, (stamp, file) in enumerate(self._depth)
+            if (item := usable(partial(depth_image, stamp, file, self._calibration), number, file, self._left_out))
         )
+        return in_turn(heapq.merge(colors, depths, key=lambda item: item.stamp), "depth")
+
+    def _sensors(self) -> Iterator[SensorInfo]:
+        yield _sensor("depth", "16-bit PNG", self._depth, self._calibration.depth)
+        if self._color and self._calibration.color is not None:
+            yield _sensor("color", "pictures", self._color, self._calibration.color)
 
 
 class FrameClock:
@@ -266,19 +245,18 @@ def depth_image(stamp: float, file: Path, calibration: FolderCalibration) -> Dep
     place = calibration.depth
     image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
     image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
-    return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.root_from_sensor)
+    return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.world_from_sensor)
 
 
-def color_image(stamp: float, file: Path, color: Calibration) -> ColorImage:
+def color_image(stamp: float, file: Path, color: PlacedCamera) -> ColorImage:
     """The image in a file of rgb/, which is read when it is decoded."""
     size = (color.camera.width, color.camera.height)
     step = -1 if color.mirrored else 1
     load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
-    return ColorImage("rgb", stamp, load, color.camera, color.root_from_sensor)
+    return ColorImage("rgb", stamp, load, color.camera, color.world_from_sensor)
 
 
-def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: Calibration) -> SensorInfo:
-    span = entries[-1][0] - entries[0][0]
+def _sensor(kind: str, words: str, entries: list[tuple[float, Path]], calibration: PlacedCamera) -> SensorInfo:
     detail = f"{calibration.camera.width}x{calibration.camera.height} {words}"
     name = "rgb" if kind == "color" else kind
-    return SensorInfo.during(span, name, kind, calibration.sensor_frame, len(entries), detail)
+    return SensorInfo.of(name, kind, calibration.name, [stamp for stamp, _ in entries], detail)

@@ -9,13 +9,9 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from voodoo.errors import RecordingError
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
-from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
-from voodoo.recordings.keypoint_depth import check_on_depth
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, KeypointImage, Measurement, RecordedFrame
+from voodoo.recordings.keypoint_check import check_keypoints, check_on_depth, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
@@ -44,7 +40,7 @@ class Around(Recording):
         """See Recording."""
         return self._recording.root_from(frame, stamp)
 
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+    def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """See Recording."""
         return self._recording.empty_scene()
 
@@ -99,7 +95,7 @@ class Joined(Around):
             # The measurement that defines the frame stays last.
             yield RecordedFrame(recorded.stamp, (*recorded.measurements[:-1], *added, *recorded.measurements[-1:]))
 
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+    def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Images of the empty scene of all recordings."""
         return {
             name: observed for one in (*self._others, self._recording) for name, observed in one.empty_scene().items()
@@ -213,19 +209,10 @@ class WithKeypoints(Around):
                         # The numbers of images count those that were left out.
                         number = self._left_out.numbers.get((item.sensor, item.stamp), number)
                     count[item.sensor] = number + 1
-                    items.append(self._keypoints(item, number))
+                    people = read_people(self._files[item.sensor][number], layout=self._layout, left_out=self._left_out)
+                    items.append(KeypointImage.of(item, people, self._layout))
                 items.append(item)
             yield RecordedFrame(recorded.stamp, tuple(items))
-
-    def _keypoints(self, item: ColorImage | DepthImage, number: int) -> KeypointImage:
-        return KeypointImage(
-            sensor=f"{item.sensor}/keypoints",
-            stamp=item.stamp,
-            people=read_people(self._files[item.sensor][number], layout=self._layout, left_out=self._left_out),
-            layout=self._layout,
-            camera=item.camera,
-            root_from_sensor=item.root_from_sensor,
-        )
 
     def info(self) -> RecordingInfo:
         """The summary of the recording, with the keypoints."""

@@ -107,9 +107,10 @@ def open_recording(
         allowed = ", ".join(word for word in known if word not in ("bare", "left_out")) or "none"
         raise RecordingError(f"loader {name!r} has no option {', '.join(unknown)}; its options: {allowed}")
     recording = LOADERS[name].open(path, **options)
-    found = getattr(recording, "loader", name)  # the bag determines which of the two kinds it is
-    if found != name:
-        raise RecordingError(f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {found!r}")
+    if recording.loader != name:  # the bag determines which of the two kinds it is
+        raise RecordingError(
+            f"{path}: expected {LOADERS[name].expects}, found a bag for the loader {recording.loader!r}"
+        )
     return recording
 
 
@@ -186,3 +187,11 @@ def _of_cameras(path: Path) -> str | None:
 
 def _listing() -> str:
     return "loaders: " + "; ".join(f"{name}: {loader.expects}" for name, loader in LOADERS.items())
+
+
+def sample_path() -> Path:
+    """Folder of the bundled recording: 90 frames of a rendered person who bends over, scoops and reaches up.
+
+    It opens like any other: `open_recording(sample_path())`. Source and license are in its README.md.
+    """
+    return Path(__file__).resolve().parent.parent / "data" / "bend_scoop"

@@ -17,7 +17,7 @@ from voodoo.model.standing import standing_along
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.recordings.marker_trajectories import Z_UP_FROM, MarkerTrajectories, read_markers
 from voodoo.recordings.pose2sim import SITES
-from voodoo.recordings.recording import Recording, RecordingInfo, SensorInfo, Start
+from voodoo.recordings.recording import Recording, SensorInfo, Start
 
 FRAME = "world"
 _HIGH_M = 1.5
@@ -82,6 +82,8 @@ class MarkerRecording(Recording):
         RecordingError: the file is damaged.
     """
 
+    loader = "markers"
+
     def __init__(self, path: Path, markers: MarkerMap | None = None, *, bare: bool = False) -> None:
         """Read the file."""
         self.path, self.name, self.root_frame = path, path.stem, FRAME
@@ -99,6 +101,7 @@ class MarkerRecording(Recording):
             self._up, half_told = self._up_of(content)
         else:
             self._up, half_told = "+Y" if self.map.y_up else "+Z", ()
+        self._notes = (f"up is {self._up} of the file",)
         self._positions = positions @ Z_UP_FROM[self._up].T
         self._sites, self._stamps = sites, content.stamps
         unknown = sorted((set(self.map.sites) | set(self.map.limbs)) - set(content.names))
@@ -148,10 +151,6 @@ class MarkerRecording(Recording):
         words = f"{self._up} of the file is taken for up, but the body stands along its {likely}"
         return (f"{self.path.name}: {words}; if that is up, {remedy}",)
 
-    def __len__(self) -> int:
-        """Number of instants."""
-        return len(self._stamps)
-
     def __iter__(self) -> Iterator[RecordedFrame]:
         """The markers, instant by instant.
 
@@ -164,10 +163,5 @@ class MarkerRecording(Recording):
             item = MarkerSet(self.path.name, float(stamp), self._at(index), self.map.sigma_m)
             yield RecordedFrame(float(stamp), (item,))
 
-    def info(self) -> RecordingInfo:
-        """Summarize."""
-        duration = float(self._stamps[-1] - self._stamps[0])
-        detail = f"{len(self._sites)} markers"
-        sensor = SensorInfo.during(duration, self.path.name, "markers", FRAME, len(self), detail)
-        notes = (f"up is {self._up} of the file", *self.assumed)
-        return self._described("markers", [sensor], start=float(self._stamps[0]), duration=duration, notes=notes)
+    def _sensors(self) -> Iterator[SensorInfo]:
+        yield SensorInfo.of(self.path.name, "markers", FRAME, self._stamps, f"{len(self._sites)} markers")

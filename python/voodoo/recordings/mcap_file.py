@@ -9,9 +9,9 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2.storage_mcap import ChunkInfo, McapReader
@@ -21,6 +21,7 @@ from voodoo.recordings.set_back import BACK_S, falls
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
 
+T = TypeVar("T")
 _MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x0F
 _ATTACHMENT, _METADATA = 0x09, 0x0C
@@ -39,6 +40,21 @@ DAMAGED = "in a damaged chunk"
 
 Item = tuple[Connection, int, bytes | RecordingError]
 """Connection, time [ns] and bytes of a message, or why it cannot be read."""
+
+
+def or_error(read: Callable[[], T], where: object, expected: str, *, reason: str = "") -> T | RecordingError:
+    """What `read` returns, or the error by which it fails.
+
+    Args:
+        read: reads a part of a file.
+        where, expected: see voodoo.errors.reading.
+        reason: of the error; "": its own.
+    """
+    try:
+        with reading(where, expected):
+            return read()
+    except RecordingError as error:
+        return RecordingError(str(error), reason=reason or error.reason)
 
 
 class McapFile(McapReader):
@@ -211,15 +227,6 @@ def stored_records(path: Path) -> Iterator[bytes]:
                 yield body[40:]
 
 
-@dataclass
-class _Found:
-    """What is in a file: where its chunks and the end of the data are, and the size of all schemas and channels."""
-
-    chunks: set[int] = field(default_factory=set)
-    ends: set[int] = field(default_factory=lambda: {0})
-    described: Counter[int] = field(default_factory=Counter)
-
-
 def is_plain_yaml(text: str) -> bool:
     """Whether a parser is safe with a text: a few lines that refer to each other describe billions of entries, and it takes
     minutes for long lists in brackets."""
@@ -241,7 +248,7 @@ def check_mcap(path: Path) -> frozenset[int]:
         RecordingError: names the offset.
     """
     size = path.stat().st_size
-    found = _Found()
+    chunks, ends, described = set[int](), {0}, Counter[int]()
     with reading(path, "a readable file"), path.open("rb") as file:
         if file.read(8) != _MAGIC:
             raise RecordingError(f"{path}: expected an MCAP file, found other bytes at its start")
@@ -258,7 +265,19 @@ def check_mcap(path: Path) -> frozenset[int]:
                 )
             if code == _FOOTER:
                 break
-            _check_record(path, code, length, position, found)
+            if length > (most := _MOST.get(code, MOST_METADATA)):
+                raise RecordingError(
+                    f"{path}: expected a record of {most} bytes at most, found {length} bytes at byte {position}"
+                )
+            if code == _CHUNK:
+                chunks.add(position)
+            elif code == _DATA_END:
+                ends.add(position + 9 + length)
+            described[code] += length
+            if described[code] > _MOST_OF_ALL.get(code, described[code]):
+                raise RecordingError(
+                    f"{path}: expected {_MOST_OF_ALL[code]} bytes of schemas or channels at most, found more"
+                )
             quality = file.read(length).partition(b"offered_qos_profiles")[2] if code == _CHANNEL else b""
             if not is_plain_yaml(quality[4:].decode("latin-1")):
                 raise RecordingError(f"{path}: expected a channel at byte {position}, found nested metadata")
@@ -268,40 +287,13 @@ def check_mcap(path: Path) -> frozenset[int]:
         if length != 20 or file.read() != _MAGIC:
             raise RecordingError(f"{path}: expected an MCAP footer at byte {position}, found damage")
         summary_start, _, summary_crc = struct.unpack("<QQI", footer)
-        if summary_start not in found.ends:
+        if summary_start not in ends:
             raise RecordingError(f"{path}: expected the summary behind the data, found it at byte {summary_start}")
         if summary_crc:
-            _check_summary(path, position + 25, summary_start, summary_crc)
-    return frozenset(found.chunks)
-
-
-def _check_record(path: Path, code: int, length: int, position: int, found: _Found) -> None:
-    most = _MOST.get(code, MOST_METADATA)
-    if length > most:
-        raise RecordingError(
-            f"{path}: expected a record of {most} bytes at most, found {length} bytes at byte {position}"
-        )
-    if code == _CHUNK:
-        found.chunks.add(position)
-    elif code == _DATA_END:
-        found.ends.add(position + 9 + length)
-    elif code in (_SCHEMA, _CHANNEL):
-        found.described[code] += length
-        if found.described[code] > _MOST_OF_ALL[code]:
-            raise RecordingError(
-                f"{path}: expected {_MOST_OF_ALL[code]} bytes of schemas or channels at most, found more"
-            )
-
-
-def _check_summary(path: Path, end: int, start: int, expected: int) -> None:
-    checksum = 0
-    with path.open("rb") as file:
-        file.seek(start)
-        left = end - start
-        while left > 0:
-            part = file.read(min(left, 2**20))
-            checksum, left = zlib.crc32(part, checksum), left - len(part)
-            if not part:
-                break
-    if checksum != expected:
-        raise RecordingError(f"{path}: expected a sound MCAP summary, found a wrong checksum")
+            file.seek(summary_start)
+            checksum = 0
+            while part := file.read(min(position + 25 - file.tell(), 2**20)):
+                checksum = zlib.crc32(part, checksum)
+            if checksum != summary_crc:
+                raise RecordingError(f"{path}: expected a sound MCAP summary, found a wrong checksum")
+    return frozenset(chunks)

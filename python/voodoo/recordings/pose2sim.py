@@ -17,13 +17,7 @@ from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP, read_trc
 from voodoo.recordings.order import in_order, matched, numbers_of
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    Reference,
-    SensorInfo,
-    number_option,
-)
+from voodoo.recordings.recording import Recording, Reference, SensorInfo, number_option
 
 SITES = {
     f"{side}{joint}": f"{side.lower()}_{site}"
@@ -65,6 +59,8 @@ class Pose2SimRecording(Recording):
         RecordingError: a part is missing or has another format, or keypoints and calibration do not fit.
     """
 
+    loader = "pose2sim"
+
     def __init__(
         self,
         path: Path,
@@ -101,13 +97,13 @@ class Pose2SimRecording(Recording):
         self.cameras = tuple(camera for camera, _ in chosen)
         self._folders = tuple(folder for _, folder in chosen)
         self._files, self._notes = _rows_of(path, self._folders)
+        self._stamps = np.arange(len(self._files)) / self.rate
         self._check(layout)
         self.reference = None if bare else read_triangulation(path, self.rate)
-        self.start = None if self.reference is None else self.reference.as_start()
-
-    def __len__(self) -> int:
-        """Number of images of each camera."""
-        return len(self._files)
+        if self.reference is not None:
+            self.start = self.reference.as_start()
+            kind = "the same keypoints: it tests consistency, not accuracy"
+            self._notes = (*self._notes, f"the reference is triangulated from {kind}")
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Keypoints of all cameras, image by image; see Recording."""
@@ -151,25 +147,10 @@ class Pose2SimRecording(Recording):
         ]
         self.assumed = (*notes, *check_keypoints(self.path, instants))
 
-    def info(self) -> RecordingInfo:
-        """Summarize."""
-        duration = (len(self) - 1) / self.rate
-        sensors = (
-            SensorInfo.during(
-                duration,
-                one.name,
-                "keypoints",
-                one.name,
-                len(self),
-                f"{self.layout} keypoints of {folder.relative_to(self.path)}",
-            )
-            for one, folder in zip(self.cameras, self._folders, strict=True)
-        )
-        notes = (*self.assumed, *self._notes)
-        if self.reference is not None:
-            kind = "the same keypoints: it tests consistency, not accuracy"
-            notes = (*notes, f"the reference is triangulated from {kind}")
-        return self._described("pose2sim", sensors, duration=duration, notes=notes)
+    def _sensors(self) -> Iterator[SensorInfo]:
+        for one, folder in zip(self.cameras, self._folders, strict=True):
+            detail = f"{self.layout} keypoints of {folder.relative_to(self.path)}"
+            yield SensorInfo.of(one.name, "keypoints", one.name, self._stamps, detail)
 
 
 def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:
@@ -191,18 +172,14 @@ def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | Non
         raise RecordingError(
             f"{path}: expected as many keypoint files for every camera, or numbers in their names, found {sorted(counts)} files"
         )
-    if len(numbers) < len(files):
-        said = (
-            ()
-            if counts == {1}
-            else ("the names of keypoint files have no numbers: they are taken in the order of names",)
-        )
-        return list(zip(*files, strict=True)), said
     gapless = all(max(each) - min(each) + 1 == len(each) for each in numbers if each)
-    if len(counts) == 1 and (gapless or not common or all(each == numbers[0] for each in numbers)):
-        differ = any(each != numbers[0] for each in numbers)
-        said = ("the cameras' keypoint files have different numbers: they are paired in their order",) if differ else ()
-        return list(zip(*files, strict=True)), said
+    differ = any(each != numbers[0] for each in numbers)
+    if len(numbers) < len(files) or (len(counts) == 1 and (gapless or not common or not differ)):
+        said = "the cameras' keypoint files have different numbers: they are paired in their order" if differ else ""
+        if len(numbers) < len(files):
+            unnumbered = "the names of keypoint files have no numbers: they are taken in the order of names"
+            said = "" if counts == {1} else unnumbered
+        return list(zip(*files, strict=True)), (said,) if said else ()
     of = [dict(zip(each, own, strict=True)) for each, own in zip(numbers, files, strict=True)]
     lacking = ", ".join(f"{folder.name} {len(union) - len(own)}" for folder, own in zip(folders, files, strict=True))
     return [tuple(each.get(number) for each in of) for number in union], (

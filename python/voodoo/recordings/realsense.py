@@ -16,6 +16,8 @@ from voodoo.recordings.ros_messages import Message
 
 EXTRA_BYTES = 4
 _STREAM = re.compile(r"^(/device_(\d+)/sensor_\d+)/(\w+_\d+)/image/data(?:/\w+)?$")
+UNITS, LENS = r"\1/option/Depth_Units/value", r"\1/\3/camera_info"
+"""Topics with the depth unit [m], and in a .db3 with the name of the lens model, by the groups of _STREAM."""
 _TRANSFORM = re.compile(r"^(/device_\d+/sensor_\d+/\w+_\d+)/tf/(\d+)$")
 
 
@@ -38,10 +40,10 @@ def info_topic(topic: str) -> str:
     return f"{topic.removesuffix('/image/data')}/info/camera_info"
 
 
-def units_topic(topic: str) -> str | None:
-    """Topic of the depth unit [m] of an image topic; None for other topics."""
+def beside(topic: str, place: str) -> str | None:
+    """A topic of the stream of an image topic, UNITS or LENS; None for other topics."""
     found = _STREAM.match(topic)
-    return None if found is None else f"{found[1]}/option/Depth_Units/value"
+    return None if found is None else found.expand(place)
 
 
 def transform_of(topic: str) -> tuple[str, str] | None:
@@ -50,12 +52,6 @@ def transform_of(topic: str) -> tuple[str, str] | None:
     if found is None:
         return None
     return frame_name(f"{found[1]}/image/data"), f"reference_{found[2]}"
-
-
-def lens_topic(topic: str) -> str | None:
-    """Topic with the name of the lens model of an image topic in a .db3; None for other topics."""
-    found = _STREAM.match(topic)
-    return None if found is None else f"{found[1]}/{found[3]}/camera_info"
 
 
 def with_lens(camera: Camera, words: Message) -> Camera:

@@ -7,17 +7,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import DepthImage, FloatArray, RecordedFrame
+from voodoo.measurements import ByteImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.joint import short
 from voodoo.model.standing import is_optical
+from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.people_truth import PeopleTruth
+
+M = TypeVar("M", bound=Measurement)
 
 
 class Start(TypedDict, total=False):
@@ -79,9 +81,10 @@ class SensorInfo:
     detail: str
 
     @classmethod
-    def during(cls, seconds: float, name: str, kind: str, frame: str, messages: int, detail: str) -> SensorInfo:
-        """A source whose last message was so long after the first one."""
-        return cls(name, kind, frame, messages, mean_rate(messages, seconds), detail)
+    def of(cls, name: str, kind: str, frame: str, stamps: Sequence[float] | FloatArray, detail: str) -> SensorInfo:
+        """A source with messages at these stamps [s]."""
+        span = stamps[-1] - stamps[0] if len(stamps) else 0.0
+        return cls(name, kind, frame, len(stamps), mean_rate(len(stamps), span), detail)
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,7 @@ class Recording(ABC):
         start: pose of the body in the first frame, or None.
         reference: joint positions to compare with, or None.
         assumed: descriptions of assumptions that the recording does not confirm, and of unused data.
+        loader: which loader reads it.
         people: exact positions of all persons, if the recording has such a truth, or None.
         complete: whether each frame holds all measurements of its time, so that none of the next frame belongs to it.
     """
@@ -163,18 +167,24 @@ class Recording(ABC):
     reference: Reference | None = None
     people: PeopleTruth | None = None
     complete: bool = False
+    loader: str
+    _stamps: Sequence[float] | FloatArray
+    _unused: Sequence[tuple[str, str]] = ()
+    _notes: tuple[str, ...] = ()
+    _scene: EmptyScene | None = None
+    _left_out: LeftOut | None = None
 
-    def empty_scene(self) -> Mapping[str, Sequence[npt.NDArray[np.uint8]]]:
+    def empty_scene(self) -> Mapping[str, Sequence[ByteImage]]:
         """Sensor -> images (H, W, 3) BGR uint8 of the empty scene; {}: there are none.
 
         Raises:
             RecordingError: a picture that cannot be read.
         """
-        return {}
+        return {} if self._scene is None else self._scene.read(left_out=self._left_out)
 
-    @abstractmethod
     def __len__(self) -> int:
         """Number of frames."""
+        return len(self._stamps)
 
     @abstractmethod
     def __iter__(self) -> Iterator[RecordedFrame]:
@@ -184,35 +194,31 @@ class Recording(ABC):
             RecordingError: damage; the frames before it have been yielded.
         """
 
-    @abstractmethod
     def info(self) -> RecordingInfo:
         """Summarize without decoding the images."""
-
-    def _described(
-        self,
-        loader: str,
-        sensors: Iterable[SensorInfo],
-        *,
-        duration: float,
-        start: float = 0.0,
-        unused: tuple[tuple[str, str], ...] = (),
-        notes: tuple[str, ...] = (),
-    ) -> RecordingInfo:
-        """The summary, with the entries that follow from the recording itself."""
+        start, end = self._span()
         return RecordingInfo(
             name=self.name,
             path=self.path,
-            loader=loader,
+            loader=self.loader,
             frames=len(self),
             start_stamp=start,
-            duration=duration,
-            rate_hz=mean_rate(len(self), duration),
+            duration=end - start,
+            rate_hz=mean_rate(len(self), end - start),
             root_frame=self.root_frame,
-            sensors=tuple(sensors),
-            unused=unused,
+            sensors=tuple(self._sensors()),
+            unused=tuple(self._unused),
             reference=reference_words(self.reference, self.people),
-            notes=notes,
+            notes=(*self.assumed, *self._notes, *(() if self._scene is None else self._scene.words)),
         )
+
+    def _span(self) -> tuple[float, float]:
+        """Stamps of the first and the last frame [s]."""
+        return float(self._stamps[0]), float(self._stamps[-1])
+
+    def _sensors(self) -> Iterable[SensorInfo]:
+        """The sources that are yielded; the first one defines the frames."""
+        return ()
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) of a frame of the recording at a time [s].
@@ -253,8 +259,8 @@ def refuse_blank(item: DepthImage, where: object) -> None:
         )
 
 
-def usable(make: Callable[[], DepthImage], number: int, where: object, left_out: LeftOut | None) -> DepthImage | None:
-    """A depth image by its number; of a damaged recording, in which also blank ones are left out, None for one that is.
+def usable(make: Callable[[], M], number: int, where: object, left_out: LeftOut | None) -> M | None:
+    """A measurement by its number; of a damaged recording, in which also blank depth images are left out, None for one that is.
 
     Raises:
         RecordingError: without `left_out`, that of `make`.
@@ -262,7 +268,8 @@ def usable(make: Callable[[], DepthImage], number: int, where: object, left_out:
     with leaving_out(left_out):
         item = make()
         if left_out is not None:
-            refuse_blank(item, where)
+            if isinstance(item, DepthImage):
+                refuse_blank(item, where)
             left_out.numbers[item.sensor, item.stamp] = number
         return item
     return None

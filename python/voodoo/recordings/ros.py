@@ -8,39 +8,20 @@ from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from voodoo.errors import RecordingError, reading
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud, RecordedFrame
+from voodoo.measurements import FloatArray, Measurement, RecordedFrame
 from voodoo.names import TOPIC_KINDS, TopicKind
 from voodoo.recordings import realsense
 from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
-from voodoo.recordings.people_truth import PEOPLE_TRUTH_FILE, read_people_truth
-from voodoo.recordings.recording import (
-    Recording,
-    RecordingInfo,
-    SensorInfo,
-    number_option,
-    refuse_blank,
-)
+from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import Bag
-from voodoo.recordings.ros_messages import (
-    Message,
-    camera_of,
-    cloud_points,
-    color_image,
-    compressed_depth_image,
-    depth_image,
-    scan_fields,
-    stamp_of,
-)
-from voodoo.recordings.ros_topics import COMPRESSED, TopicChoice, TopicFinder, TopicSource
+from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
+from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
 from voodoo.recordings.set_back import SetBack
-from voodoo.recordings.together import together
+from voodoo.recordings.together import in_turn, together
 from voodoo.recordings.transforms import TransformTree, matrix
-from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_start, read_truth
+from voodoo.recordings.truth import OWN_ROOTS, find_beside, read_beside
 
 _MILLIMETER = 0.001
 STILL_FRAMES = ("odom", "map")
@@ -110,10 +91,9 @@ class RosRecording(Recording):
         scale = number_option(path, "meters_per_unit", scale, "a length > 0", most=1e3)
         max_age = number_option(path, "tf_max_age", tf_max_age, "seconds >= 0", most=math.inf, zero=True)
         self._left_out = left_out
-        given = (
-            None if unpacked_gb is None else number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
-        )
-        self._bag = Bag(path, left_out=left_out, unpacked=None if given is None else int(given * 1e9))
+        if unpacked_gb is not None:
+            unpacked_gb = number_option(path, "unpacked_gb", unpacked_gb, "gigabytes > 0", most=1e6)
+        self._bag = Bag(path, left_out=left_out, unpacked=None if unpacked_gb is None else int(unpacked_gb * 1e9))
         self.loader = "ros2" if self._bag.is_ros2 else "ros1"
         choices = dict(zip(TOPIC_KINDS, (depth_topic, points_topic, scan_topic, color_topic), strict=True))
         finder = TopicFinder(self._bag, choices=choices, camera_info_topic=camera_info_topic)
@@ -133,8 +113,15 @@ class RosRecording(Recording):
 
         place = path if path.suffix == ".zip" else self._bag.file
         self.name = next(part for part in (place.stem, *(p.name for p in place.resolve().parents)) if part != "bag")
-        self._read_beside(place, bare=bare)
-        self._scene = EmptyScene(place, background, self._names_of_cameras())
+        if not bare:
+            find, first = partial(find_beside, place), self._driver.first_stamp
+            read_beside(self, find, root=self._own_root, first=first, left_out=left_out)
+        cameras = {
+            s.topic: (s.camera, (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame")))
+            for s in self._sources.values()
+            if s.kind == "color" and s.camera is not None
+        }
+        self._scene = EmptyScene(place, background, cameras)
 
     def __len__(self) -> int:
         """Number of messages on the topic that defines the frames."""
@@ -142,15 +129,7 @@ class RosRecording(Recording):
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         """Read the bag; see Recording."""
-        if self.complete:
-            yield from together(self._measurements(), self._driver.topic)
-            return
-        pending: list[Measurement] = []
-        for measured in self._measurements():
-            pending.append(measured)
-            if measured.sensor == self._driver.topic:
-                yield RecordedFrame(measured.stamp, tuple(pending))
-                pending.clear()
+        return (together if self.complete else in_turn)(self._measurements(), self._driver.topic)
 
     def _measurements(self) -> Iterator[Measurement]:
         """All used measurements, in the order of recording."""
@@ -164,15 +143,13 @@ class RosRecording(Recording):
                     self._check_calibration(topic, message)
                 continue
             numbers[topic] += 1
-            measured = None
-            with leaving_out(self._left_out):
-                measured = None if message is None else self._measured(topic, message, last, clock)
-            if measured is None:
-                continue
-            if self._left_out is not None:
-                self._left_out.numbers[topic, measured.stamp] = numbers[topic]
-                self._left_out.notes |= dict.fromkeys(clock.words)
-            yield measured
+            make = partial(self._measured, topic, message, last, clock)
+            where = f"{self.path}, topic {topic}"
+            if message is not None and (item := usable(make, numbers[topic], where, self._left_out)):
+                last[topic] = item.stamp
+                if self._left_out is not None:
+                    self._left_out.notes |= dict.fromkeys(clock.words)
+                yield item
 
     def _measured(self, topic: str, message: Message, last: dict[str, float], clock: SetBack) -> Measurement:
         """The measurement of a message that is not older than the `last` of its topic."""
@@ -187,67 +164,40 @@ class RosRecording(Recording):
                     f"{where}: expected rising stamps, found {stamp:.6f} after {before:.6f}",
                     reason="with a repeated stamp" if stamp == before else "with a stamp before the last one",
                 )
-            measured = self._measurement(self._sources[topic], message, stamp, f"{where}, stamp {stamp:.6f}")
-            if self._left_out is not None and isinstance(measured, DepthImage):
-                refuse_blank(measured, where)
-        last[topic] = stamp
-        return measured
-
-    def info(self) -> RecordingInfo:
-        """Summarize; reads the first and last message of every topic in use, once."""
-        with self._bag.kept_open():
-            return self._summary
+            source = self._sources[topic]
+            pose = self._tree.lookup(self.root_frame, self._bag.frame_of(topic, message), stamp)
+            sensed = Sensed(topic, stamp, pose, source.camera, (self._units[topic], self._float_unit))
+            return sensed.of(source.kind, message, f"{where}, stamp {stamp:.6f}")
 
     @cached_property
-    def _summary(self) -> RecordingInfo:
-        sensors = []
-        duration = 0.0
+    def _ends(self) -> dict[str, tuple[float, float]]:
+        """Stamps of the first and the last message of every topic in use."""
+        ends = {}
+        with self._bag.kept_open():
+            for source in self._sources.values():
+                where, last = f"{self.path}, topic {source.topic}", self._bag.last(source.topic)
+                with reading(where, "a readable message"):
+                    ends[source.topic] = source.first_stamp, stamp_of(last, where)
+        return ends
+
+    def _span(self) -> tuple[float, float]:
+        return self._ends[self._driver.topic]
+
+    def _sensors(self) -> Iterator[SensorInfo]:
         for source in self._sources.values():
-            where = f"{self.path}, topic {source.topic}"
-            last = self._bag.last(source.topic)
-            with reading(where, "a readable message"):
-                span = stamp_of(last, where) - source.first_stamp
-            if source is self._driver:
-                duration = span
-            about = source.topic, source.kind, source.frame, source.messages, source.detail
-            sensors.append(SensorInfo.during(span, *about))
-        return self._described(
-            self.loader,
-            sensors,
-            start=self._driver.first_stamp,
-            duration=duration,
-            unused=tuple(self._unused),
-            notes=(*self.assumed, *self._scene.words),
-        )
+            first, end = self._ends[source.topic]
+            rate = mean_rate(source.messages, end - first)
+            yield SensorInfo(source.topic, source.kind, source.frame, source.messages, rate, source.detail)
 
     def _unit(self, topic: str, otherwise: float, *, given: bool) -> float:
         """Scale of 16-bit depth in meters: the value of librealsense's recorder, unless the user sets one."""
-        units = realsense.units_topic(topic)
+        units = realsense.beside(topic, realsense.UNITS)
         if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
         with reading(f"{self.path}, topic {units}", "a readable message"):
             return number_option(
                 self.path, str(units), float(f"{self._bag.first(str(units)).data:.7g}"), "a length > 0", most=1e3
             )
-
-    def _read_beside(self, place: Path, *, bare: bool) -> None:
-        """Read reference and start from the files beside the bag; if damage is left out, files that do not fit are only noted."""
-        own = partial(self.root_from, self._own_root)
-        for name in () if bare else ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
-            file = find_beside(place, name)
-            try:
-                if file is not None and name == "truth.csv":
-                    self.reference = read_truth(file, own)
-                elif file is not None and name == PEOPLE_TRUTH_FILE:
-                    self.people = read_people_truth(file, own)
-                elif file is not None:
-                    self.start = read_start(
-                        file, lambda frame: self.root_from(frame or self._own_root, self._driver.first_stamp)
-                    )
-            except RecordingError as error:
-                if self._left_out is None:
-                    raise
-                self.assumed = (*self.assumed, f"{file} is not used: {error}")
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""
@@ -257,7 +207,10 @@ class RosRecording(Recording):
         dynamic = [name for name in names if name not in static]
         for topics, is_static in ((static, True), (dynamic, False)):
             for _, message in self._bag.read(topics):
-                self._add_transforms(message, static=is_static)
+                unread = leaving_out(self._left_out, "transforms that cannot be read")
+                with unread, reading(self.path, "a readable transform"):
+                    if message is not None:
+                        self._tree.add(message, static=is_static)
         known = {*self._tree.frames, *(source.frame for source in sources)}
         self._own_root = next((name for name in OWN_ROOTS if name in known), sources[0].frame)
         if asked is not None:
@@ -269,11 +222,6 @@ class RosRecording(Recording):
         return next(
             (frame for frame in moving if all(self._tree.reaches(frame, s.frame) for s in sources)), self._own_root
         )
-
-    def _add_transforms(self, message: Message | None, *, static: bool) -> None:
-        with leaving_out(self._left_out, "transforms that cannot be read"), reading(self.path, "a readable transform"):
-            if message is not None:
-                self._tree.add(message, static=static)
 
     def _read_recorders_transforms(self) -> None:
         """Read the transforms of librealsense's recorder: the pose of each stream relative to the common reference."""
@@ -298,23 +246,10 @@ class RosRecording(Recording):
         if left:
             self.assumed = (*self.assumed, f"not used: {', '.join(left)}; voodoo info says why")
 
-    def _names_of_cameras(self) -> dict[str, tuple[str, ...]]:
-        """Topic -> possible names of images of its empty scene."""
-        return {
-            s.topic: (*s.topic.strip("/").split("/"), s.frame, s.frame.removesuffix("_optical_frame"))
-            for s in self._sources.values()
-            if s.kind == "color"
-        }
-
-    def empty_scene(self) -> dict[str, tuple[npt.NDArray[np.uint8], ...]]:
-        """See Recording."""
-        cameras = {s.topic: s.camera for s in self._sources.values() if s.camera is not None}
-        return self._scene.read(cameras, left_out=self._left_out)
-
     def _connected(self, source: TopicSource, *, optional: bool) -> bool:
         optional = optional and source.kind == "color" and source is not self._driver
         if optional and not self._tree.reaches(self.root_frame, source.frame):
-            self._unused.append((source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
+            self._unused = (*self._unused, (source.topic, f"no transform {self.root_frame!r} from {source.frame!r}"))
             return False
         self._tree.path(self.root_frame, source.frame)
         return True
@@ -335,20 +270,3 @@ class RosRecording(Recording):
                         self._left_out.add("calibrations unlike the first", f"{where}: {camera}")
                     elif camera != source.camera:
                         raise RecordingError(f"{where}: expected one calibration, found {camera} after {source.camera}")
-
-    def _measurement(self, source: TopicSource, message: Message, stamp: float, where: str) -> Measurement:
-        root_from_sensor = self._tree.lookup(self.root_frame, self._bag.frame_of(source.topic, message), stamp)
-        camera, compressed = source.camera, source.type == COMPRESSED
-        if source.kind == "scan":
-            return LaserScan(source.topic, stamp, **scan_fields(message, where), root_from_sensor=root_from_sensor)
-        if source.kind == "points":
-            return PointCloud(source.topic, stamp, cloud_points(message, where), root_from_sensor)
-        if camera is None:
-            raise RecordingError(f"{where}: expected a calibrated camera, found none")
-        if source.kind == "depth":
-            image = (compressed_depth_image if compressed else depth_image)(message, camera, where)
-            scale = self._units[source.topic] if image.dtype.kind == "u" else self._float_unit
-            return DepthImage(source.topic, stamp, image, scale, camera, root_from_sensor)
-
-        decode = partial(color_image, message, camera, where, compressed=compressed)
-        return ColorImage(source.topic, stamp, decode, camera, root_from_sensor)

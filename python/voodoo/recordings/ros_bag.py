@@ -1,4 +1,7 @@
-"""Access to the messages of ROS 1 and ROS 2 bags, with every failure converted to a RecordingError."""
+"""Access to the messages of ROS 1 and ROS 2 bags, with every failure converted to a RecordingError.
+
+What a bag says of its message types is compared with the definitions of ROS, and not executed.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,112 @@ import shutil
 import tempfile
 import weakref
 import zipfile
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePosixPath
+from typing import Any
 
-from rosbags.interfaces import Connection
+from rosbags.interfaces import Connection, MessageDefinitionFormat, Nodetype
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from voodoo.errors import RecordingError, reading
 from voodoo.recordings import realsense
 from voodoo.recordings.bag_files import BagFile, BagFolder, bag_file
 from voodoo.recordings.left_out import LeftOut, leave_out
-from voodoo.recordings.message_types import MessageTypes
+from voodoo.recordings.mcap_file import or_error
 from voodoo.recordings.ros_messages import Message, frame_of
 from voodoo.stored import MOST_RECORDED, check_stored
 from voodoo.unpacking import Unpacking
+
+_TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"
+_MOST_TEXT = 2**16
+"""Largest size of the definition of a type [bytes]; those of ROS are ten times smaller."""
+
+
+class MessageTypes:
+    """Deserializes messages.
+
+    rosbags makes Python code of the definitions in a bag, and a definition may describe a small message as one that fills the
+    memory. The types that are read here are the same in all releases of ROS 2, and in ROS 1 since 2010.
+
+    Args:
+        is_ros2: ROS 2 instead of ROS 1.
+    """
+
+    def __init__(self, *, is_ros2: bool) -> None:
+        """Load the definitions of ROS."""
+        self._is_ros2 = is_ros2
+        self._store: Typestore = get_typestore(Stores.ROS2_HUMBLE if is_ros2 else Stores.ROS1_NOETIC)
+        if not is_ros2:
+            for name in ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"):
+                self._store.register(get_types_from_msg(_TRANSFORMS, name))
+        self._checked: set[tuple[str, str, str]] = set()
+
+    def check(self, connection: Connection, source: object) -> None:
+        """Check that a topic has messages as ROS defines them.
+
+        Raises:
+            RecordingError: a type that is not one of ROS, or another definition of it; names the source and the topic.
+        """
+        kind, definition = str(connection.msgtype), connection.msgdef
+        key = (kind, definition.data, str(connection.digest))
+        if key in self._checked:
+            return
+        where = f"{source}, topic {connection.topic}"
+        with reading(where, f"a definition of {kind}"):
+            if kind not in self._store.fielddefs:
+                raise RecordingError(f"{where}: expected a message type of ROS, found {kind:.100}")
+            if not self._is_ros2:
+                expected, found = self._store.generate_msgdef(kind)[1], connection.digest
+                if found not in (expected, "*"):
+                    raise RecordingError(f"{where}: expected {kind} with the checksum {expected}, found {found:.40}")
+            elif definition.format != MessageDefinitionFormat.NONE:
+                self._compare(kind, definition.format, definition.data, where)
+        self._checked.add(key)
+
+    def _compare(self, kind: str, form: MessageDefinitionFormat, text: str, where: str) -> None:
+        if len(text) > _MOST_TEXT:
+            raise RecordingError(f"{where}: expected a definition of {_MOST_TEXT} bytes at most, found {len(text)}")
+        if form == MessageDefinitionFormat.MSG:
+            found = get_types_from_msg(text, kind)
+        else:
+            found = {}
+            # Definitions of several files follow each other, each below such a line.
+            line = "=" * 80 + "\n"
+            for part in text.split(line + "IDL: ")[1:] or [f"\n{text}"]:
+                found |= get_types_from_idl(part.split("\n", 1)[1].removesuffix(line))
+        waiting, seen = [kind], set()
+        while waiting:
+            name = waiting.pop()
+            if name in seen or name not in found:
+                continue
+            seen.add(name)
+            fields = self._store.fielddefs[name][1] if name in self._store.fielddefs else None
+            if found[name][1] != fields:
+                raise RecordingError(f"{where}: expected {name} as in ROS 2, found a message with other fields")
+            waiting += [used for _, field in fields if (used := _type_used(field)) is not None]
+
+    def deserialize(self, data: bytes, kind: str) -> object:
+        """The message in these bytes.
+
+        Raises:
+            Exception: damage, of many kinds.
+        """
+        read = self._store.deserialize_cdr if self._is_ros2 else self._store.deserialize_ros1
+        return read(data, kind)
+
+
+def _type_used(field: Any) -> str | None:  # noqa: ANN401 - of rosbags
+    """The message type of a field, or of its elements."""
+    node, value = field
+    if node in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        node, value = value[0]
+    return value if node == Nodetype.NAME else None
+
 
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 _ADVICE = "; --option unpacked_gb=N allows N gigabytes"
@@ -128,36 +221,40 @@ class Bag:
         Raises:
             RecordingError: damage, or no message although the index has some.
         """
-        problem: RecordingError | None = None
-        for _, message in self._messages([topic]):
+        problems: list[RecordingError] = []
+        for message in self._usable(topic, problems, good=good):
+            return message
+        raise (problems or [self._without(topic)])[0]
+
+    def _usable(
+        self,
+        topic: str,
+        problems: list[RecordingError],
+        start: int | None = None,
+        good: Callable[[Message], object] | None = None,
+    ) -> Iterator[Message]:
+        """The messages of a topic; if damage is left out, those that can be used, and `problems` get the others."""
+        for _, message in self._messages([topic], start):
             try:
                 if isinstance(message, RecordingError):
                     raise message
                 if good is not None and self._left_out is not None:
                     good(message)
-                return message
             except RecordingError as error:
                 if self._left_out is None:
                     raise
-                problem = problem or error
-        raise problem or self._without(topic)
+                problems.append(error)
+            else:
+                yield message
 
     def last(self, topic: str) -> Message:
         """The last message of `topic`; reads the end of the bag first."""
-        problem: RecordingError | None = None
+        problems: list[RecordingError] = []
         for seconds in (1, 10, None):
             start = None if seconds is None else self.end_time - seconds * 1_000_000_000
-            found = None
-            for _, message in self._messages([topic], start):
-                if not isinstance(message, RecordingError):
-                    found = message
-                elif self._left_out is None:
-                    raise message
-                else:
-                    problem = problem or message
-            if found is not None:
-                return found
-        raise problem or self._without(topic)
+            if found := deque(self._usable(topic, problems, start), maxlen=1):
+                return found[0]
+        raise (problems or [self._without(topic)])[0]
 
     def _without(self, topic: str) -> RecordingError:
         return RecordingError(f"{self.path}: expected messages on {topic} as the bag's index says, found none")
@@ -238,13 +335,13 @@ class Bag:
     def _message(self, connection: Connection, data: bytes | RecordingError) -> Message | RecordingError:
         if isinstance(data, RecordingError):
             return self._named(data)
-        try:
-            with reading(f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message"):
-                if self.realsense and connection.topic.endswith("/image/data"):
-                    data = data[: -realsense.EXTRA_BYTES]
-                return self._types.deserialize(data, connection.msgtype)
-        except RecordingError as error:
-            return error
+        if self.realsense and connection.topic.endswith("/image/data"):
+            data = data[: -realsense.EXTRA_BYTES]
+        read, where = (
+            partial(self._types.deserialize, data, connection.msgtype),
+            f"{self.path}, topic {connection.topic}",
+        )
+        return or_error(read, where, f"a {connection.msgtype} message")
 
 
 class _Stopped(RecordingError):

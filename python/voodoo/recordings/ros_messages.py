@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import CameraError, RecordingError, naming, reading
-from voodoo.measurements import FloatArray
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
 from voodoo.model.camera import Camera
-from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png
-from voodoo.recordings.rvl import decode_rvl
+from voodoo.recordings.pictures import check_size, decode_color, decode_depth_png, decode_rvl
 
 T = TypeVar("T")
 Message: TypeAlias = Any
@@ -155,7 +156,7 @@ def compressed_depth_image(message: Message, camera: Camera, source: str) -> npt
     return image
 
 
-def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.uint8]:
+def _raw_color(message: Message, camera: Camera, source: str) -> ByteImage:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image.
 
     Raises:
@@ -169,14 +170,14 @@ def _raw_color(message: Message, camera: Camera, source: str) -> npt.NDArray[np.
     return np.ascontiguousarray(image[:, :, 2::-1] if message.encoding.startswith("rgb") else image[:, :, :3])
 
 
-def color_image(message: Message, camera: Camera, source: str, *, compressed: bool) -> npt.NDArray[np.uint8]:
+def color_image(message: Message, camera: Camera, source: str) -> ByteImage:
     """(H, W, 3) BGR uint8 of a raw sensor_msgs/Image, or of a JPEG or PNG sensor_msgs/CompressedImage.
 
     Raises:
         RecordingError: it cannot be decoded, or has another encoding or size.
     """
     with reading(source, "a readable picture"):
-        if compressed:
+        if hasattr(message, "format"):
             return decode_color(message.data.tobytes(), source, (camera.width, camera.height))
         return _raw_color(message, camera, source)
 
@@ -187,20 +188,18 @@ def cloud_points(message: Message, source: str) -> FloatArray:
     Raises:
         RecordingError: no x, y, z, an unknown field type, or inconsistent sizes.
     """
-    fields = {field.name: field for field in message.fields}
-    missing = [name for name in "xyz" if name not in fields]
-    if missing:
-        raise RecordingError(f"{source}: expected fields x, y, z, found {sorted(fields)}")
-    order = ">" if message.is_bigendian else "<"
+    fields = {field.name: (field.datatype, field.offset) for field in message.fields if field.name in ("x", "y", "z")}
     height, width, step = int(message.height), int(message.width), int(message.point_step)
-    formats = []
-    for name in "xyz":
-        code = _POINT_FIELDS.get(fields[name].datatype)
-        if code is None:
-            raise RecordingError(f"{source}: field {name}: expected datatype 1 to 8, found {fields[name].datatype}")
-        formats.append(np.dtype(order + code))
-        if fields[name].offset + formats[-1].itemsize > step:
-            raise RecordingError(f"{source}: field {name} at {fields[name].offset} leaves the point of {step} bytes")
+    order = ">" if message.is_bigendian else "<"
+    try:
+        formats, offsets = (
+            [order + _POINT_FIELDS[fields[name][0]] for name in "xyz"],
+            [fields[name][1] for name in "xyz"],
+        )
+        layout = np.dtype({"names": list("xyz"), "formats": formats, "offsets": offsets, "itemsize": step})
+    except (KeyError, ValueError, OverflowError):
+        expected = f"fields x, y, z of datatype 1 to 8, none of which leaves the point of {step} bytes"
+        raise RecordingError(f"{source}: expected {expected}, found {fields} as (datatype, offset)") from None
     if height * width == 0:
         return np.empty((0, 3))
     row_step = int(message.row_step) or width * step
@@ -209,9 +208,6 @@ def cloud_points(message: Message, source: str) -> FloatArray:
             f"{source}: expected {height} rows of {width} points of {step} bytes, found {len(message.data)} bytes "
             f"in rows of {row_step}"
         )
-    layout = np.dtype(
-        {"names": list("xyz"), "formats": formats, "offsets": [fields[n].offset for n in "xyz"], "itemsize": step}
-    )
     view = np.ndarray((height, width), layout, buffer=message.data.tobytes(), strides=(row_step, step))
     points = np.stack([view[name].astype(np.float64).ravel() for name in "xyz"], axis=1)
     kept: FloatArray = points[np.isfinite(points).all(axis=1)]
@@ -237,7 +233,38 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
     return {"ranges": message.ranges.astype(np.float32), **numbers}
 
 
-def _rows(message: Message, pixel_bytes: int, source: str) -> npt.NDArray[np.uint8]:
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a measurement needs beside its message: topic, stamp [s], root_from_sensor (4, 4), camera of an image, and meters of
+    a unit of 16-bit depth and of float depth."""
+
+    topic: str
+    stamp: float
+    pose: FloatArray
+    camera: Camera | None
+    units: tuple[float, float]
+
+    def of(self, kind: str, message: Message, where: str) -> Measurement:
+        """The measurement in a message of the kind "scan", "points", "depth" or "color"; `where` is named in errors.
+
+        Raises:
+            RecordingError: the message cannot be used, or is an image without a camera.
+        """
+        if kind == "scan":
+            return LaserScan(self.topic, self.stamp, **scan_fields(message, where), root_from_sensor=self.pose)
+        if kind == "points":
+            return PointCloud(self.topic, self.stamp, cloud_points(message, where), self.pose)
+        if self.camera is None:
+            raise RecordingError(f"{where}: expected a calibrated camera, found none")
+        if kind == "color":
+            decode = partial(color_image, message, self.camera, where)
+            return ColorImage(self.topic, self.stamp, decode, self.camera, self.pose)
+        image = (compressed_depth_image if hasattr(message, "format") else depth_image)(message, self.camera, where)
+        unit = self.units[image.dtype.kind == "f"]
+        return DepthImage(self.topic, self.stamp, image, unit, self.camera, self.pose)
+
+
+def _rows(message: Message, pixel_bytes: int, source: str) -> ByteImage:
     """(H, W * pixel_bytes) bytes without the padding at the end of the rows."""
     height, width, step = int(message.height), int(message.width), int(message.step)
     expected = width * pixel_bytes

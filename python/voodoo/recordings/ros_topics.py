@@ -27,29 +27,32 @@ from voodoo.recordings.ros_messages import (
 TopicChoice: TypeAlias = str | Sequence[str] | None
 
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CLOUD, SCAN = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan"
 CAMERA_INFO, STRING = "sensor_msgs/msg/CameraInfo", "std_msgs/msg/String"
-_TYPES: dict[TopicKind, tuple[str, ...]] = {
-    "depth": (IMAGE, COMPRESSED),
-    "points": ("sensor_msgs/msg/PointCloud2",),
-    "scan": ("sensor_msgs/msg/LaserScan",),
-    "color": (IMAGE, COMPRESSED),
-}
+IMAGES = (IMAGE, COMPRESSED)
+MEASURED = (*IMAGES, CLOUD, SCAN)
+"""Message types of measurements."""
+_TYPES: dict[TopicKind, tuple[str, ...]] = {"depth": IMAGES, "points": (CLOUD,), "scan": (SCAN,), "color": IMAGES}
 
 
 @dataclass(frozen=True)
 class TopicSource:
-    """A topic that is read: kind, message type, number of messages, and from its first message the frame id, the
+    """A topic that is read: kind, number of messages, and from its first message the frame id, the
     stamp [s] and a description of the format. `camera` and the topic it came from are set for images."""
 
     topic: str
     kind: TopicKind
-    type: str
     messages: int
     frame: str
     first_stamp: float
     detail: str
     camera: Camera | None = None
     info_topic: str | None = None
+
+
+def info_topic(topic: str) -> str:
+    """Topic of the calibration of an image topic: its name with the last part replaced."""
+    return f"{base_topic(topic).rsplit('/', 1)[0]}/camera_info"
 
 
 class TopicFinder:
@@ -207,10 +210,10 @@ class TopicFinder:
 
     def _source(self, name: str, kind: TopicKind) -> TopicSource:
         topic, message = self._topics[name], self._message(name)
-        camera, info_topic = None, None
+        camera, info = None, None
         with reading(f"{self.bag.path}, topic {name}", f"a {topic.type} message"):
             if kind in ("depth", "color"):
-                info_topic, camera = self._calibration(name, kind, self.bag.frame_of(name, message))
+                info, camera = self._calibration(name, kind, self.bag.frame_of(name, message))
                 words = message.format if topic.type == COMPRESSED else message.encoding
                 detail = f"{camera.width}x{camera.height} {words}"
             elif kind == "points":
@@ -219,13 +222,11 @@ class TopicFinder:
             else:
                 detail = f"scan of {len(message.ranges)} rays"
             stamp, frame = stamp_of(message, f"{self.bag.path}, topic {name}"), self.bag.frame_of(name, message)
-        return TopicSource(name, kind, topic.type, topic.messages, frame, stamp, detail, camera, info_topic)
+        return TopicSource(name, kind, topic.messages, frame, stamp, detail, camera, info)
 
     def _calibration(self, name: str, kind: TopicKind, frame: str) -> tuple[str, Camera]:
-        """CameraInfo beside the image (its name with the last part replaced), or the one chosen for depth."""
-        expected = f"{base_topic(name).rsplit('/', 1)[0]}/camera_info"
-        if self.bag.realsense:
-            expected = realsense.info_topic(name)
+        """CameraInfo beside the image, or the one chosen for depth."""
+        expected = (realsense.info_topic if self.bag.realsense else info_topic)(name)
         if kind == "depth" and self._camera_info_topic is not None:
             expected = self._camera_info_topic
         topic = self._topics.get(expected)
@@ -238,7 +239,7 @@ class TopicFinder:
             )
         source = f"{self.bag.path}, topic {expected}"
         camera = camera_of(self._message(expected, lambda info: camera_of(info, name, source)), name, source)
-        lens = realsense.lens_topic(name)
+        lens = realsense.beside(name, realsense.LENS)
         if lens in self._topics and self._topics[lens].type == STRING and self._topics[lens].messages:
             camera = realsense.with_lens(camera, self._message(lens))
         return expected, camera

@@ -7,7 +7,7 @@ import sqlite3
 import tempfile
 import weakref
 from collections.abc import Collection, Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -16,7 +16,7 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefiniti
 from rosbags.rosbag2.metadata import ReaderMetadata
 
 from voodoo.errors import RecordingError, reading
-from voodoo.recordings.mcap_file import Item
+from voodoo.recordings.mcap_file import Item, or_error
 from voodoo.recordings.set_back import falls
 from voodoo.stored import MOST_BYTES, MOST_METADATA, MOST_RECORDED, check_stored
 
@@ -200,16 +200,12 @@ class SqliteFile:
         if not falls((topic, time) for _, topic, time in order):
             order.sort(key=lambda row: row[2])
         for row, topic, time in order:
-            yield wanted[topic], time, self._data(row)
+            yield wanted[topic], time, or_error(partial(self._data, row), self.path, f"message {row}", reason=DAMAGED)
 
-    def _data(self, row: int) -> bytes | RecordingError:
+    def _data(self, row: int) -> bytes:
         assert self._base is not None
-        try:
-            with reading(self.path, f"message {row}"):
-                query = "SELECT CASE WHEN length(data) <= ? THEN data END FROM messages WHERE rowid = ?"
-                (data,) = self._base.execute(query, (MOST_BYTES, row)).fetchone()
-                if not isinstance(data, bytes):
-                    raise ValueError(f"expected {MOST_BYTES} bytes at most, found more or none")
-                return data
-        except RecordingError as error:
-            return RecordingError(str(error), reason=DAMAGED)
+        query = "SELECT CASE WHEN length(data) <= ? THEN data END FROM messages WHERE rowid = ?"
+        (data,) = self._base.execute(query, (MOST_BYTES, row)).fetchone()
+        if not isinstance(data, bytes):
+            raise ValueError(f"expected {MOST_BYTES} bytes at most, found more or none")
+        return data

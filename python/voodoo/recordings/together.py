@@ -1,4 +1,4 @@
-"""Groups images of several cameras into frames: one per image of the first camera, with the simultaneous images of the others."""
+"""Groups measurements into frames: one for each of the sensor that defines them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,16 @@ from voodoo.measurements import Measurement, RecordedFrame
 FARTHEST_S = 0.25
 """An image with a larger time difference [s] belongs to no frame, even at low frame rates."""
 _AHEAD = 2
+
+
+def in_turn(items: Iterable[Measurement], driver: str) -> Iterator[RecordedFrame]:
+    """A frame for each measurement of one sensor, which is its last one, with those of the others since the one before."""
+    pending: list[Measurement] = []
+    for item in items:
+        pending.append(item)
+        if item.sensor == driver:
+            yield RecordedFrame(item.stamp, tuple(pending))
+            pending.clear()
 
 
 def together(items: Iterable[Measurement], first: str) -> Iterator[RecordedFrame]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError
 from voodoo.measurements import FloatArray
-from voodoo.model.rotations import turned_between
+from voodoo.model.rotations import matrix_of_quaternion, turned_between
 from voodoo.model.transforms import inverse, pose_of
 from voodoo.recordings.ros_messages import Message
 from voodoo.recordings.set_back import SetBack
@@ -31,13 +31,8 @@ def matrix(translation: Message, rotation: Message, source: object) -> FloatArra
     norm = math.sqrt(float(q @ q))
     if not np.isfinite(t).all() or not abs(norm - 1.0) < 0.01:
         raise RecordingError(f"{source}: expected a finite translation and a unit quaternion, found {t} and {q}")
-    x, y, z, w = (float(value) for value in q / norm)
-    turn = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return pose_of(turn, t)
+    x, y, z, w = (q / norm).tolist()
+    return pose_of(matrix_of_quaternion((x, y, z, w)), t)
 
 
 def between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:

@@ -1,24 +1,33 @@
-"""Reads truth.csv and init.json beside a recording: exact joint positions and the initial pose."""
+"""Reads truth.csv, truth_people.csv and init.json beside a recording: exact joint positions and the initial pose."""
 
 from __future__ import annotations
 
+import csv
+import io
+import math
+from array import array
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat
 
-from voodoo.errors import RecordingError
+from voodoo.errors import RecordingError, columns_in, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.joint import valid
 from voodoo.model.projection import transform
-from voodoo.recordings.joint_table import read_positions
-from voodoo.recordings.recording import Reference, Start
-from voodoo.stored import MOST_METADATA, read_stored_text
+from voodoo.recordings.left_out import LeftOut
+from voodoo.recordings.people_truth import PeopleTruth
+from voodoo.recordings.recording import Recording, Reference, Start
+from voodoo.stored import MOST_BYTES, MOST_METADATA, read_stored_text
 
 OWN_ROOTS = ("base_link", "world")
-"""The default root frame of a recording is the first of these in its transforms; both files are in it."""
+"""The default root frame of a recording is the first of these in its transforms; the files are in it."""
+PEOPLE_TRUTH_FILE = "truth_people.csv"
+_FIRST = ("stamp_s", "person", "in_view")
+_LAST = np.iinfo(np.int32).max
 
 RootFromTruth: TypeAlias = Callable[[float], FloatArray]
 """(4, 4) from the frame of truth.csv to the root frame at a stamp [s]."""
@@ -48,6 +57,69 @@ def find_beside(bag: Path, name: str) -> Path | None:
     return None
 
 
+def read_positions(path: Path, first: tuple[str, ...]) -> tuple[tuple[str, ...], FloatArray]:
+    """The names and cells (R, C) of a table whose columns are `first` and then NAME_x, NAME_y, NAME_z; NaN for empty cells.
+
+    Raises:
+        RecordingError: another header, a short row, a cell that is not a number.
+    """
+    text = read_stored_text(path, "a table of joint positions")
+    with reading(path, "a table of joint positions"):
+        rows = csv.reader(io.StringIO(text))
+        header = next(rows, [])
+        names = tuple(cell.removesuffix("_x") for cell in header[len(first) :: 3])
+        if header != [*first, *(f"{name}_{axis}" for name in names for axis in "xyz")] or len(set(names)) != len(names):
+            expected = ", ".join((*first, "NAME_x", "NAME_y", "NAME_z", "..."))
+            raise RecordingError(f"{path}: expected columns {expected}, found {columns_in(header)}")
+        cells = array("d")  # a list takes thirty times the size of the file
+        for line, row in enumerate(rows, start=2):
+            if len(row) != len(header):
+                raise RecordingError(f"{path}, line {line}: expected {len(header)} cells, found {len(row)}")
+            try:
+                cells.extend(float(cell) if cell else math.nan for cell in row)
+            except ValueError as error:
+                raise RecordingError(f"{path}, line {line}: expected numbers, found {error}") from error
+    if not cells:
+        raise RecordingError(f"{path}: expected a header and at least one row, found {int(bool(header))} lines")
+    return names, np.array(cells).reshape(-1, len(header))
+
+
+def read_beside(
+    recording: Recording,
+    find: Callable[[str], Path | None],
+    *,
+    root: str,
+    first: float = 0.0,
+    left_out: LeftOut | None = None,
+) -> None:
+    """Set the reference, the persons and the start of a recording by the files beside it.
+
+    Args:
+        recording: the recording.
+        find: returns the file of a name, or None.
+        root: the frame of the files, unless init.json names another one.
+        first: stamp of the first frame [s].
+        left_out: of the recording; with it, a file that does not fit is only noted.
+
+    Raises:
+        RecordingError: a file that cannot be used.
+    """
+    own = partial(recording.root_from, root)
+    for name in ("truth.csv", PEOPLE_TRUTH_FILE, "init.json"):
+        file = find(name)
+        try:
+            if file is not None and name == "truth.csv":
+                recording.reference = read_truth(file, own)
+            elif file is not None and name == PEOPLE_TRUTH_FILE:
+                recording.people = read_people_truth(file, own)
+            elif file is not None:
+                recording.start = read_start(file, lambda frame: recording.root_from(frame or root, first))
+        except RecordingError as error:
+            if left_out is None:
+                raise
+            recording.assumed = (*recording.assumed, f"{file} is not used: {error}")
+
+
 def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
     """Read a truth.csv: stamp_s, then NAME_x,NAME_y,NAME_z [m] in the recording's own root frame; empty cells are missing joints.
 
@@ -62,6 +134,39 @@ def read_truth(path: Path, root_from_truth: RootFromTruth) -> Reference:
     for index, stamp in enumerate(stamps):
         positions[index] = transform(root_from_truth(float(stamp)), positions[index])
     return Reference(stamps, names, positions, exact=True)
+
+
+def read_people_truth(path: Path, root_from_truth: RootFromTruth) -> PeopleTruth:
+    """Read a truth_people.csv: stamp_s, person, in_view, then NAME_x,NAME_y,NAME_z [m] in base_link.
+
+    Args:
+        path: the file.
+        root_from_truth: (4, 4) root_from_base_link at a stamp [s].
+
+    Raises:
+        RecordingError: another header, a short row, a cell that is not a number, or two rows of a person at one stamp.
+    """
+    names, table = read_positions(path, _FIRST)
+    if not names:
+        raise RecordingError(f"{path}: expected joints, NAME_x, NAME_y, NAME_z, found none")
+    numbers = table[:, 1]
+    if not np.isfinite(table).all() or not ((numbers >= 1) & (numbers <= _LAST) & (numbers % 1.0 == 0.0)).all():
+        raise RecordingError(f"{path}: expected finite numbers and persons from 1, found others")
+    stamps, frame = np.unique(table[:, 0], return_inverse=True)
+    persons, column = np.unique(numbers.astype(np.int64), return_inverse=True)
+    if len(np.unique(frame * len(persons) + column)) != len(table):
+        raise RecordingError(f"{path}: expected one row for a person and stamp, found several")
+    if len(stamps) * len(persons) * len(names) * 24 > MOST_BYTES:
+        raise RecordingError(
+            f"{path}: expected people who are there together, found {len(persons)} at {len(stamps)} stamps"
+        )
+    in_view = np.zeros((len(stamps), len(persons)))
+    in_view[frame, column] = table[:, 2]
+    positions = np.full((len(stamps), len(persons), len(names), 3), np.nan)
+    positions[frame, column] = table[:, 3:].reshape(len(table), len(names), 3)
+    for index, stamp in enumerate(stamps):
+        positions[index] = transform(root_from_truth(float(stamp)), positions[index])
+    return PeopleTruth(stamps, persons, in_view, names, positions)
 
 
 def read_start(path: Path, root_from: RootFromStart) -> Start:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
-from voodoo.measurements import DepthImage
+from voodoo.measurements import DepthArray, DepthImage, FloatArray
 from voodoo.model.projection import transform
-from voodoo.sensors.pixels import FloatArray, in_sensor
-
-DepthArray: TypeAlias = npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+from voodoo.sensors.pixels import in_sensor
 
 _BOX_STEPS, _BOX_MARGIN_PX, _BOX_NEAREST_M = 5, 8, 0.1
 """Points on each edge of a box, whose straight edges a lens bends, pixels around them, and how near they may be to be used."""
@@ -128,9 +125,3 @@ def _window(depth: DepthImage, box: tuple[FloatArray, FloatArray]) -> tuple[slic
     low, high = pixels.min(axis=0) - _BOX_MARGIN_PX, pixels.max(axis=0) + _BOX_MARGIN_PX
     (left, top), (right, bottom) = np.clip([low, high], 0, depth.image.shape[::-1]).astype(int)
     return slice(top, bottom), slice(left, right), near, far
-
-
-def meters(depth: DepthImage) -> FloatArray:
-    """Depths (height, width) [m], NaN where there is no return."""
-    z = depth.image.astype(np.float64) * depth.meters_per_unit
-    return np.asarray(np.where(z > 0.0, z, np.nan))

@@ -6,9 +6,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.measurements import LaserScan
+from voodoo.measurements import FloatArray, LaserScan
 from voodoo.model.projection import transform
-from voodoo.sensors.pixels import FloatArray
 
 CELL_M, SIZE_M = 0.10, 40.0
 """Side of a cell, half the width of a leg; and side of the map, centered on the laser's first position."""

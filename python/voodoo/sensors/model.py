@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar, overload
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,8 @@ POINTS_SHARING = 25.0
 """Neighboring pixels of a depth image that share one error."""
 
 
-def _check(name: str, value: float, *, zero: bool = True) -> None:
+def check_number(name: str, value: float, *, zero: bool = True) -> None:
+    """Raise an error for a number that is not finite, negative, or zero if that is not allowed."""
     if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not zero):
         raise MeasurementError(f"{name}: expected a finite number {'>=' if zero else '>'} 0, found {value!r}")
 
@@ -55,16 +56,10 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         """Check both."""
-        _check("reference_sigma", self.reference_sigma, zero=False)
-        _check("max_weight", self.max_weight, zero=False)
+        check_number("reference_sigma", self.reference_sigma, zero=False)
+        check_number("max_weight", self.max_weight, zero=False)
 
-    @overload
-    def weight(self, sigma: float, *, sharing: float = 1.0) -> float: ...
-    @overload
-    def weight(self, sigma: npt.NDArray[np.float64], *, sharing: float = 1.0) -> npt.NDArray[np.float64]: ...
-    def weight(
-        self, sigma: float | npt.NDArray[np.float64], *, sharing: float = 1.0
-    ) -> float | npt.NDArray[np.float64]:
+    def weight(self, sigma: N, *, sharing: float = 1.0) -> N:
         """Weight of a datum.
 
         Args:
@@ -82,12 +77,12 @@ class SensorModel:
         values = np.asarray(sigma, dtype=np.float64)
         if not np.isfinite(values).all() or (values <= 0.0).any():
             raise MeasurementError(f"sigma: expected finite meters > 0, found {sigma!r}")
-        weights = np.minimum((self.reference_sigma / values) ** 2 / sharing, self.max_weight)
-        return float(weights) if weights.ndim == 0 else weights
+        weights: Any = np.minimum((self.reference_sigma / values) ** 2 / sharing, self.max_weight)
+        return weights if weights.ndim else weights.item()
 
     def sigma(self, weight: float) -> float:
         """Returns the standard deviation [m] that corresponds to a weight, such as those of K06."""
-        _check("weight", weight, zero=False)
+        check_number("weight", weight, zero=False)
         return self.reference_sigma / math.sqrt(weight)
 
 
@@ -111,7 +106,7 @@ class RangeNoise:
     def __post_init__(self) -> None:
         """Check all three."""
         for name in ("constant", "linear", "quadratic"):
-            _check(f"range noise {name}", getattr(self, name))
+            check_number(f"range noise {name}", getattr(self, name))
         if self.constant == self.linear == self.quadratic == 0.0:
             raise MeasurementError("range noise: expected one coefficient above zero, found none")
 
@@ -140,7 +135,7 @@ def stereo_noise(*, focal: float, baseline: float, disparity_sigma: float = 0.5)
         MeasurementError: a number that is not above zero.
     """
     for name, value in (("focal", focal), ("baseline", baseline), ("disparity_sigma", disparity_sigma)):
-        _check(name, value, zero=False)
+        check_number(name, value, zero=False)
     return RangeNoise(quadratic=disparity_sigma / (focal * baseline))
 
 
@@ -165,8 +160,8 @@ class PixelNoise:
 
     def __post_init__(self) -> None:
         """Check both."""
-        _check("pixel noise", self.pixels, zero=False)
-        _check("spread", self.spread)
+        check_number("pixel noise", self.pixels, zero=False)
+        check_number("spread", self.spread)
 
     def sigma(self, z: float, focal: float, *, confidence: float = 1.0, spread: float | None = None) -> float:
         """Standard deviation [m] perpendicular to the ray.
@@ -181,6 +176,6 @@ class PixelNoise:
             MeasurementError: depth, focal length or confidence not above zero.
         """
         for name, value in (("depth", z), ("focal length", focal), ("confidence", confidence)):
-            _check(name, value, zero=False)
+            check_number(name, value, zero=False)
         across = self.pixels / min(confidence, 1.0) * z / focal
         return math.hypot(across, self.spread if spread is None else spread)

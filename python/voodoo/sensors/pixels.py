@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 
 def normalized(camera: Camera, pixels: npt.ArrayLike) -> FloatArray:

@@ -1,27 +1,94 @@
-"""Rays on which named sites were detected, from any number of cameras, and their mutual agreement."""
+"""Rays on which named sites were detected, from any number of cameras: their mutual agreement, and where they meet."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
 
-import voodoo._core as _core
 from voodoo._core import Frame
+from voodoo._core import SiteRay as SiteRay
+from voodoo.measurements import FloatArray
 from voodoo.sensors.model import SensorModel
-from voodoo.sensors.pixels import FloatArray
+
+AGREE_M = 0.08
+"""A ray at this distance from a position has a quarter of the weight of a ray through it; networks have errors of 2 to 6 cm."""
+TRUSTED = 0.25
+"""A ray with less trust does not support the position."""
+_PARALLEL = 1e-3
+"""Rays whose directions differ by less than 2 degrees (sine squared) do not determine a position."""
+
+
+@dataclass(frozen=True, eq=False)
+class TriangulatedSite:
+    """A position triangulated from rays.
+
+    Args:
+        position: (3,) [m], world.
+        sigma: standard deviation along the worst direction [m].
+        trust: of each ray, in [0, 1].
+    """
+
+    position: FloatArray
+    sigma: float
+    trust: FloatArray
+
+    @property
+    def visible_in(self) -> npt.NDArray[np.bool_]:
+        """Which rays (N,) support it."""
+        return np.asarray(self.trust >= TRUSTED)
+
+
+def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> TriangulatedSite | None:
+    """Triangulates the rays of one site by robust least squares; returns None if fewer than two rays agree.
+
+    Every pair of rays gives an initial position. The one with the most support from all rays is refined with the
+    Geman-McClure weight `(s^2 / (s^2 + r^2))^2` of a ray's distance r from it, s = `scale` [m].
+    """
+    if len(rays) < 2:
+        return None
+    origins = np.array([ray.origin for ray in rays])
+    directions = np.array([ray.direction for ray in rays])
+    planes = across(directions)
+    information = np.array([1.0 / ray.sigma**2 for ray in rays])
+    best: tuple[float, FloatArray] | None = None
+    for pair in combinations(range(len(rays)), 2):
+        point = _meeting(origins[list(pair)], directions[list(pair)], planes[list(pair)])
+        if point is not None:
+            total = float(trust_at(point, origins, directions, scale=scale).sum())
+            if best is None or total > best[0]:
+                best = total, point
+    if best is None:
+        return None
+    found = met(origins, directions, information, best[1], scale=scale)
+    if found is None:
+        return None
+    point, trust = found
+    seeing = trust >= TRUSTED
+    if seeing.sum() < 2:
+        return None
+    matrix = (information[seeing, None, None] * planes[seeing]).sum(axis=0)
+    least = float(np.linalg.eigvalsh(matrix)[0])
+    return TriangulatedSite(point, least**-0.5, trust) if least > 0.0 else None
+
+
+def _meeting(origins: FloatArray, directions: FloatArray, planes: FloatArray) -> FloatArray | None:
+    """The point nearest to two rays; None for parallel ones, and behind a camera."""
+    if 1.0 - float(directions[0] @ directions[1]) ** 2 < _PARALLEL:
+        return None
+    point = np.linalg.solve(planes.sum(axis=0), np.einsum("nij,nj->i", planes, origins))
+    ahead = np.einsum("nj,nj->n", point - origins, directions)
+    return np.asarray(point) if (ahead > 0.0).all() else None
+
 
 _STEPS = 20
 _MOVED_M = 1e-4
 
 
-SiteRay = _core.SiteRay
-
-
-def agreed(
-    rays: Sequence[SiteRay], *, predicted: Mapping[str, npt.NDArray[np.float64]], scale: float = 0.08
-) -> list[SiteRay]:
+def agreed(rays: Sequence[SiteRay], *, predicted: Mapping[str, FloatArray], scale: float = AGREE_M) -> list[SiteRay]:
     """Returns the rays with a trust that measures how well those of one site agree.
 
     With three rays or more to a site, its position is found by reweighted least squares from the predicted position;
@@ -39,32 +106,58 @@ def agreed(
         origins = np.array([rays[index].origin for index in members])
         directions = np.array([rays[index].direction for index in members])
         information = np.array([rays[index].trust / rays[index].sigma ** 2 for index in members])
-        start = np.asarray(predicted[site], dtype=np.float64)
-        for index, trust in zip(members, _trust(origins, directions, information, start, scale), strict=True):
+        # The prediction is a weak prior, so that the position is determined for parallel rays too.
+        prior = 0.01 * float(information.max())
+        found = met(origins, directions, information, predicted[site], scale=scale, prior=prior)
+        for index, trust in zip(members, found[1], strict=True) if found else ():
             result[index] = result[index].trusted(result[index].trust * float(trust))
     return result
 
 
-def _trust(
-    origins: FloatArray, directions: FloatArray, information: FloatArray, start: FloatArray, scale: float
-) -> FloatArray:
-    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    offsets = np.einsum("nij,nj->ni", across, origins)
-    # The prediction is a weak prior, so that the position is determined for parallel rays too.
-    prior = 0.01 * float(information.max())
-    point = start
+def across(directions: FloatArray) -> FloatArray:
+    """Projections (N, 3, 3) onto the planes perpendicular to unit directions (N, 3)."""
+    return np.asarray(np.eye(3) - directions[:, :, None] * directions[:, None, :])
+
+
+def trust_at(point: FloatArray, origins: FloatArray, directions: FloatArray, *, scale: float) -> FloatArray:
+    """The Geman-McClure weights (N,) of the distances of rays from a point; 0 of rays that lead away from it."""
+    towards = point - origins
+    along = (towards * directions).sum(axis=1)
+    distance2 = np.square(towards - along[:, None] * directions).sum(axis=1)
+    return np.where(along > 0.0, (scale**2 / (scale**2 + distance2)) ** 2, 0.0)
+
+
+def met(
+    origins: FloatArray,
+    directions: FloatArray,
+    information: FloatArray,
+    start: FloatArray,
+    *,
+    scale: float,
+    prior: float = 0.0,
+) -> tuple[FloatArray, FloatArray] | None:
+    """Where rays meet, by reweighted least squares, and the trust of each; None if they do not determine a point.
+
+    Args:
+        origins, directions: (N, 3) of the rays.
+        information: (N,) inverse variances [1/m^2].
+        start: the first position (3,) [m].
+        scale: see `agreed`.
+        prior: information of `start` [1/m^2].
+    """
+    planes, point = across(directions), start
+    offsets = np.einsum("nij,nj->ni", planes, origins)
     for _ in range(_STEPS):
-        distance2 = (np.einsum("nij,j->ni", across, point) - offsets) ** 2
-        trust = (scale**2 / (scale**2 + distance2.sum(axis=1))) ** 2
-        weights = information * trust
-        matrix = (weights[:, None, None] * across).sum(axis=0) + prior * np.eye(3)
-        moved = np.linalg.solve(matrix, (weights[:, None] * offsets).sum(axis=0) + prior * start)
+        weights = information * trust_at(point, origins, directions, scale=scale)
+        matrix = (weights[:, None, None] * planes).sum(axis=0) + prior * np.eye(3)
+        if not prior and float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
+            return None
+        moved = np.linalg.solve(matrix, weights @ offsets + prior * start)
         done = float(np.linalg.norm(moved - point)) < _MOVED_M
         point = moved
         if done:
             break
-    distance2 = (np.einsum("nij,j->ni", across, point) - offsets) ** 2
-    return np.asarray((scale**2 / (scale**2 + distance2.sum(axis=1))) ** 2)
+    return point, trust_at(point, origins, directions, scale=scale)
 
 
 def add_rays(frame: Frame, rays: Sequence[SiteRay], *, model: SensorModel, min_trust: float = 0.05) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -11,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.measurements import ByteImage, FloatArray
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
@@ -20,7 +20,6 @@ from voodoo.sensors.skin.settings import SkinSettings
 
 Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two opposite corners [m], the lower one first."""
-ByteImage: TypeAlias = npt.NDArray[np.uint8]
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 WHOLE_BODY = ("depth", "points", "keypoints", "markers")
@@ -125,7 +124,7 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
     return tuple(kind for kind in inputs() if kind != "skin")
 
 
-def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
+def within_boxes(places: FloatArray, boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
     """Which positions (N, 3) [m] lie in one of the boxes."""
     inside = np.zeros(len(places), dtype=bool)
     for low, high in boxes:
@@ -135,8 +134,8 @@ def within_boxes(places: npt.NDArray[np.float64], boxes: Sequence[Box]) -> npt.N
 
 def _check_box(box: Box) -> None:
     """Raise an error for a box that excludes nothing."""
-    low, high = box
-    if not all(math.isfinite(value) for value in (*low, *high)) or not all(
-        a < b for a, b in zip(low, high, strict=True)
-    ):
-        raise MeasurementError(f"exclude: expected two corners in meters, the lower one first, found {low} and {high}")
+    low, high = corners = np.array(box, dtype=np.float64)
+    if not np.isfinite(corners).all() or not (low < high).all():
+        raise MeasurementError(
+            f"exclude: expected two corners in meters, the lower one first, found {box[0]} and {box[1]}"
+        )

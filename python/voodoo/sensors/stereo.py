@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
+from voodoo.measurements import ByteImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import pose_of, rigid
 from voodoo.sensors.model import RangeNoise, stereo_noise
-from voodoo.sensors.pixels import FloatArray
 
 _FRACTIONS = 16  # StereoSGBM gives sixteenths of a pixel
 
@@ -126,8 +126,8 @@ class StereoPair:
 
     def depth(
         self,
-        left: npt.NDArray[np.uint8],
-        right: npt.NDArray[np.uint8],
+        left: ByteImage,
+        right: ByteImage,
         *,
         world_from_left: npt.ArrayLike | None = None,
     ) -> StereoDepth:

@@ -12,30 +12,22 @@ from voodoo.export.ros2 import STORE
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Fault, Faults, faulty
 from voodoo.live.source import Arrival
-from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
+from voodoo.measurements import FloatArray, Measurement
 from voodoo.model.camera import Camera
 from voodoo.recordings.ros_messages import (
     COLOR_CHANNELS,
     DEPTH_ENCODINGS,
     Message,
-    base_topic,
+    Sensed,
     camera_of,
-    cloud_points,
-    color_image,
-    compressed_depth_image,
-    depth_image,
     frame_of,
     is_depth,
-    scan_fields,
     stamp_of,
 )
+from voodoo.recordings.ros_topics import CAMERA_INFO, CLOUD, COMPRESSED, IMAGES, MEASURED, SCAN, info_topic
 from voodoo.recordings.transforms import TransformTree
 
-IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
-CLOUD, SCAN = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan"
-CAMERA_INFO, TF = "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
-MEASURED = (IMAGE, COMPRESSED, CLOUD, SCAN)
-"""Message types of measurements."""
+TF = "tf2_msgs/msg/TFMessage"
 STANDING = ("odom", "map", "base_link", "world")
 """Root frames, best first: the first two are fixed to the room while a robot moves."""
 _KEPT_S = 10.0
@@ -76,7 +68,7 @@ class RosFeed:
         """Start without messages."""
         self.unusable = 0
         self._topics, self.faults, self.clock = tuple(topics), faults, clock
-        self._scale, self._float_scale = (0.001, 1.0) if meters_per_unit is None else (meters_per_unit, meters_per_unit)
+        self._units = (0.001, 1.0) if meters_per_unit is None else (meters_per_unit, meters_per_unit)
         self._pose = sensor_pose
         self._tree = TransformTree("tf", max_age=tf_max_age)
         self._lock = threading.Lock()  # transforms arrive in one thread and are read in another
@@ -92,10 +84,6 @@ class RosFeed:
     def root_frame(self) -> str:
         """The target frame of `root_from_sensor`; "" until it is known."""
         return self._root or ""
-
-    def info_topic(self, topic: str) -> str:
-        """Topic of the calibration of an image topic."""
-        return f"{base_topic(topic).rsplit('/', 1)[0]}/camera_info"
 
     def root_from(self, frame: str, stamp: float) -> FloatArray:
         """root_from_frame (4, 4) at a time [s].
@@ -150,7 +138,7 @@ class RosFeed:
 
     def _take_calibration(self, topic: str, message: Message) -> None:
         for image in self._topics:
-            if self.info_topic(image) != topic:
+            if info_topic(image) != topic:
                 continue
             try:
                 with faulty("calibration unusable"):
@@ -197,22 +185,12 @@ class RosFeed:
     def _measure(self, topic: str, kind: str, measured: str, message: Message, stamp: float, frame: str) -> Measurement:
         where = f"{topic}, stamp {stamp:.6f}"
         pose = self._root_from_sensor(topic, frame, stamp)
-        if measured == "scan":
-            return LaserScan(topic, stamp, **scan_fields(message, where), root_from_sensor=pose)
-        if measured == "points":
-            with faulty(_cut(message)):
-                return PointCloud(topic, stamp, cloud_points(message, where), pose)
         camera = self._cameras.get(topic)
-        if camera is None:
-            expected = f"a calibration on {self.info_topic(topic)}"
+        if camera is None and kind in IMAGES:
+            expected = f"a calibration on {info_topic(topic)}"
             raise Fault("calibration missing", f"{where}: expected {expected}, found none")
-        if measured == "color":
-            decode = partial(color_image, message, camera, where, compressed=kind == COMPRESSED)
-            return ColorImage(topic, stamp, decode, camera, pose)
         with faulty("damaged picture" if kind == COMPRESSED else _cut(message)):
-            image = (compressed_depth_image if kind == COMPRESSED else depth_image)(message, camera, where)
-        unit = self._scale if image.dtype.kind == "u" else self._float_scale
-        return DepthImage(topic, stamp, image, unit, camera, pose)
+            return Sensed(topic, stamp, pose, camera, self._units).of(measured, message, where)
 
 
 def _measured_as(topic: str, kind: str, message: Message) -> str:
@@ -221,10 +199,8 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     Raises:
         Fault: an image of neither depth nor color.
     """
-    if kind == CLOUD:
-        return "points"
-    if kind == SCAN:
-        return "scan"
+    if kind in (CLOUD, SCAN):
+        return "points" if kind == CLOUD else "scan"
     if kind == COMPRESSED:
         return "depth" if is_depth(topic, message) else "color"
     if message.encoding in DEPTH_ENCODINGS:
@@ -238,4 +214,4 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
 def _cut(message: Message) -> str:
     """The fault of a message that cannot be read: it may have fewer bytes than its fields announce."""
     row = int(getattr(message, "row_step", 0)) or int(getattr(message, "step", 0))
-    return "half a message" if len(message.data) < row * int(message.height) else "unreadable message"
+    return "half a message" if row and len(message.data) < row * int(message.height) else "unreadable message"

@@ -21,7 +21,7 @@ from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import pose_of
-from voodoo.recordings.calibration import read_calibration
+from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.pictures import decode_color
 
 Vendor: TypeAlias = Any
@@ -76,7 +76,7 @@ class CameraSource(Source):
         self._root_from_depth, self.placed = np.eye(4), calibration is not None
         if calibration is not None:
             place = read_calibration(calibration)
-            self.root_frame, self._root_from_depth = place.root_frame, place.depth.root_from_sensor
+            self.root_frame, self._root_from_depth = place.root_frame, place.depth.world_from_sensor
         self._ends: list[Callable[[], object]] = []
         self._arrivals: deque[Arrival] = deque(maxlen=_WAITING)
         self._error: VoodooError | None = None

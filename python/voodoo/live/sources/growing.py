@@ -12,7 +12,7 @@ from voodoo.errors import RecordingError
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Faults
 from voodoo.live.source import Arrival, Source, SourceGone
-from voodoo.recordings.calibration import FolderCalibration, read_calibration
+from voodoo.recordings.camera_files import FolderCalibration, read_calibration
 from voodoo.recordings.folder import FrameClock as NameClock
 from voodoo.recordings.folder import color_image, depth_image
 
@@ -102,9 +102,6 @@ class GrowingSource(Source):
             self._faults.add_error(error, now, "damaged picture") if isinstance(error, RecordingError) else None
             return []
         return [Arrival("depth", "depth", stamp, lambda: item, drives=True)]
-
-    def close(self) -> None:
-        """See Source."""
 
     def about(self) -> dict[str, Any]:
         """See Source."""

@@ -108,10 +108,8 @@ class OrbbecSource(CameraSource):
     def read(self, timeout: float) -> Sequence[Arrival]:
         """See Source."""
         arrivals = super().read(timeout)
-        if (
-            not (arrivals or self.stays)
-            and self._device.get_playback_status() == self._library.OBPlaybackStatus.STOPPED
-        ):
+        stopped = self._library.OBPlaybackStatus.STOPPED
+        if not (arrivals or self.stays) and self._device.get_playback_status() == stopped:
             raise SourceEnded(f"{self.name}: it is at its end")
         return arrivals
 

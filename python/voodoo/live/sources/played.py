@@ -11,7 +11,7 @@ from typing import Any
 from voodoo.live.clock import Clock
 from voodoo.live.faults import Faults, kind_of
 from voodoo.live.source import Arrival, Source, SourceEnded
-from voodoo.measurements import FloatArray, Measurement, RecordedFrame
+from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
@@ -88,8 +88,9 @@ class PlayedSource(Source):
         made_for = [item for item in frame.measurements if item.stamp == frame.stamp]
         driver = next((item for item in made_for if item.sensor == self._driver), made_for[-1])
         for item in (*(item for item in frame.measurements if item is not driver), driver):
-            adapter, measure = adapter_of(item), partial(_shifted, item, self._shift)
-            kind, stamp = adapter.recorded_as or adapter.kind, item.stamp + self._shift
+            adapter, stamp = adapter_of(item), item.stamp + self._shift
+            measure = partial(replace, item, stamp=stamp)
+            kind = adapter.recorded_as or adapter.kind
             arrivals.append(Arrival(item.sensor, kind, stamp, measure, item is driver, taken=due))
         return arrivals
 
@@ -104,7 +105,3 @@ class PlayedSource(Source):
     def about(self) -> dict[str, Any]:
         """See Source."""
         return {"name": self.name, "kind": "recording", "path": str(self.recording.path), "rate": self._rate}
-
-
-def _shifted(item: Measurement, shift: float) -> Measurement:
-    return replace(item, stamp=item.stamp + shift) if shift else item

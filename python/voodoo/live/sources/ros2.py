@@ -1,4 +1,4 @@
-"""ROS 2 topics as a live source."""
+"""ROS 2 topics as a live source, and a list of them for those who do not know the name of theirs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from voodoo.errors import VoodooError
 from voodoo.live.clock import Clock, HostClock
 from voodoo.live.faults import Faults
 from voodoo.live.ros2.dds import Node, Offer, Subscription
-from voodoo.live.ros2.feed import CAMERA_INFO, COMPRESSED, IMAGE, MEASURED, TF, RosFeed
+from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.live.source import Arrival, Source, SourceGone
 from voodoo.measurements import FloatArray
-from voodoo.recordings.calibration import read_calibration
+from voodoo.recordings.camera_files import read_calibration
+from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, info_topic
 
 _DISCOVERY_S = 3.0
 _POLL_S = 0.05
@@ -59,7 +60,7 @@ class Ros2Source(Source):
             root_frame=root_frame,
             meters_per_unit=meters_per_unit,
             tf_max_age=tf_max_age,
-            sensor_pose=None if place is None else (place.root_frame, place.depth.root_from_sensor),
+            sensor_pose=None if place is None else (place.root_frame, place.depth.world_from_sensor),
         )
         self._subscriptions: dict[str, Subscription] = {}
         self._gone = False
@@ -105,8 +106,8 @@ class Ros2Source(Source):
                 raise VoodooError(
                     f"{topic}: expected one of {', '.join(MEASURED)}, found {offer.kind or 'no ROS type'}"
                 )
-            if offer.kind in (IMAGE, COMPRESSED):
-                info = self._feed.info_topic(topic)
+            if offer.kind in IMAGES:
+                info = info_topic(topic)
                 offered = offers.get(info, Offer(CAMERA_INFO, reliable=False, latched=False))
                 self._subscribe(info, Offer(CAMERA_INFO, offered.reliable, offered.latched), _DEPTH)
             self._subscribe(topic, offer, _DEPTH)
@@ -142,9 +143,6 @@ class Ros2Source(Source):
             self._feed.faults.log(f"{self.name}: it is there again")
         self._gone = gone
 
-    def close(self) -> None:
-        """See Source."""
-
     def root_from(self, frame: str, stamp: float) -> FloatArray | None:
         """See Source."""
         return self._feed.root_from(frame, stamp)
@@ -152,3 +150,35 @@ class Ros2Source(Source):
     def about(self) -> dict[str, Any]:
         """See Source."""
         return {"name": self.name, "kind": "ros2", "topics": self._topics, "root_frame": self.root_frame}
+
+
+_DISCOVERY_S, _LISTEN_S, _POLL_S = 1.0, 2.0, 0.05
+
+
+def listing(node: Node | None = None, *, seconds: float = _LISTEN_S) -> list[str]:
+    """A line for each topic that is published: name, type, and rate of those that voodoo reads.
+
+    Args:
+        node: None: one of its own.
+        seconds: how long messages are counted [s].
+
+    Raises:
+        VoodooError: see Node.
+    """
+    node = Node() if node is None else node
+    found = time.monotonic() + _DISCOVERY_S
+    while not node.offers() and time.monotonic() < found:
+        time.sleep(_POLL_S)
+    offers = node.offers()
+    read = {topic: offer for topic, offer in offers.items() if offer.kind in (*MEASURED, CAMERA_INFO, TF)}
+    subscriptions = {topic: node.subscribe(topic, offer, depth=100) for topic, offer in read.items()}
+    counts, began = dict.fromkeys(read, 0), time.monotonic()
+    while (waited := time.monotonic() - began) < seconds:
+        node.wait(_POLL_S)
+        for topic, subscription in subscriptions.items():
+            counts[topic] += len(subscription.take())
+    lines = []
+    for topic, offer in sorted(offers.items(), key=lambda item: (item[1].kind not in MEASURED, item[0])):
+        rate = f"  {counts[topic] / waited:.1f} Hz" if topic in counts else ""
+        lines.append(f"{topic}  {offer.kind or 'no ROS type'}{rate}")
+    return lines

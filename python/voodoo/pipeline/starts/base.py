@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
-from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.settings import FrontEndSettings
 
 TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")

@@ -9,12 +9,11 @@ from math import inf
 
 import numpy as np
 
-from voodoo.measurements import KeypointImage
+from voodoo.measurements import FloatArray, KeypointImage
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose, without_impossible
 from voodoo.sensors.keypoints.sites import site_pixels
-from voodoo.sensors.pixels import FloatArray, ray_distance, world_rays
-from voodoo.sensors.rays import SiteRay
-from voodoo.sensors.triangulation import TriangulatedSite, place_of
+from voodoo.sensors.pixels import ray_distance, world_rays
+from voodoo.sensors.rays import SiteRay, TriangulatedSite, place_of
 
 _TOGETHER_S = 0.05
 """Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 import voodoo._core as _core
-from voodoo.measurements import DepthImage, KeypointImage
+from voodoo.measurements import DepthImage, FloatArray, KeypointImage
 from voodoo.pipeline.starts.base import (
     FoundStart,
     StartFinder,
@@ -19,10 +19,8 @@ from voodoo.pipeline.starts.base import (
     without_impossible,
 )
 from voodoo.sensors.depth import depth_points
-from voodoo.sensors.keypoints.sensor import POINT_SIGMA_M
-from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
-from voodoo.sensors.keypoints.surface import behind_surface
-from voodoo.sensors.pixels import FloatArray, in_sensor, world_rays
+from voodoo.sensors.keypoints.sites import POINT_SIGMA_M, SitePixel, behind_surface, site_pixels
+from voodoo.sensors.pixels import in_sensor, world_rays
 
 _TOGETHER_S = 0.05
 """Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""

@@ -7,13 +7,12 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from voodoo.measurements import LaserScan
+from voodoo.measurements import FloatArray, LaserScan
 from voodoo.model.body import Body
 from voodoo.model.legs import HALF_WIDTH, HIP, LEG
 from voodoo.model.projection import transform
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.sensors.free_space import FreeSpace
-from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.settings import Box, within_boxes
 
 SITES = ("l_hip", "r_hip", "l_ankle", "r_ankle")

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from voodoo.measurements import MarkerSet
+from voodoo.measurements import FloatArray, MarkerSet
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame, fixes_pose
-from voodoo.sensors.pixels import FloatArray
 
 
 class MarkersStart(StartFinder):

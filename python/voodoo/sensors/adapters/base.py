@@ -16,11 +16,10 @@ import voodoo._core as _core
 from voodoo._core import Estimate, Frame
 from voodoo.drawing.canvas import Canvas
 from voodoo.drawing.rerun_log import Log
-from voodoo.measurements import DepthImage
+from voodoo.measurements import DepthImage, FloatArray
 from voodoo.people import Followed
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import RangeNoise
-from voodoo.sensors.pixels import FloatArray
 from voodoo.sensors.rays import SiteRay, add_rays, agreed
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker

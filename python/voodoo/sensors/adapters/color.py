@@ -8,11 +8,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Frame
 from voodoo.drawing.canvas import Canvas
-from voodoo.measurements import ColorImage
+from voodoo.measurements import ByteImage, ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.pinhole import Pinhole
 from voodoo.sensors.silhouettes.regions import LIKELY
@@ -35,7 +34,7 @@ class _Known:
     tracker: Tracker
     drawn: bool
 
-    def picture(self, image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    def picture(self, image: ByteImage) -> ByteImage:
         """Converts an image (H, W, 3) for the tracker: undistorted, and (H, W) for a gray camera."""
         observed = self.lens.apply(image)
         return np.ascontiguousarray(observed[:, :, 1]) if self.gray else observed
@@ -61,7 +60,8 @@ class ColorAdapter(Adapter[ColorImage]):
         known = context.memory.all(self.kind).get(item.sensor)
         if known is None or known.lens.original != item.camera or known.tracker is not context.tracker:
             drawn = context.settings.draw_regions
-            known = _Known(Pinhole(item.camera), _is_gray(item.image), context.tracker, drawn)
+            gray = bool((np.ptp(item.image, axis=2) <= _GRAY).all())
+            known = _Known(Pinhole(item.camera), gray, context.tracker, drawn)
             empty = context.settings.empty_scene.get(item.sensor)
             if empty is not None:
                 context.tracker.set_background(item.sensor, [known.picture(picture) for picture in empty])
@@ -88,8 +88,3 @@ class ColorAdapter(Adapter[ColorImage]):
         scale = np.array(size) / (known.lens.camera.width, known.lens.camera.height)
         marks = [(float(u), float(v)) for u, v in (edges + 0.5) * scale - 0.5]
         canvas.regions(item, mask, marks=marks, names={}, color=_INK)
-
-
-def _is_gray(image: npt.NDArray[np.uint8]) -> bool:
-    low, high = image.min(axis=2), image.max(axis=2)
-    return bool((high - low <= _GRAY).all())

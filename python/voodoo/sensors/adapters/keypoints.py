@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from voodoo._core import Frame
-from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.canvas import Canvas, same_place
 from voodoo.drawing.rerun_log import Log
-from voodoo.measurements import DepthImage, KeypointImage
+from voodoo.measurements import KeypointImage
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory
-from voodoo.sensors.keypoints.people import assign_keypoints
-from voodoo.sensors.keypoints.sensor import KeypointReport, KeypointSensor
-from voodoo.sensors.keypoints.sites import nearest_person
+from voodoo.sensors.keypoints.sites import KeypointReport, KeypointSensor, assign_keypoints, nearest_person
 
 KEYPOINT = (255, 120, 255)
 """Color in overlays, BGR."""
@@ -32,26 +29,21 @@ class KeypointsAdapter(Adapter[KeypointImage]):
     def add(self, frame: Frame, item: KeypointImage, context: Context) -> None:
         """As rays, or with depth as positions; `Memory` keeps the report of each sensor under "keypoints"."""
         chosen = context.settings
-        place: dict[str, Any] = {
-            "layout": item.layout,
-            "camera": item.camera,
-            "world_from_sensor": item.root_from_sensor,
-        }
-        person = nearest_person(item.people, predicted=context.predicted, **place)
+        person = nearest_person(item, predicted=context.predicted)
         if person is None:
             context.memory.put(self.kind, item.sensor, KeypointReport())
             return
         sensor = KeypointSensor(
-            **place,
+            item.layout,
+            item.camera,
+            item.root_from_sensor,
             source=item.sensor,
             noise=chosen.keypoint_noise,
             model=chosen.model,
             min_confidence=chosen.min_confidence,
         )
-        registered = next((depth for depth in context.depth_images if _same_camera(depth, item)), None)
-        with_depth: dict[str, Any] = {}
-        if registered is not None:
-            with_depth = {"depth": registered.image, "meters_per_unit": registered.meters_per_unit}
+        registered = next((depth for depth in context.depth_images if same_place(depth, item)), None)
+        depth, unit = (None, 1.0) if registered is None else (registered.image, registered.meters_per_unit)
         # As lists: rows of an array, one by one, are slower.
         joints = dict(zip(context.estimate.joint_names, context.estimate.joint_positions.tolist(), strict=True))
         sites = [part.site for part in layout_of(item.layout).parts if part.site in joints]
@@ -63,7 +55,8 @@ class KeypointsAdapter(Adapter[KeypointImage]):
             predicted=context.predicted,
             gate=context.gate,
             before=dict(zip(sites, hidden.tolist(), strict=True)),
-            **with_depth,
+            depth=depth,
+            meters_per_unit=unit,
         )
         context.memory.put(self.kind, item.sensor, report)
         context.rays.extend(rays)
@@ -72,8 +65,8 @@ class KeypointsAdapter(Adapter[KeypointImage]):
 
     def shares(self, item: KeypointImage, persons: Mapping[int, Context]) -> Mapping[int, KeypointImage]:
         """The detected people are assigned to the persons jointly."""
-        assigned = assign_keypoints(item, {number: context.predicted for number, context in persons.items()})
-        return {**assigned.of, NOBODY: assigned.rest}
+        of, rest = assign_keypoints(item, {number: context.predicted for number, context in persons.items()})
+        return {**of, NOBODY: rest}
 
     def forget(self, memory: Memory) -> None:
         """Nobody's keypoints are used."""
@@ -93,7 +86,3 @@ class KeypointsAdapter(Adapter[KeypointImage]):
         rows = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0)]
         rings = np.column_stack([np.full((len(rows), 3), KEYPOINT), 60 + 195 * rows[:, 2].clip(0.0, 1.0)])
         log.send(f"{path}/picture/keypoints", log.rr.Points2D(rows[:, :2], radii=4.0, colors=rings.astype(np.uint8)))
-
-
-def _same_camera(depth: DepthImage, item: KeypointImage) -> bool:
-    return depth.camera == item.camera and np.allclose(depth.root_from_sensor, item.root_from_sensor, atol=1e-6)

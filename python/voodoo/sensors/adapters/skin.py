@@ -34,6 +34,9 @@ class SkinAdapter(Adapter[ColorImage]):
         # The picture is older or newer than the frame: the ray is moved along with its site.
         then = context.tracker.predict(item.stamp)
         depth = next(iter(context.depth_images), None)
+        # What a hand's region shows changes as the hand turns.
+        is_measured = depth is not None and context.estimate.limb_status.get("head") == "measured"
+        heads = {site for site in skin.settings.sites if is_measured and site.startswith("head")}
         rays = skin.observe(
             item.image,
             item.camera,
@@ -43,7 +46,7 @@ class SkinAdapter(Adapter[ColorImage]):
             depth=depth,
             tracker=context.tracker,
             others=context.others,
-            head_visible=() if depth is None else _heads(context.estimate.limb_status, skin.settings.sites),
+            head_visible=heads,
             source=item.sensor,
             moved=context.predicted,
         )
@@ -89,8 +92,3 @@ class SkinAdapter(Adapter[ColorImage]):
         if skin is not None:
             places = [candidate.pixel for candidate in skin.candidates]
             log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
-
-
-def _heads(status: Mapping[str, str], sites: Mapping[str, float]) -> set[str]:
-    """Sites of the head, if it was measured in the last frame; what a hand's region shows changes as the hand turns."""
-    return {site for site in sites if status.get("head") == "measured" and site.startswith("head")}

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from voodoo.errors import MeasurementError
-from voodoo.sensors.model import PixelNoise
+from voodoo.sensors.model import PixelNoise, check_number
 
 
 @dataclass(frozen=True)
@@ -49,5 +47,4 @@ class SkinSettings:
         numbers = {name: float(getattr(self, name)) for name in names} | dict(self.sites)
         numbers |= {f"visible_bias {site}": bias for site, bias in self.visible_bias.items()}
         for name, value in numbers.items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise MeasurementError(f"skin {name}: expected a number > 0, found {value!r}")
+            check_number(f"skin {name}", value, zero=False)

@@ -12,17 +12,16 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import MeasurementError
-from voodoo.measurements import DepthImage
+from voodoo.measurements import ByteImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
-from voodoo.sensors.pixels import FloatArray, checked_camera
+from voodoo.sensors.pixels import checked_camera
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.tracker import Tracker
 
 Mask = npt.NDArray[np.bool_]
-ByteImage = npt.NDArray[np.uint8]
 
 _NOWHERE = np.full(3, np.nan)
 
