@@ -8,11 +8,12 @@ from typing import Annotated
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, loader_words, print_interrupted, print_message, progressing, reporting
+from voodoo.cli.common import clear_errors, print_interrupted, print_message, progressing, reporting
 from voodoo.cli.signals import deferred
 
 
 def batch_command(
+    *,
     recordings: Annotated[
         list[str], typer.Argument(metavar="RECORDING...", help="Recordings, folders of recordings, or URLs of either.")
     ],
@@ -23,13 +24,8 @@ def batch_command(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, tcp://HOST:PORT.")
     ] = None,
-    init: Annotated[
-        str | None,
-        typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
-    ] = None,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
-    ] = None,
+    init: options.AutoOption = None,
+    only: options.OnlyOption = None,
     time_limit: Annotated[
         float | None, typer.Option(metavar="S", min=0.001, help="A recording that takes longer has failed.")
     ] = None,
@@ -37,11 +33,7 @@ def batch_command(
     model: options.ModelOption = None,
     use: options.UseOption = None,
     people: options.PeopleOption = "1",
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
     strict: options.StrictOption = False,
     pages: Annotated[
         bool,
@@ -80,19 +72,16 @@ def batch_command(
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.config import Config
     from voodoo.errors import NoPoseError, VoodooError
-    from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
     with clear_errors(), reporting(as_json) as told:
-        if init not in (None, AUTO):
-            raise typer.BadParameter(f"--init: expected auto, found {init!r}")
         chosen, plain = config_of(config), Config()
         settings = Settings(
             use=kinds_of(use),
             init=init,
             model=model,
-            loader=loader,
-            options=loader_words(topic, option, frame=frame, layout=layout),
+            loader=reading.loader,
+            options=reading.words(),
             people=limit_of(people),
             strict=strict,
             config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},

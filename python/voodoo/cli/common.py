@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 
 import typer
 
-from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.cli.terminal import READER_LEFT, Escaped
 from voodoo.errors import NoPoseError, VoodooError, reason
@@ -35,54 +34,6 @@ EXIT_CODES = {
     READER_LEFT: "what read the output has ended, as `head` does (128 + SIGPIPE); nothing more is said",
 }
 """What the exit codes of all commands mean; Typer uses 2."""
-
-
-def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
-    """Options of the loader from words like "depth=/front/depth/image".
-
-    Raises:
-        VoodooError: another form or kind, or several calibrations.
-    """
-    names: dict[str, list[str]] = {}
-    for word in words or ():
-        kind, _, name = word.partition("=")
-        if kind not in TOPICS or not name:
-            raise VoodooError(f"topic: expected KIND=NAME with one of {', '.join(TOPICS)}, found {word!r}")
-        names.setdefault(kind, []).append(name)
-    if len(names.get("camera_info", ())) > 1:
-        raise VoodooError(f"topic: expected one camera_info, found {', '.join(names['camera_info'])}")
-    return {f"{kind}_topic": found if len(found) > 1 else found[0] for kind, found in names.items()}
-
-
-def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
-    """Options of the loader from words like "rate=30".
-
-    Raises:
-        VoodooError: another form or name.
-    """
-    numbers: dict[str, float] = {}
-    for word in words or ():
-        name, _, value = word.partition("=")
-        try:
-            number = float(value) if name in NUMBERS else None
-        except ValueError:
-            number = None
-        if number is None:
-            raise VoodooError(f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}")
-        numbers[name] = number
-    return numbers
-
-
-def loader_words(
-    topic: Sequence[str] | None, option: Sequence[str] | None, *, frame: str | None = None, layout: str | None = None
-) -> dict[str, Any]:
-    """Options of `open_recording` from --topic, --option, --frame and --layout, without those that are not given.
-
-    Raises:
-        VoodooError: see `topics_of` and `numbers_of`.
-    """
-    given = {"root_frame": frame, "layout": layout}
-    return topics_of(topic) | numbers_of(option) | {name: word for name, word in given.items() if word is not None}
 
 
 def refuse_both(name: str, value: object, **others: object) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from voodoo.cli import options
 from voodoo.cli.common import clear_errors, refuse_missing, states
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError
@@ -34,7 +35,7 @@ def demo_command(
     from voodoo.visualization.sheet import contact_sheet
 
     with clear_errors():
-        source = opened(sample_path(), None, None)
+        source = opened(sample_path(), options.Reading())
         tracker = start_tracker(source, init=AUTO)
         estimates: list[Estimate] = []
         steps = track(source, tracker)

@@ -11,7 +11,6 @@ import typer
 from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
-    loader_words,
     print_interrupted,
     print_text,
     print_written,
@@ -23,21 +22,17 @@ from voodoo.cli.signals import deferred
 
 
 def eval_command(
+    *,
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders of recordings.")
     ],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plots.")] = None,
-    init: Annotated[
-        str | None,
-        typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
-    ] = None,
+    init: options.AutoOption = None,
     config: options.ConfigOption = None,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Number of parallel recordings; by default one per core.")
     ] = None,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
-    ] = None,
+    only: options.OnlyOption = None,
     model: options.ModelOption = None,
     use: options.UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
@@ -47,11 +42,7 @@ def eval_command(
             metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
         ),
     ] = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
     as_json: options.JsonOption = False,
 ) -> None:
     """Track recordings with ground truth or a reference skeleton, and evaluate the result.
@@ -84,14 +75,10 @@ def eval_command(
     from voodoo.evaluation.report import brief, write_reports
     from voodoo.evaluation.search import find_recordings
     from voodoo.evaluation.summary import summarize
-    from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
     with clear_errors(), reporting(as_json) as report:
-        if init not in (None, AUTO):
-            raise typer.BadParameter(f"--init: expected auto, found {init!r}")
-        automatic = None if init is None else AUTO
-        words = loader_words(topic, option, frame=frame, layout=layout)
+        words = reading.words()
         config_of(config)  # an invalid file is one error here instead of one per recording
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
@@ -99,14 +86,14 @@ def eval_command(
         if result is not None:
             if len(paths) != 1:
                 raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-            show_people([evaluate_result(paths[0], result, loader=loader, options=words)], out, report=report)
+            show_people([evaluate_result(paths[0], result, loader=reading.loader, options=words)], out, report=report)
             return
         jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         kinds = ("depth",) if depth_only else kinds_of(use)
         several = [path for path in paths if has_people(path)]
         how: dict[str, Any] = {
             "config_file": config,
-            "loader": loader,
+            "loader": reading.loader,
             "options": words,
             "model": model,
             "use": kinds,
@@ -120,7 +107,7 @@ def eval_command(
             return
         if out is not None:
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        done = evaluate_all(paths, **how, init=automatic, jobs=jobs)
+        done = evaluate_all(paths, **how, init=init, jobs=jobs)
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
         ordered = sorted(finished, key=lambda item: item[0])
         scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]

@@ -11,11 +11,9 @@ import typer
 from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
-    loader_words,
     print_interrupted,
     print_message,
     print_result,
-    refuse_both,
     refuse_missing,
     states,
     wrote,
@@ -25,6 +23,7 @@ from voodoo.errors import NoPoseError
 
 
 def ik_command(
+    *,
     context: typer.Context,
     recording: options.RecordingArgument,
     targets: Annotated[
@@ -50,9 +49,7 @@ def ik_command(
         ),
     ] = True,
     init: options.InitOption = None,
-    body: options.BodyOption = None,
-    height: options.HeightOption = None,
-    model: options.ModelOption = None,
+    human: options.Human,
     out: Annotated[
         list[Path] | None,
         typer.Option(
@@ -60,11 +57,7 @@ def ik_command(
             help=f"{options.RESULTS}; by default NAME_ik.csv.",
         ),
     ] = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
 ) -> None:
     """Compute postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
@@ -81,25 +74,17 @@ def ik_command(
     from voodoo.cli.running import opened, run, spool_of, turn_of
     from voodoo.export.files import upright_words
     from voodoo.export.track import Track
-    from voodoo.model.body import Body
     from voodoo.people import ONE
     from voodoo.pipeline.ik import Solved, follow, known_positions
     from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
 
     with clear_errors():
-        refuse_both("--body", body, **{"--height": height, "--model": model})
         beginning = beginning_of(init)
-        source = opened(recording, loader, frame, **loader_words(topic, option, layout=layout))
+        source = opened(recording, reading)
         files, keeping = spool_of(source, out, context, suffix="_ik.csv")
         with keeping as spool:
             positions = known_positions(source, None if targets is None else Track.load(targets))
-            tracker = start_tracker(
-                source,
-                init=beginning,
-                body=None if body is None else Body.load(body),
-                height=height,
-                model=model,
-            )
+            tracker = start_tracker(source, init=beginning, **human.start())
             if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
                 raise NoPoseError(
                     f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"

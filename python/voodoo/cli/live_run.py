@@ -8,7 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from voodoo._core import Estimate
 from voodoo.cli.common import print_message
+from voodoo.cli.running import Start
 from voodoo.cli.signals import deferred
 from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import cdr, description, instant
@@ -33,9 +34,8 @@ from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
 from voodoo.model.camera import Camera
 from voodoo.people import ONE, PeopleEstimate
-from voodoo.pipeline.start import Beginning, start_people, start_tracker, starts_of
+from voodoo.pipeline.start import starts_of
 from voodoo.sensors.keypoints.networks import KeypointNetwork
-from voodoo.sensors.settings import FrontEndSettings
 from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
@@ -60,19 +60,16 @@ _SWITCH_S = 5e-4
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """Settings of the command line: largest number of persons, options of start_tracker and of FrontEndSettings, outputs."""
+class Outputs:
+    """Files and addresses of the command line."""
 
-    limit: int | None
-    beginning: Beginning | None
-    start: Mapping[str, Any]
-    settings: Mapping[str, Any]
     targets: Sequence[Path]
     record: Path | None
+    report: Path | None
     to: Sequence[str]
+    publish: bool
     view: bool
     serve: str | None
-    publish: bool
 
 
 @dataclass
@@ -115,7 +112,7 @@ def entered(
     return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
-def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | None) -> Done:
+def run(live: Live, start: Start, wanted: Outputs, *, duration: float | None) -> Done:
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
 
     Raises:
@@ -124,21 +121,21 @@ def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | No
     done = Done()
     warm_up()
     with _prompt_threads(), deferred() as ended, live:
-        outputs, files = _outputs(live, wishes)
-        session = Session(live, lambda frame: _follower(live, wishes, frame), outputs=outputs)
+        outputs, files = _outputs(live, wanted)
+        session = Session(live, lambda frame: _follower(start, FirstFrame(live, frame)), outputs=outputs)
         try:
             _check_states(session, ended, duration)
         finally:
             try:
                 session.finish()
             finally:
-                if report is not None:
-                    write_whole(report, json.dumps(session.report(), indent=2) + "\n")
+                if wanted.report is not None:
+                    write_whole(wanted.report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
         done.ended, done.with_pose = ended.is_set(), session.with_pose
         if files is not None:
             done.written += files.written
-        done.written += [path for path in (wishes.record, report) if path is not None and path.exists()]
+        done.written += [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
     return done
 
 
@@ -155,29 +152,27 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
             print_message(session.line())
 
 
-def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
-    first = FirstFrame(live, frame)
-    settings = replace(FrontEndSettings.of(first, use=wishes.start["use"]), **wishes.settings)
-    if wishes.limit != 1:
-        return Follower(people=lambda: start_people(first, limit=wishes.limit, **wishes.start), settings=settings)
-    tracker = start_tracker(first, init=wishes.beginning, **wishes.start)
-    return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
+def _follower(start: Start, first: FirstFrame) -> Follower:
+    if start.limit != 1:
+        return Follower(people=lambda: start.tracker(first), settings=start.settings(first))
+    starts = starts_of(start.beginning, first)
+    return Follower(start.tracker(first), settings=start.settings(first), starts=starts)
 
 
-def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | None]:
+def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | None]:
     # Addresses come first: one that is of no use leaves no file behind.
-    addresses = [*wishes.to, *([ROS2] if wishes.publish and ROS2 not in wishes.to else [])]
+    addresses = [*wanted.to, *([ROS2] if wanted.publish and ROS2 not in wanted.to else [])]
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
-    if wishes.targets:
-        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame)
+    if wanted.targets:
+        files = FileOutput(wanted.targets, root_frame=lambda: live.root_frame)
         outputs.append(files)
-    if wishes.record is not None:
-        outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
-        print_message(f"{wishes.record} stores pictures of people")
-    if wishes.view or wishes.serve is not None:
+    if wanted.record is not None:
+        outputs.append(Recorder(wanted.record, root_frame=lambda: live.root_frame))
+        print_message(f"{wanted.record} stores pictures of people")
+    if wanted.view or wanted.serve is not None:
         try:
-            viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
+            viewer = Viewer(name=live.sources[0].name, serve=wanted.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
         outputs.append(ShowOutput(viewer))

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from voodoo.names import INPUTS, TOPIC_KINDS, HumanModel
+from voodoo.cli.common import refuse_both
+from voodoo.errors import VoodooError
+from voodoo.names import INPUTS, TOPIC_KINDS, Automatic, HumanModel
 from voodoo.recordings.keypoint_layouts import LAYOUTS
 from voodoo.recordings.loaders import LOADERS
 
@@ -43,6 +49,14 @@ InitOption = Annotated[
         help="First pose as JSON, or an earlier result (.csv, .npz); auto: search for a person, even if there is a start beside "
         "the recording. By default the recording's start; auto if it has none.",
     ),
+]
+AutoOption = Annotated[
+    Automatic | None,
+    typer.Option("--init", metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
+]
+OnlyOption = Annotated[
+    list[str] | None,
+    typer.Option("--only", metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'."),
 ]
 DetectorOption = Annotated[
     Path | None,
@@ -166,3 +180,115 @@ OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", h
 OutOrNameOption = Annotated[
     list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}; by default NAME.csv.")
 ]
+
+
+def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
+    """Options of the loader from words like "depth=/front/depth/image".
+
+    Raises:
+        VoodooError: another form or kind, or several calibrations.
+    """
+    names: dict[str, list[str]] = {}
+    for word in words or ():
+        kind, _, name = word.partition("=")
+        if kind not in TOPICS or not name:
+            raise VoodooError(f"topic: expected KIND=NAME with one of {', '.join(TOPICS)}, found {word!r}")
+        names.setdefault(kind, []).append(name)
+    if len(names.get("camera_info", ())) > 1:
+        raise VoodooError(f"topic: expected one camera_info, found {', '.join(names['camera_info'])}")
+    return {f"{kind}_topic": found if len(found) > 1 else found[0] for kind, found in names.items()}
+
+
+def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
+    """Options of the loader from words like "rate=30".
+
+    Raises:
+        VoodooError: another form or name.
+    """
+    numbers: dict[str, float] = {}
+    for word in words or ():
+        name, _, value = word.partition("=")
+        try:
+            number = float(value) if name in NUMBERS else None
+        except ValueError:
+            number = None
+        if number is None:
+            raise VoodooError(f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}")
+        numbers[name] = number
+    return numbers
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """A command for Typer: a parameter that is a dataclass of options becomes an option for each of its fields."""
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    parameters = []
+    for name, own in inspect.signature(command).parameters.items():
+        parts = get_type_hints(groups[name], include_extras=True) if name in groups else hints
+        items = fields(groups[name]) if name in groups else [own]
+        parameters += [own.replace(name=one.name, default=one.default, annotation=parts[one.name]) for one in items]
+
+    @wraps(command)
+    def run(**values: Any) -> None:  # noqa: ANN401 - of the options
+        for name, kind in groups.items():
+            values[name] = kind(**{field.name: values.pop(field.name) for field in fields(kind)})
+        command(**values)
+
+    vars(run)["__signature__"] = inspect.Signature(parameters)
+    return run
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a recording is read."""
+
+    topic: TopicOption = None
+    frame: FrameOption = None
+    loader: LoaderOption = None
+    option: LoaderNumberOption = None
+    layout: LayoutOption = None
+
+    def words(self) -> dict[str, Any]:
+        """Options of `open_recording` but for the loader, without those that are not given.
+
+        Raises:
+            VoodooError: see `topics_of` and `numbers_of`.
+        """
+        given = {"root_frame": self.frame, "layout": self.layout}
+        named = {name: word for name, word in given.items() if word is not None}
+        return topics_of(self.topic) | numbers_of(self.option) | named
+
+
+@dataclass(frozen=True)
+class Human:
+    """Whom to track."""
+
+    body: BodyOption = None
+    height: HeightOption = None
+    model: ModelOption = None
+
+    def start(self) -> dict[str, Any]:
+        """Options of `start_tracker`.
+
+        Raises:
+            typer.BadParameter: a body and the size or model of a human.
+            VoodooError: a file that is wrong.
+        """
+        from voodoo.model.body import Body
+
+        refuse_both("--body", self.body, **{"--height": self.height, "--model": self.model})
+        body = None if self.body is None else Body.load(self.body)
+        return {"body": body, "height": self.height, "model": self.model}
+
+
+@dataclass(frozen=True)
+class Tracking(Human):
+    """Whom to track, and how."""
+
+    init: InitOption = None
+    config: ConfigOption = None
+    detector: DetectorOption = None
+    people: PeopleOption = "1"
+    use: UseOption = None
+    depth_range: DepthRangeOption = None
+    exclude: ExcludeOption = None

@@ -14,7 +14,6 @@ from voodoo.errors import NoPoseError, VoodooError
 if TYPE_CHECKING:
     from voodoo.evaluation.people import PeopleScore
     from voodoo.evaluation.score import Score
-    from voodoo.pipeline.start import Automatic
 
 ANY = "any"
 
@@ -28,19 +27,6 @@ def limit_of(word: str) -> int | None:
     if word != ANY and (not word.isdecimal() or int(word) < 1):
         raise VoodooError(f"people: expected any or a whole number from 1, found {word!r}")
     return None if word == ANY else int(word)
-
-
-def no_starts(init: str | None) -> Automatic:
-    """Several persons are always searched for.
-
-    Raises:
-        VoodooError: a start was given.
-    """
-    from voodoo.pipeline.start import AUTO
-
-    if init not in (None, AUTO):
-        raise VoodooError(f"init: expected none with --people any or N, where everybody is looked for, found {init}")
-    return AUTO
 
 
 def refuse_several(**options: object) -> None:

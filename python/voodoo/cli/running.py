@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -12,7 +13,9 @@ import numpy as np
 import typer
 
 from voodoo.cli.common import print_message, progressing
+from voodoo.cli.options import Reading, Tracking
 from voodoo.cli.paths import check_paths
+from voodoo.cli.people import limit_of
 from voodoo.cli.recover import recover_before
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
@@ -25,6 +28,7 @@ from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
 from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.run import TrackedFrame
+from voodoo.pipeline.start import AUTO, Beginning, beginning_of, start_people, start_tracker
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
@@ -51,11 +55,53 @@ class Run(NamedTuple):
     failures: list[Exception]
 
 
-def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
-    """Open a recording, in the requested root frame."""
-    if frame is not None:
-        options["root_frame"] = frame
-    return open_recording(path, loader=loader, **options)
+@dataclass(frozen=True)
+class Start:
+    """How a tracker starts, by the options of a command.
+
+    Args:
+        limit: largest number of persons; None: any.
+        beginning: first pose; with several persons they are searched for.
+        options: others of `start_tracker`.
+        filters: entries of FrontEndSettings.
+    """
+
+    limit: int | None
+    beginning: Beginning | None
+    options: Mapping[str, Any]
+    filters: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, asked: Tracking) -> Start:
+        """Parse the options.
+
+        Raises:
+            typer.BadParameter: options that exclude each other.
+            VoodooError: an option of another form, or a file that is wrong.
+        """
+        limit = limit_of(asked.people)
+        if limit != 1 and asked.init not in (None, AUTO):
+            raise VoodooError(
+                f"init: expected none with --people any or N, where everybody is looked for, found {asked.init}"
+            )
+        how = {"config": config_of(asked.config), "use": kinds_of(asked.use), "detector": detector_of(asked.detector)}
+        filters = {"depth_filter": depth_filter_of(asked.depth_range), "exclude": boxes_of(asked.exclude)}
+        return cls(limit, beginning_of(asked.init) if limit == 1 else AUTO, asked.start() | how, filters)
+
+    def settings(self, source: Recording) -> FrontEndSettings:
+        """Those of the front end."""
+        return replace(FrontEndSettings.of(source, use=self.options["use"]), **self.filters)
+
+    def tracker(self, source: Recording, **more: Any) -> Any:  # noqa: ANN401 - of start_tracker; a Tracker or People
+        """The tracker of one person, or of several."""
+        if self.limit != 1:
+            return start_people(source, limit=self.limit, **self.options, **more)
+        return start_tracker(source, init=self.beginning, **self.options, **more)
+
+
+def opened(path: Path, reading: Reading, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
+    """Open a recording."""
+    return open_recording(path, **{"loader": reading.loader} | reading.words() | options)
 
 
 def kinds_of(words: str | None) -> tuple[str, ...] | None:

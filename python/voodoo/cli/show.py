@@ -8,16 +8,13 @@ from typing import Annotated
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, loader_words, print_json, print_text, refuse_both
+from voodoo.cli.common import clear_errors, print_json, print_text, refuse_both
 
 
 def info_command(
+    *,
     recording: options.RecordingArgument,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
     as_json: options.JsonOption = False,
 ) -> None:
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
@@ -29,7 +26,7 @@ def info_command(
 
     with clear_errors():
         left_out = LeftOut()
-        source = opened(recording, loader, frame, left_out=left_out, **loader_words(topic, option, layout=layout))
+        source = opened(recording, reading, left_out=left_out)
         about = source.info()
         with left_out.aside():
             depth = depth_range(source)

@@ -11,13 +11,11 @@ import typer
 from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
-    numbers_of,
     print_message,
     print_result,
     refuse_both,
     refuse_missing,
     states,
-    topics_of,
     wrote,
 )
 from voodoo.cli.signals import INTERRUPTED, deferred
@@ -31,15 +29,10 @@ if TYPE_CHECKING:
 
 
 def track_command(
+    *,
     context: typer.Context,
     recording: options.RecordingArgument,
-    init: options.InitOption = None,
-    body: options.BodyOption = None,
-    height: options.HeightOption = None,
-    model: options.ModelOption = None,
-    config: options.ConfigOption = None,
-    detector: options.DetectorOption = None,
-    people: options.PeopleOption = "1",
+    tracking: options.Tracking,
     out: options.OutOrNameOption = None,
     upright: options.UprightOption = False,
     overlay: Annotated[
@@ -53,24 +46,17 @@ def track_command(
     ] = False,
     view: options.ViewOption = False,
     save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write the data of --view to a file.")] = None,
-    use: options.UseOption = None,
-    depth_range: options.DepthRangeOption = None,
     with_: Annotated[
         list[Path] | None,
         typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
     ] = None,
     offset: Annotated[float, typer.Option(metavar="S", help="Seconds to add to the stamps of --with.")] = 0.0,
     keypoints: options.KeypointsOption = None,
-    layout: options.LayoutOption = None,
     marker_map: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="TOML that assigns the markers of .trc and .c3d files to sites."),
     ] = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    exclude: options.ExcludeOption = None,
+    reading: options.Reading,
     background: options.BackgroundOption = None,
     strict: options.StrictOption = False,
 ) -> None:
@@ -120,13 +106,9 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.closing import closing_doubts, closing_lines
-    from voodoo.cli.people import limit_of, no_starts, refuse_several
+    from voodoo.cli.people import refuse_several
     from voodoo.cli.running import (
-        boxes_of,
-        config_of,
-        depth_filter_of,
-        detector_of,
-        kinds_of,
+        Start,
         opened,
         refuse_unused,
         run,
@@ -137,30 +119,23 @@ def track_command(
     )
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
-    from voodoo.model.body import Body
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
     from voodoo.pipeline.run import TrackedFrame, track
-    from voodoo.pipeline.start import AUTO, beginning_of, start_people, start_tracker, starts_of
+    from voodoo.pipeline.start import AUTO, starts_of
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
-    from voodoo.sensors.settings import FrontEndSettings
 
     with clear_errors():
-        refuse_both("--body", body, **{"--height": height, "--model": model})
         refuse_both("--view", view or None, **{"--save": save})
         if offset and not with_:
             raise typer.BadParameter("--offset is for the stamps of --with, give both")
-        kinds, left_out = kinds_of(use), None if strict else LeftOut()
-        depth_filter, boxes = depth_filter_of(depth_range), boxes_of(exclude)
-        limit = limit_of(people)
-        several = limit != 1
-        beginning = no_starts(init) if several else beginning_of(init)
-        bare = beginning is not None
+        start, layout, left_out = Start.of(tracking), reading.layout, None if strict else LeftOut()
+        several, bare = start.limit != 1, start.beginning is not None
         markers = None if marker_map is None else MarkerMap.load(marker_map)
-        numbers, others = numbers_of(option), with_ or ()
-        about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": kinds}
-        asked = topics_of(topic) | loader_options(recording, loader, **about)
+        numbers, others = options.numbers_of(reading.option), with_ or ()
+        about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": start.options["use"]}
+        asked = loader_options(recording, reading.loader, **about)
         if background is not None:
             asked["background"] = background
         # A number that no other recording accepts belongs to this one, whose loader may reject it.
@@ -168,7 +143,7 @@ def track_command(
         asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
         folders, network = keypoint_words(keypoints or (), layout)
         source = join(
-            opened(recording, asked.pop("loader", loader), frame, left_out=left_out, bare=bare, **asked),
+            opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked),
             keypoints=folders,
             network=network,
             layout=layout,
@@ -183,13 +158,13 @@ def track_command(
             print_message(words)
         if several:
             refuse_several(draw_regions=draw_regions, background=background)
-        used = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
+        used = start.settings(source)
         places = ("depth", "points", "scan")
         refuse_unused(
             used_inputs(source, used),
-            depth_range=(depth_range, ("depth",)),
-            detector=(detector, ("depth",)),
-            exclude=(exclude, places),
+            depth_range=(tracking.depth_range, ("depth",)),
+            detector=(tracking.detector, ("depth",)),
+            exclude=(tracking.exclude, places),
             layout=(layout, ("keypoints",)),
             marker_map=(marker_map, ("markers",)),
             draw_regions=(draw_regions, ("color",)),
@@ -199,21 +174,8 @@ def track_command(
         with keeping as spool, viewer_of(view, save, source.name) as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(used, draw_regions=draw_regions)
-            start: dict[str, Any] = {
-                "body": None if body is None else Body.load(body),
-                "height": height,
-                "model": model,
-                "config": config_of(config),
-                "markers": markers,
-                "use": kinds,
-                "detector": detector_of(detector),
-            }
-            tracker: Any
-            if several:
-                tracker = start_people(source, limit=limit, **start)
-            else:
-                tracker = start_tracker(source, init=beginning, **start)
-            starts = starts_of(beginning, source)
+            tracker = start.tracker(source, markers=markers)
+            starts = starts_of(start.beginning, source)
             steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
             refusals: Counter[str] = Counter()
 
@@ -245,11 +207,11 @@ def track_command(
         print_result(message, targets)
         for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
             print_message(f"{source.name}: {doubt}")
-        told = height or getattr(beginning, "height_m", None)
-        if told is None and beginning is None and source.start is not None:
+        told = tracking.height or getattr(start.beginning, "height_m", None)
+        if told is None and start.beginning is None and source.start is not None:
             told = source.start.get("height_m")
         # Frames before a given start are meant to be without a pose.
-        begun = spool.states - Counter({SEARCHING: 0 if beginning in (None, AUTO) else len(source)})
+        begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
         for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
             print_message(f"{source.name}: {doubt}")
         _print_warnings(source, spool, left_out, refusals)

@@ -27,10 +27,10 @@ from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
 from voodoo.evaluation.metrics import BoolArray, FloatArray
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.names import SEARCHING, HumanModel
+from voodoo.names import SEARCHING, Automatic, HumanModel
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
-from voodoo.pipeline.start import Automatic, start_tracker
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import Annotated, Any, TypeAlias, get_args
 
 from pydantic import ConfigDict, Field, FiniteFloat
 
@@ -19,7 +19,7 @@ from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.joint import short, valid
 from voodoo.model.legs import legs_body
-from voodoo.names import HumanModel
+from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
@@ -107,8 +107,6 @@ class Init(FirstPose):
             return cls.model_validate(dict(recording.start))
 
 
-Automatic: TypeAlias = Literal["auto"]
-"""Value that requests a search, even if a first pose comes with the recording."""
 AUTO: Automatic = "auto"
 Beginning: TypeAlias = Init | Track | Automatic
 """A first pose, an earlier result that has one, or neither."""
