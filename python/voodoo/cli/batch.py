@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, print_interrupted, print_message, progressing, reporting
+from voodoo.cli.common import clear_errors, cores, print_interrupted, print_message, progressing, reporting
 from voodoo.cli.signals import deferred
 
 
@@ -104,11 +103,8 @@ def batch_command(
         before = len(sources) - len(batch.jobs)
         interrupted = False
         if batch.jobs:
-            count = workers or (
-                len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-            )
             with deferred() as stop:
-                rows = run(batch.jobs, workers=count, scheduler=scheduler, stop=stop)
+                rows = run(batch.jobs, workers=workers or cores(), scheduler=scheduler, stop=stop)
                 try:
                     for row in progressing(rows, "tracking", len(batch.jobs)):
                         batch.take(row)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import warnings
@@ -96,6 +97,11 @@ def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
     with Progress(*columns, console=console, transient=True) as progress:
         with redirect_stderr(Escaped(sys.stderr)):  # Rich writes lines above the bar
             yield from progress.track(items, total=total, description=words)
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +10,7 @@ import typer
 from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
+    cores,
     print_interrupted,
     print_text,
     print_written,
@@ -71,8 +71,10 @@ def eval_command(
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.figure import new_figure
-    from voodoo.evaluation.people_evaluate import evaluate_all_people, evaluate_result, has_people
+    from voodoo.evaluation.people import PeopleScore
+    from voodoo.evaluation.people_evaluate import evaluate_result, has_people
     from voodoo.evaluation.report import brief, write_reports
+    from voodoo.evaluation.score import Score
     from voodoo.evaluation.search import find_recordings
     from voodoo.evaluation.summary import summarize
     from voodoo.whole import check_outputs
@@ -88,38 +90,26 @@ def eval_command(
                 raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
             show_people([evaluate_result(paths[0], result, loader=reading.loader, options=words)], out, report=report)
             return
-        jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-        kinds = ("depth",) if depth_only else kinds_of(use)
-        several = [path for path in paths if has_people(path)]
-        how: dict[str, Any] = {
-            "config_file": config,
-            "loader": reading.loader,
-            "options": words,
-            "model": model,
-            "use": kinds,
-        }
-        judgments = list(progressing(evaluate_all_people(several, **how), "following everybody", len(several)))
-        if several:
-            show_people(judgments, out, report=report)
-            refuse_failures(judgments)
-        paths = [path for path in paths if path not in several]
-        if not paths:
-            return
-        if out is not None:
+        if out is not None and not all(map(has_people, paths)):
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        done = evaluate_all(paths, **how, init=init, jobs=jobs)
+        how: dict[str, Any] = {"config_file": config, "loader": reading.loader, "options": words, "model": model}
+        kinds = ("depth",) if depth_only else kinds_of(use)
+        done = evaluate_all(paths, **how, use=kinds, init=init, jobs=jobs or cores())
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
-        ordered = sorted(finished, key=lambda item: item[0])
-        scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
-        if report is not None:
-            report |= {"summaries": summarize(scores), "recordings": scores}
-        elif scores:
-            print_text(brief(scores))
-            if out is None:
-                typer.echo("--out DIR writes all measures, a row for every recording, and one for every frame")
-        if out is not None and scores:
-            with deferred():
-                files = write_reports(out, scores, tables, picture=not interrupted)
-            print_written(files, aside=as_json)
-        print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
-        refuse_failures(scores)
+        finished.sort(key=lambda item: item[0])
+        scores = [score for _, score, _ in finished if isinstance(score, Score)]
+        several = [score for _, score, _ in finished if isinstance(score, PeopleScore)]
+        with deferred():
+            if several:
+                show_people(several, out, report=report)
+            if report is not None:
+                report |= {"summaries": summarize(scores), "recordings": scores}
+            elif scores:
+                print_text(brief(scores))
+                if out is None:
+                    typer.echo("--out DIR writes all measures, a row for every recording, and one for every frame")
+            if out is not None and scores:
+                tables = [table for _, score, table in finished if isinstance(score, Score)]
+                print_written(write_reports(out, scores, tables, picture=not interrupted), aside=as_json)
+        print_interrupted(interrupted, f"{len(finished)} of {len(paths)} recordings are done")
+        refuse_failures([score for _, score, _ in finished])

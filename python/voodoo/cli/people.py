@@ -52,7 +52,7 @@ def show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict
         print_written(write_people(out, scores), aside=report is not None)
 
 
-def refuse_failures(scores: Sequence[PeopleScore] | Sequence[Score]) -> None:
+def refuse_failures(scores: Sequence[PeopleScore | Score]) -> None:
     """Raise an error if a recording could not be tracked to its end, or nobody was found in any.
 
     Raises:

@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,8 +23,10 @@ from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
-from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
+from voodoo.evaluation.depth_agreement import Selection, witness
 from voodoo.evaluation.metrics import BoolArray, FloatArray
+from voodoo.evaluation.people import PeopleScore
+from voodoo.evaluation.people_evaluate import evaluate_people, has_people
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
 from voodoo.names import SEARCHING, Automatic, HumanModel
@@ -84,7 +86,8 @@ def evaluate(
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         observed = witness(frame.recorded, tracker, estimate, truth, selection)
         known = joints, called_measured(estimate), sigma_of(estimate)
-        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, observed, *known))
+        # The images of a whole recording would fill the memory.
+        steps.append((float(estimate.stamp), str(estimate.status), frame.seconds, observed, *known))
     if not steps:
         raise RecordingError(f"{path}: expected at least one frame, found none")
     return _score(recording, path, selection, steps)
@@ -127,19 +130,22 @@ def evaluate_all(
     *,
     config_file: Path | None = None,
     jobs: int = 1,
+    init: Automatic | None = None,
     **how: Any,  # noqa: ANN401 - of evaluate
-) -> Iterator[tuple[int, Score, FrameTable | None]]:
+) -> Iterator[tuple[int, Score | PeopleScore, FrameTable | None]]:
     """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
 
-    A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
+    One with the truth of several persons yields their score, and no frames. A recording that fails yields a score with `failure`
+    set and no frames. jobs=1 stays in this process.
 
     Args:
         paths: of the recordings.
         config_file: None means the defaults.
         jobs: number of processes.
-        **how: the other options of `evaluate`.
+        init: see `evaluate`.
+        **how: its other options.
     """
-    task = partial(_task, config_file, how)
+    task = partial(_task, config_file, init, how)
     if jobs == 1 or len(paths) == 1:
         for index, path in enumerate(paths):
             yield index, *task(path)
@@ -182,17 +188,23 @@ def _deaf_children() -> Iterator[None]:
 
 def _one_thread() -> None:
     """Initialize a worker: one thread each, because the processes run in parallel."""
-    for number in _OF_TERMINALS:
-        signal.signal(number, signal.SIG_IGN)
     os.environ["RAYON_NUM_THREADS"] = "1"
     cv2.setNumThreads(1)
 
 
-def _task(config_file: Path | None, how: Mapping[str, Any], path: Path) -> tuple[Score, FrameTable | None]:
+def _task(
+    config_file: Path | None, init: Automatic | None, how: Mapping[str, Any], path: Path
+) -> tuple[Score | PeopleScore, FrameTable | None]:
+    several = has_people(path)
     try:
-        return evaluate(path, config=None if config_file is None else Config.load(config_file), **how)
+        config = None if config_file is None else Config.load(config_file)
+        return (
+            (evaluate_people(path, config=config, **how), None)
+            if several
+            else evaluate(path, config=config, init=init, **how)
+        )
     except (VoodooError, OSError) as error:
-        return Score(path.name, path, failure=str(error)), None
+        return (PeopleScore if several else Score)(path.name, path, failure=str(error)), None
 
 
 def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
@@ -209,19 +221,9 @@ def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
     return dict(zip(reference.names, positions, strict=True))
 
 
-class _Step(NamedTuple):
-    """Data kept from a frame; the images of a whole recording would fill the memory."""
-
-    stamp: float
-    status: str
-    seconds: float
-    witness: FrameWitness
-    joints: FloatArray
-    measured: BoolArray
-    sigma: FloatArray
-
-
-def _score(recording: Recording, path: Path, selection: Selection, steps: Sequence[_Step]) -> tuple[Score, FrameTable]:
+def _score(
+    recording: Recording, path: Path, selection: Selection, steps: Sequence[tuple[Any, ...]]
+) -> tuple[Score, FrameTable]:
     stamp, status, time, seen, joints, known, spread = zip(*steps, strict=True)
     stamps, seconds, positions, measured, sigma = map(np.array, (stamp, time, joints, known, spread))
     overlaps, within = (np.array([getattr(one, name) for one in seen]) for name in ("iou", "within"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -87,32 +87,30 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
     return score(recording.name, recording.path, truth, rows, seconds=about.duration, step_s=seconds)
 
 
-def evaluate_all_people(
-    paths: Sequence[Path],
+def evaluate_people(
+    path: Path,
     *,
-    config_file: Path | None = None,
+    config: Config | None = None,
     loader: str | None = None,
     options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
-) -> Iterator[PeopleScore]:
-    """Track all persons in recordings, without a start, and evaluate the results; one that fails yields a score with a `failure`.
+) -> PeopleScore:
+    """Track all persons in a recording and evaluate the result.
 
     Args:
-        paths: of recordings with truth_people.csv beside them.
-        config_file: None means the defaults.
+        path: of a recording with truth_people.csv beside it.
+        config: None means the defaults.
         loader, options: see open_recording.
         model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
+
+    Raises:
+        VoodooError: it cannot be read, or a frame was refused.
     """
-    for path in paths:
-        try:
-            config = None if config_file is None else Config.load(config_file)
-            recording = open_recording(path, loader=loader, **(options or {}))
-            people = People(None if model is None else Body.human(model=model), config=config)
-            yield judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
-        except (VoodooError, OSError) as error:
-            yield PeopleScore(path.name, path, failure=str(error))
+    recording = open_recording(path, loader=loader, **(options or {}))
+    people = People(None if model is None else Body.human(model=model), config=config)
+    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
 
 
 def truth_of(recording: Recording) -> PeopleTruth:
