@@ -19,37 +19,29 @@ from voodoo.recordings.videos import picture_sources
 from voodoo.sensors.keypoints.networks import KeypointNetwork, network_of
 
 
-def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
-    """Parse "SENSOR=FOLDER" arguments to a mapping from sensor to folder.
-
-    Raises:
-        VoodooError: an argument of another form, or a folder that does not exist.
-    """
-    folders = {}
-    for word in words:
-        sensor, _, folder = word.partition("=")
-        if not (sensor and folder):
-            raise VoodooError(f"keypoints: expected SENSOR=FOLDER, found {word!r}")
-        if not Path(folder).is_dir():
-            raise VoodooError(f"{folder}: expected a folder of OpenPose JSON files, found none")
-        folders[sensor] = Path(folder)
-    return folders
-
-
 def keypoint_words(words: Sequence[str], layout: str | None) -> tuple[dict[str, Path], KeypointNetwork | None]:
     """Folders by sensor, and the network to run on all other color images.
 
     Args:
-        words: "SENSOR=FOLDER" (see keypoint_folders), and at most one network (see network_of).
+        words: "SENSOR=FOLDER", and at most one network (see network_of).
         layout: of the keypoints; None: told by them, or by the network.
 
     Raises:
-        VoodooError: an argument of another form, several networks, or one that cannot be loaded.
+        VoodooError: an argument of another form, a folder that does not exist, several networks, or one that cannot be loaded.
     """
-    networks = [word for word in words if "=" not in word]
+    folders, networks = {}, []
+    for word in words:
+        sensor, of_sensor, folder = word.partition("=")
+        if not of_sensor:
+            networks.append(word)
+        elif not (sensor and folder):
+            raise VoodooError(f"keypoints: expected SENSOR=FOLDER, found {word!r}")
+        elif not Path(folder).is_dir():
+            raise VoodooError(f"{folder}: expected a folder of OpenPose JSON files, found none")
+        else:
+            folders[sensor] = Path(folder)
     if len(networks) > 1:
         raise VoodooError(f"keypoints: expected one network, found {', '.join(networks)}")
-    folders = keypoint_folders([word for word in words if "=" in word])
     return folders, network_of(networks[0], layout=layout) if networks else None
 
 
