@@ -14,7 +14,8 @@ from voodoo.measurements import DepthImage, KeypointImage, LaserScan, MarkerSet,
 from voodoo.model.camera import Camera
 from voodoo.model.legs import legs_body
 from voodoo.pipeline.front_end import FrontEnd
-from voodoo.pipeline.start import Init, first_pose, pose_as_init, start_tracker, starts_of, stature
+from voodoo.pipeline.run import first_pose
+from voodoo.pipeline.start import Init, pose_as_init, start_tracker, starts_of, stature
 from voodoo.pipeline.starts import StartFrame, Starts
 from voodoo.pipeline.starts.cameras import CamerasStart
 from voodoo.pipeline.starts.given import GivenStart

@@ -76,7 +76,8 @@ def ik_command(
     from voodoo.export.track import Track
     from voodoo.people import ONE
     from voodoo.pipeline.ik import Solved, follow, known_positions
-    from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
+    from voodoo.pipeline.run import first_pose
+    from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
 
     with clear_errors():
         beginning = beginning_of(init)

@@ -44,7 +44,8 @@ def init_command(
     from dataclasses import replace
 
     from voodoo.cli.running import boxes_of, config_of, kinds_of, opened
-    from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
+    from voodoo.pipeline.run import first_pose
+    from voodoo.pipeline.start import AUTO, pose_as_init, start_tracker
     from voodoo.recordings.left_out import LeftOut
     from voodoo.sensors.settings import FrontEndSettings
     from voodoo.whole import write_whole

@@ -21,22 +21,18 @@ from voodoo.model.joint import short, valid
 from voodoo.model.legs import legs_body
 from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
-from voodoo.pipeline.front_end import FrontEnd
-from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.starts.chosen import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
 from voodoo.pipeline.starts.legs import serves
-from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.truth import FirstPose
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
-from voodoo.sensors.settings import FrontEndSettings, inputs_for
+from voodoo.sensors.settings import inputs_for
 from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
-_ROUNDED_S = 1e-6
 _DEFAULT_M = 1.75
 """Stature of `Body.human()`."""
 
@@ -224,43 +220,6 @@ def starts_of(init: Beginning | None, recording: Recording) -> Starts | None:
     if isinstance(init, Init) and init.stamp_s is not None:
         return Starts((GivenStart(init.in_root_frame(recording).joints, init.stamp_s),), by_tracker=False)
     return Starts((EarlierStart(init),), by_tracker=False) if isinstance(init, Track) else None
-
-
-def first_pose(
-    recording: Recording,
-    tracker: Tracker,
-    *,
-    settings: FrontEndSettings | None = None,
-    starts: Starts | None = None,
-    after: float = float("-inf"),
-    left_out: LeftOut | None = None,
-) -> Estimate | None:
-    """Step a tracker until a person is found; returns the estimate of that frame, or None.
-
-    Args:
-        recording: read while searching.
-        tracker: without a pose; it has one afterwards.
-        settings, starts: see `voodoo.pipeline.run.track`.
-        after: frames before this time [s] are left out.
-        left_out: counts frames that the tracker rejects, which are left out; None: they are errors.
-
-    Raises:
-        VoodooError: the recording is damaged, or the tracker rejects a frame.
-    """
-    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
-    for recorded in paired(recording):
-        if recorded.stamp < after - _ROUNDED_S:
-            continue
-        try:
-            estimate = front_end.step(recorded)
-        except VoodooError as error:
-            if left_out is None:
-                raise
-            left_out.add_error(error)
-            continue
-        if front_end.posed:
-            return estimate
-    return None
 
 
 def pose_as_init(estimate: Estimate, body: Body) -> Init:
