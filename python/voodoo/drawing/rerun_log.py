@@ -96,15 +96,11 @@ class Log:
 
     def depth(self, path: str, image: npt.NDArray[Any], meters_per_unit: float) -> None:
         """Log a depth image (H, W), compressed: to a quarter of a percent, and in a file not more pixels than `most_points`."""
-        rr = self.rr
         step = 1 if self.whole else every(image.size, self.most_points)
         millimeters = grown(rounded_millimeters(image[::step, ::step], meters_per_unit), step, image.shape)
-        done, blob = cv2.imencode(".png", millimeters, _PNG)
-        if not done or not hasattr(rr, "EncodedDepthImage"):  # Rerun before 0.29
-            self.send(path, rr.DepthImage(millimeters, meter=1000.0, point_fill_ratio=_POINT_FILL))
-            return
+        blob = cv2.imencode(".png", millimeters, _PNG)[1].tobytes()
         about = {"media_type": "image/png", "meter": 1000.0, "point_fill_ratio": _POINT_FILL}
-        self.send(path, rr.EncodedDepthImage(blob.tobytes(), **about))
+        self.send(path, self.rr.EncodedDepthImage(blob, **about))
 
     def body_points(
         self, path: str, points: npt.NDArray[Any], pose: FloatArray, *, background: bool = True

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
-from types import ModuleType, TracebackType
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -69,8 +69,12 @@ class Viewer:
         )
         if save is not None and Path(save).suffix != ".rrd":
             raise VoodooError(f"{save}: expected a name that ends in .rrd, found {Path(save).suffix!r}")
-        how = {} if save is None else _large_chunks(self._rr)
-        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, **how)
+        chunks = None
+        if save is not None:
+            chunks = self._rr.ChunkBatcherConfig.DEFAULT()
+            # Every chunk has an overhead of two kilobytes, and of a file the latency does not matter.
+            chunks.flush_tick, chunks.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
+        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, batcher_config=chunks)
         self._stream.send_recording_name(name)
         self._server: Server | None = None
         self._ends = ExitStack()
@@ -245,7 +249,7 @@ class Viewer:
     def _mesh(self, shape: TaperedEllipticCylinder, color: tuple[int, int, int], *, known: bool) -> object:
         """Log the surface of a limb; for a `known` mesh only the vertices."""
         vertices, triangles, normals = limb_mesh(shape)
-        if known and hasattr(self._rr.Mesh3D, "from_fields"):
+        if known:
             return self._rr.Mesh3D.from_fields(vertex_positions=vertices)
         return self._rr.Mesh3D(
             vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=(*color, 150)
@@ -254,7 +258,7 @@ class Viewer:
     def _log_spread(self, path: str, estimate: Estimate) -> None:
         """Ellipsoids of one standard deviation of the joints."""
         covariances = estimate.joint_covariances
-        if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances):
+        if not len(covariances):
             return
         known = np.isfinite(covariances).all(axis=(1, 2))
         variances, axes = np.linalg.eigh(covariances[known])
@@ -297,12 +301,3 @@ def _alike(one: TaperedEllipticCylinder | None, other: TaperedEllipticCylinder) 
     """Whether the difference is invisible: sizes are refined in every frame, and a mesh needs kilobytes."""
     sizes = ("length", "a0", "b0", "a1", "b1")
     return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _VISIBLE_M for name in sizes)
-
-
-def _large_chunks(rr: ModuleType) -> dict[str, Any]:
-    """Batching of a file: every chunk has an overhead of two kilobytes, and latency does not matter."""
-    if not hasattr(rr, "ChunkBatcherConfig"):
-        return {}
-    config = rr.ChunkBatcherConfig.DEFAULT()
-    config.flush_tick, config.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
-    return {"batcher_config": config}
