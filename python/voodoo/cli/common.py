@@ -7,9 +7,8 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
-from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -162,9 +161,9 @@ def print_text(text: str, *, err: bool = False) -> None:
 
 def print_json(value: object) -> None:
     """A value on stdout as JSON: dataclasses are objects, what is not known (NaN) is null."""
-    import json
+    from pydantic_core import to_json
 
-    typer.echo(json.dumps(_plain(value), indent=2, ensure_ascii=False))
+    typer.echo(to_json(value, indent=2, inf_nan_mode="null", fallback=str).decode("utf-8"))
 
 
 @contextmanager
@@ -176,17 +175,6 @@ def reporting(as_json: bool) -> Iterator[dict[str, Any] | None]:
     finally:
         if report:
             print_json(report)
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401
-    value = {name: getattr(value, name) for name in getattr(value, "__dataclass_fields__", ())} or value
-    if isinstance(value, Mapping):
-        return {str(name): _plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
 def _fail(message: str, hint: str = "", *, code: int = FAILED) -> None:

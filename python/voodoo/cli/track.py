@@ -11,6 +11,7 @@ import typer
 from voodoo.cli import options
 from voodoo.cli.common import (
     clear_errors,
+    print_interrupted,
     print_message,
     print_result,
     refuse_both,
@@ -18,7 +19,7 @@ from voodoo.cli.common import (
     states,
     wrote,
 )
-from voodoo.cli.signals import INTERRUPTED, deferred
+from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError
 from voodoo.names import SEARCHING
 
@@ -198,9 +199,7 @@ def track_command(
         if turned:
             print_message(turned)
         refuse_missing([*failed, *done.failures], message)
-        if done.interrupted:
-            print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
-            raise typer.Exit(INTERRUPTED)
+        print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
         size = None if several or not spool.found else stature_of(tracker.body)
         if not several:
             message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
