@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
 from voodoo.evaluation.people import ABSENT_S, IN_VIEW, JOINTS_IN_VIEW, MATCH_M, PeopleScore, together
+from voodoo.evaluation.score import RATIO, written
 from voodoo.evaluation.tables import write_table
 from voodoo.whole import write_whole
 
@@ -58,28 +58,24 @@ def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _word(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
-
-
 def _first_pose(score: PeopleScore) -> str:
-    wait = _word(score.first_pose_s, 2)
-    return wait if wait == "-" else f"{wait} ({_word(score.worst_first_pose_s, 2)})"
+    wait = written(score.first_pose_s, RATIO)
+    return wait if wait == "-" else f"{wait} ({written(score.worst_first_pose_s, RATIO)})"
 
 
 _COLUMNS: tuple[tuple[str, Callable[[PeopleScore], str]], ...] = (
     ("recording", lambda score: score.name),
     ("persons", lambda score: f"{score.persons}"),
     ("ids", lambda score: f"{score.ids}"),
-    ("MOTA", lambda score: _word(score.mota, 3)),
-    ("IDF1", lambda score: _word(score.idf1, 3)),
+    ("MOTA", lambda score: written(score.mota, (1.0, ".3f", ""))),
+    ("IDF1", lambda score: written(score.idf1, (1.0, ".3f", ""))),
     ("id switches", lambda score: f"{score.switches}"),
     ("same id after return", lambda score: f"{score.returned} of {score.returns}" if score.returns else "-"),
     ("first pose after, s (worst)", _first_pose),
     ("never found", lambda score: f"{score.visits - score.visits_matched} of {score.visits}"),
-    ("false bodies a minute", lambda score: _word(score.false_a_minute, 1)),
+    ("false bodies a minute", lambda score: written(score.false_a_minute, (1.0, ".1f", ""))),
     ("left behind", lambda score: f"{score.left_behind}"),
-    ("joint error, cm", lambda score: _word(100.0 * score.joint_error_m, 1)),
-    ("ms a frame", lambda score: _word(1000.0 * score.step_s, 1)),
+    ("joint error, cm", lambda score: written(score.joint_error_m, (100.0, ".1f", ""))),
+    ("ms a frame", lambda score: written(score.step_s, (1000.0, ".1f", ""))),
 )
 """Name and cell of each column."""

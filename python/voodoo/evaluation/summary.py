@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from voodoo.evaluation import metrics
-from voodoo.evaluation.score import Score
+from voodoo.evaluation.score import PERCENT, Form, Score
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -42,14 +42,14 @@ class Summary:
         return metrics.mean_or_nan(np.repeat(np.array(CLASSES, dtype=np.float64), self.classes))
 
 
-MEANS = tuple(item.name for item in fields(Score) if item.type == "float")
-
-
+ROWS: dict[str, tuple[str, Form]] = {item.name: item.metadata["row"] for item in fields(Score) if item.metadata}
+"""Means, by the name of the field of Score: words and form of their rows."""
 TOGETHER = {"lost_recall": "far_ends", "false_alarm_rate": "near_ends"}
 """Fractions that are also computed over all sequences together, because some have few such limbs, and their totals."""
-
-
-SUMMARY = (*MEANS, *(f"{name}_together" for name in TOGETHER))
+ALL_ROWS = ROWS | {
+    "lost_recall_together": ("limbs off by 10 cm, all sequences together", PERCENT),
+    "false_alarm_rate_together": ("nearer limbs, all sequences together", PERCENT),
+}
 
 
 def summarize(scores: Sequence[Score]) -> list[Summary]:
@@ -61,9 +61,7 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
         if group:
             lags = [score.best_lag for score in done if score.best_lag is not None]
             counts = [sum(score.tracking_class == value for score in done) for value in CLASSES]
-            means = {
-                name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in MEANS
-            }
+            means = {name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in ROWS}
             means |= {f"{name}_together": _together(done, name, count) for name, count in TOGETHER.items()}
             summaries.append(
                 Summary(

@@ -11,7 +11,7 @@ import numpy as np
 
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import FrameTable, Score
-from voodoo.evaluation.summary import MEANS, SUMMARY, TOGETHER, Summary
+from voodoo.evaluation.summary import ALL_ROWS, ROWS, TOGETHER, Summary
 from voodoo.whole import appearing_whole
 
 
@@ -32,7 +32,7 @@ def cell(value: object) -> str:
 
 def write_sequences(path: Path, scores: Sequence[Score]) -> None:
     """A row for each recording."""
-    own = ("name", "failure", "frames", "exact", "tracking_class", "best_lag", *MEANS, *TOGETHER.values())
+    own = ("name", "failure", "frames", "exact", "tracking_class", "best_lag", *ROWS, *TOGETHER.values())
     header = [*own, *(f"error_{name}_m" for name in metrics.JOINTS), "selection", "lost_joints", "path"]
     rows = (
         [getattr(score, name) for name in own]
@@ -47,10 +47,17 @@ def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
     """A row for each kind of comparison."""
     own = ("kind", "sequences", "failures", "class_0", "class_1", "class_2", "class_average")
     rows = (
-        [one.kind, one.sequences, one.failures, *one.classes, one.class_average, *(one.means[name] for name in SUMMARY)]
+        [
+            one.kind,
+            one.sequences,
+            one.failures,
+            *one.classes,
+            one.class_average,
+            *(one.means[name] for name in ALL_ROWS),
+        ]
         for one in summaries
     )
-    write_table(path, [*own, *SUMMARY], rows)
+    write_table(path, [*own, *ALL_ROWS], rows)
 
 
 def write_frames(path: Path, table: FrameTable) -> None:
