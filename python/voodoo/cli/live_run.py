@@ -9,10 +9,9 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from voodoo._core import Estimate
 from voodoo.cli.common import print_message
@@ -30,23 +29,16 @@ from voodoo.live.session import Output, Session
 from voodoo.live.sinks.registry import sink_of
 from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
-from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
-from voodoo.model.camera import Camera
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.start import starts_of
+from voodoo.recordings.loaders import open_recording
+from voodoo.recordings.sample import sample_path
 from voodoo.sensors.keypoints.networks import KeypointNetwork
-from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
 from voodoo.whole import write_whole
 
-_STANDING = {
-    "l_shoulder": (2.4, 0.19, 1.42),
-    "r_shoulder": (2.4, -0.19, 1.42),
-    "l_hip": (2.4, 0.09, 0.93),
-    "r_hip": (2.4, -0.09, 0.93),
-}
 ROS2 = "ros2://"
 """Address of `--publish`."""
 _TICK_S = 0.05
@@ -251,18 +243,10 @@ def _prompt_threads() -> Iterator[None]:
 
 
 def warm_up() -> None:
-    """Run initialization that would delay the first frames: track a person in a small image and serialize the result."""
-    camera = Camera(80, 60, 66.0, 66.0, 39.5, 29.5)
-    body = Body.human()
-    tracker = Tracker(body)
-    tracker.reset(joints=_STANDING, fit_sizes=False)
-    pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
-    observed = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
-    image = np.where(np.isfinite(observed) & (observed > 0.0), observed, 4.0).astype(np.float32)
+    """Run initialization that would delay the first frames: track some of the bundled recording and serialize the result."""
     follower = Follower(Tracker(Body.human()))
-    for number in range(3):
-        item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
-        step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
+    for number, recorded in enumerate(islice(open_recording(sample_path()), 3)):
+        step = follower.step(LiveFrame(recorded.stamp, recorded.measurements, number, 0.0, 0.0, False))
     messages = instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="p1")
     for message in (messages | description(step.bodies[ONE], "p1")).values():
         cdr(message)
