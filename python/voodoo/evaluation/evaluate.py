@@ -101,7 +101,7 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
 
 def differences(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
     """Errors by coordinate, (F, 12, 3): estimate minus reference."""
-    positions = _joints(result.joint_names, result.joints)
+    positions = metrics.places_of(result.joint_names, result.joints)
     reference = _reference_positions(recording, result.stamps)
     lag = metrics.best_lag(positions, reference) if at_best_lag else 0
     return np.asarray(positions - metrics.shifted(reference, lag))
@@ -306,20 +306,11 @@ def _first_pose(
     return max(float(stamps[found[0]] - stamps[known[0]]), 0.0), metrics.mean_or_nan(errors[found[0]])
 
 
-def _joints(names: Sequence[str], positions: FloatArray) -> FloatArray:
-    """Of positions (F, J, 3) those of metrics.JOINTS (F, 12, 3); NaN where a joint is missing."""
-    chosen = np.full((len(positions), len(metrics.JOINTS), 3), np.nan)
-    for index, name in enumerate(metrics.JOINTS):
-        if name in names:
-            chosen[:, index] = positions[:, names.index(name)]
-    return chosen
-
-
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     """Reference of the twelve joints at the stamps, (F, 12, 3); NaN where there is none."""
     reference = recording.reference
     if reference is None:
         return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
-    table = _joints(reference.names, reference.positions)
+    table = metrics.places_of(reference.names, reference.positions)
     period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / 30.0
     return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)
