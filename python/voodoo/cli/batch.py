@@ -67,8 +67,7 @@ def batch_command(
     from voodoo.batch.storage import find_sources, is_local, local_path
     from voodoo.batch.summary import DONE, FAILED
     from voodoo.batch.task import Settings
-    from voodoo.cli.people import limit_of
-    from voodoo.cli.running import config_of, kinds_of
+    from voodoo.cli.running import config_of, kinds_of, limit_of
     from voodoo.config import Config
     from voodoo.errors import NoPoseError, VoodooError
     from voodoo.whole import check_outputs

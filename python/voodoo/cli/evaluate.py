@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +20,11 @@ from voodoo.cli.common import (
     until_interrupted,
 )
 from voodoo.cli.signals import deferred
+from voodoo.errors import NoPoseError, VoodooError
+
+if TYPE_CHECKING:
+    from voodoo.evaluation.people import PeopleScore
+    from voodoo.evaluation.score import Score
 
 
 def eval_command(
@@ -67,12 +73,11 @@ def eval_command(
 
     voodoo eval two_walk/ --result theirs.csv
     """
-    from voodoo.cli.people import refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.evaluate import evaluate_all
-    from voodoo.evaluation.figure import new_figure
     from voodoo.evaluation.people import PeopleScore
     from voodoo.evaluation.people_evaluate import evaluate_result, has_people
+    from voodoo.evaluation.plot import new_figure
     from voodoo.evaluation.report import brief, write_reports
     from voodoo.evaluation.score import Score
     from voodoo.evaluation.search import find_recordings
@@ -88,7 +93,7 @@ def eval_command(
         if result is not None:
             if len(paths) != 1:
                 raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-            show_people([evaluate_result(paths[0], result, loader=reading.loader, options=words)], out, report=report)
+            _show_people([evaluate_result(paths[0], result, loader=reading.loader, options=words)], out, report=report)
             return
         if out is not None and not all(map(has_people, paths)):
             new_figure(1.0, 1.0)  # a missing library is reported before the work
@@ -101,7 +106,7 @@ def eval_command(
         several = [score for _, score, _ in finished if isinstance(score, PeopleScore)]
         with deferred():
             if several:
-                show_people(several, out, report=report)
+                _show_people(several, out, report=report)
             if report is not None:
                 report |= {"summaries": summarize(scores), "recordings": scores}
             elif scores:
@@ -112,4 +117,30 @@ def eval_command(
                 tables = [table for _, score, table in finished if isinstance(score, Score)]
                 print_written(write_reports(out, scores, tables, picture=not interrupted), aside=as_json)
         print_interrupted(interrupted, f"{len(finished)} of {len(paths)} recordings are done")
-        refuse_failures([score for _, score, _ in finished])
+        _refuse_failures([score for _, score, _ in finished])
+
+
+def _show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
+    """Print and write the table of several persons."""
+    from voodoo.evaluation.people_report import DERIVED, people_markdown, write_people
+
+    if report is not None:
+        report["people"] = [{**vars(score), **{name: getattr(score, name) for name in DERIVED}} for score in scores]
+    else:
+        typer.echo(people_markdown(scores))
+    if out is not None:
+        print_written(write_people(out, scores), aside=report is not None)
+
+
+def _refuse_failures(scores: Sequence[PeopleScore | Score]) -> None:
+    """Raise an error if a recording could not be tracked to its end, or nobody was found in any.
+
+    Raises:
+        VoodooError: names the first.
+        NoPoseError: nobody was found.
+    """
+    failures = [score for score in scores if score.failure]
+    if failures:
+        raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
+    if scores and all(score.nobody for score in scores):
+        raise NoPoseError(f"nobody was found in {', '.join(score.name for score in scores[:3])}")

@@ -15,7 +15,6 @@ import typer
 from voodoo.cli.common import print_message, progressing
 from voodoo.cli.options import Reading, Tracking
 from voodoo.cli.paths import check_paths
-from voodoo.cli.people import limit_of
 from voodoo.cli.recover import recover_before
 from voodoo.cli.signals import deferred
 from voodoo.config import Config
@@ -102,6 +101,17 @@ class Start:
 def opened(path: Path, reading: Reading, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
     """Open a recording."""
     return open_recording(path, **{"loader": reading.loader} | reading.words() | options)
+
+
+def limit_of(word: str) -> int | None:
+    """Parse the largest number of persons, from 1, or "any": None.
+
+    Raises:
+        VoodooError: another word.
+    """
+    if word != "any" and (not word.isdecimal() or int(word) < 1):
+        raise VoodooError(f"people: expected any or a whole number from 1, found {word!r}")
+    return None if word == "any" else int(word)
 
 
 def kinds_of(words: str | None) -> tuple[str, ...] | None:

@@ -20,7 +20,7 @@ from voodoo.cli.common import (
     wrote,
 )
 from voodoo.cli.signals import deferred
-from voodoo.errors import NoPoseError
+from voodoo.errors import NoPoseError, VoodooError
 from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
@@ -107,7 +107,6 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.closing import closing_doubts, closing_lines
-    from voodoo.cli.people import refuse_several
     from voodoo.cli.running import (
         Start,
         opened,
@@ -157,8 +156,9 @@ def track_command(
         )
         for words in source.assumed:
             print_message(words)
-        if several:
-            refuse_several(draw_regions=draw_regions, background=background)
+        for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
+            if given:
+                raise VoodooError(f"{name}: expected none with --people any or N, it is for one person")
         used = start.settings(source)
         places = ("depth", "points", "scan")
         refuse_unused(
