@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -32,7 +32,6 @@ from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.overlay import Overlay
@@ -83,7 +82,8 @@ class Start:
             raise VoodooError(
                 f"init: expected none with --people any or N, where everybody is looked for, found {asked.init}"
             )
-        how = {"config": config_of(asked.config), "use": kinds_of(asked.use), "detector": detector_of(asked.detector)}
+        detector: AnyDetector = "shipped" if asked.detector is None else OnnxDetector(asked.detector)
+        how = {"config": config_of(asked.config), "use": kinds_of(asked.use), "detector": detector}
         filters = {"depth_filter": depth_filter_of(asked.depth_range), "exclude": boxes_of(asked.exclude)}
         return cls(limit, beginning_of(asked.init) if limit == 1 else AUTO, asked.start() | how, filters)
 
@@ -158,11 +158,6 @@ def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> N
             )
 
 
-def used_inputs(source: Recording, settings: FrontEndSettings) -> set[str]:
-    """Kinds of inputs that a recording has and that are used."""
-    return {kind for sensor in source.info().sensors for kind in inputs_of(sensor.kind)} & set(settings.use)
-
-
 def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
     """Parse boxes of the form "X0,Y0,Z0,X1,Y1,Z1", lower corner first.
 
@@ -185,15 +180,6 @@ def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
 def config_of(path: Path | None) -> Config:
     """Load a configuration; None: the defaults."""
     return Config() if path is None else Config.load(path)
-
-
-def detector_of(path: Path | None) -> AnyDetector:
-    """Load the network of an ONNX file; None: the shipped detector.
-
-    Raises:
-        ConfigError: the file is not such a network.
-    """
-    return "shipped" if path is None else OnnxDetector(path)
 
 
 def spool_of(
@@ -324,8 +310,3 @@ def _apart(output: Target | None, serve: Callable[[Target, TrackedFrame[Any]], N
             serve(output, step)
         except Exception as error:
             output.failure = error
-
-
-def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:
-    """Open the requested viewer before the work, so that a missing Rerun is reported immediately."""
-    return Viewer(save=save, name=name) if view or save is not None else nullcontext()

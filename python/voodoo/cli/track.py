@@ -104,6 +104,7 @@ def track_command(
 
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
+    from contextlib import nullcontext
     from dataclasses import replace
 
     from voodoo.cli.closing import closing_doubts, closing_lines
@@ -114,17 +115,16 @@ def track_command(
         run,
         spool_of,
         turn_of,
-        used_inputs,
-        viewer_of,
     )
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
     from voodoo.pipeline.run import TrackedFrame, track
-    from voodoo.pipeline.start import AUTO, starts_of
+    from voodoo.pipeline.start import AUTO, starts_of, used_kinds
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
+    from voodoo.visualization.rerun_viewer import Viewer
 
     with clear_errors():
         refuse_both("--view", view or None, **{"--save": save})
@@ -162,7 +162,7 @@ def track_command(
         used = start.settings(source)
         places = ("depth", "points", "scan")
         refuse_unused(
-            used_inputs(source, used),
+            used_kinds(source, used.use),
             depth_range=(tracking.depth_range, ("depth",)),
             detector=(tracking.detector, ("depth",)),
             exclude=(tracking.exclude, places),
@@ -172,7 +172,8 @@ def track_command(
             background=(background, ("color",)),
         )
         targets, keeping = spool_of(source, out, context, upright=upright)
-        with keeping as spool, viewer_of(view, save, source.name) as viewer:
+        shown = Viewer(save=save, name=source.name) if view or save is not None else nullcontext()
+        with keeping as spool, shown as viewer:
             how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
             settings = replace(used, draw_regions=draw_regions)
             tracker = start.tracker(source, markers=markers)

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import TaperedEllipticCylinder
-from voodoo.errors import BodyError, MeasurementError
+from voodoo.errors import BodyError
 from voodoo.model.body_toml import body_text, core_body
 from voodoo.model.joint import Joint, Place, number_of, numbers_of, short
 from voodoo.model.toml_io import read_text
@@ -133,12 +132,11 @@ def checked_joints(
     return checked
 
 
-def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> list[npt.NDArray[np.float64]]:
+def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> list[npt.ArrayLike]:
     """Poses (4, 4) by name in the order of the body's limbs; the core checks that they are rigid.
 
     Raises:
         BodyError: not a mapping, or a limb is missing or unknown.
-        MeasurementError: a pose is not an array of numbers; names the limb.
     """
     if not isinstance(world_from_limb, Mapping):
         raise BodyError(
@@ -149,5 +147,4 @@ def ordered_poses(body: Body, world_from_limb: Mapping[str, npt.ArrayLike]) -> l
         raise BodyError(
             f"world_from_limb: expected the limbs {', '.join(names)}, found {', '.join(map(str, world_from_limb))}"
         )
-    expected = "a rigid 4x4 transform"
-    return [numbers_of(f"world_from_limb[{name}]", world_from_limb[name], MeasurementError, expected) for name in names]
+    return [world_from_limb[name] for name in names]

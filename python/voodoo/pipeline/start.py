@@ -152,7 +152,8 @@ def start_tracker(
     init = init or Init.of(recording) or AUTO
     if height is None and body is None and isinstance(init, Init):
         height = init.height_m
-    legs = init == AUTO and _only_laser(recording, use)
+    # Without another input to start from: no person can be found in images of skin and color.
+    legs = init == AUTO and used_kinds(recording, use) - {"skin", "color"} == {"scan"}
     tracker = Tracker(
         _body(body, height=height, model=model, markers=markers, legs=legs), config=config, detector=detector
     )
@@ -250,15 +251,10 @@ def _upright(body: Body) -> float:
     return float(max(heights) - min(heights))
 
 
-def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
+def used_kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
     """Kinds of inputs that a recording has and that are used."""
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     return has & set(use if use is not None else inputs_for(recording))
-
-
-def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
-    """Whether lasers are the only inputs to start from, because no person can be found in images."""
-    return _kinds(recording, use) - {"skin", "color"} == {"scan"}
 
 
 def check_findable(recording: Recording, tracker: Tracker | People, use: Sequence[str] | None) -> None:
@@ -272,7 +268,7 @@ def check_findable(recording: Recording, tracker: Tracker | People, use: Sequenc
         if tracker.numbers:
             return
         tracker = Tracker(tracker.prototype, detector=tracker.detector)
-    kinds, body = _kinds(recording, use), tracker.body
+    kinds, body = used_kinds(recording, use), tracker.body
     blind = {"points", "skin", "color"}
     if not tracker.can_search:
         blind.add("depth")

@@ -169,7 +169,9 @@ class Viewer:
             seconds: time the step took.
         """
         bodies = bodies if isinstance(bodies, Mapping) else {ONE: bodies}
-        self._set_time(estimate.stamp)
+        # Stamps of a robot are Unix times, those of other recordings start at zero.
+        clock = "timestamp" if estimate.stamp > _EPOCH_S else "duration"
+        self._stream.set_time("time", **{clock: estimate.stamp})
         if isinstance(estimate, PeopleEstimate):
             self._log_people(estimate, bodies)
             # Images and points are not assigned to persons.
@@ -207,11 +209,6 @@ class Viewer:
                 self._stream.log(f"{path}/number", rr.Points3D([head], labels=words, colors=[color], radii=0.02))
             self._stream.log(f"plots/status/{person.id}", rr.TextLog(str(person.status)))
         self._stream.log("plots/people", rr.Scalars(float(len(there))))
-
-    def _set_time(self, stamp: float) -> None:
-        # Stamps of a robot are Unix times, those of other recordings start at zero.
-        clock = "timestamp" if stamp > _EPOCH_S else "duration"
-        self._stream.set_time("time", **{clock: stamp})
 
     def _clear(self, path: str) -> None:
         """Clear the body; the meshes must be sent again for the next person."""

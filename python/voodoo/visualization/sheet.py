@@ -12,14 +12,10 @@ import numpy.typing as npt
 from voodoo.drawing.ink import INK, Picture
 
 
-def side_by_side(pictures: Sequence[Picture]) -> Picture:
-    """Images in a row, scaled to the height of the first one."""
-    return np.asarray(np.hstack(_fitted(pictures, 0)), dtype=np.uint8)
-
-
 def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
-    """Images in rows of `columns`, all rows scaled to the width of the first one."""
-    rows = [side_by_side(pictures[start : start + columns]) for start in range(0, len(pictures), columns)]
+    """Images in rows of `columns`, scaled to the height of the first one in a row, all rows to the width of the first one."""
+    starts = range(0, len(pictures), columns)
+    rows = [np.hstack(_fitted(pictures[start : start + columns], 0)) for start in starts]
     return np.asarray(np.vstack(_fitted(rows, 1)), dtype=np.uint8)
 
 
