@@ -86,7 +86,7 @@ def eval_command(
 
     with clear_errors(), reporting(as_json) as report:
         words = reading.words()
-        config_of(config)  # an invalid file is one error here instead of one per recording
+        settings = config_of(config)
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
             check_outputs([out], paths)
@@ -97,7 +97,7 @@ def eval_command(
             return
         if out is not None and not all(map(has_people, paths)):
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        how: dict[str, Any] = {"config_file": config, "loader": reading.loader, "options": words, "model": model}
+        how: dict[str, Any] = {"config": settings, "loader": reading.loader, "options": words, "model": model}
         kinds = ("depth",) if depth_only else kinds_of(use)
         done = evaluate_all(paths, **how, use=kinds, init=init, jobs=jobs or cores())
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))

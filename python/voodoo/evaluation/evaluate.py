@@ -128,9 +128,7 @@ def select_by(recording: Recording) -> Selection:
 def evaluate_all(
     paths: Sequence[Path],
     *,
-    config_file: Path | None = None,
     jobs: int = 1,
-    init: Automatic | None = None,
     **how: Any,  # noqa: ANN401 - of evaluate
 ) -> Iterator[tuple[int, Score | PeopleScore, FrameTable | None]]:
     """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
@@ -140,12 +138,10 @@ def evaluate_all(
 
     Args:
         paths: of the recordings.
-        config_file: None means the defaults.
         jobs: number of processes.
-        init: see `evaluate`.
-        **how: its other options.
+        **how: other options of `evaluate`.
     """
-    task = partial(_task, config_file, init, how)
+    task = partial(_task, how)
     if jobs == 1 or len(paths) == 1:
         for index, path in enumerate(paths):
             yield index, *task(path)
@@ -192,17 +188,10 @@ def _one_thread() -> None:
     cv2.setNumThreads(1)
 
 
-def _task(
-    config_file: Path | None, init: Automatic | None, how: Mapping[str, Any], path: Path
-) -> tuple[Score | PeopleScore, FrameTable | None]:
+def _task(how: Mapping[str, Any], path: Path) -> tuple[Score | PeopleScore, FrameTable | None]:
     several = has_people(path)
     try:
-        config = None if config_file is None else Config.load(config_file)
-        return (
-            (evaluate_people(path, config=config, **how), None)
-            if several
-            else evaluate(path, config=config, init=init, **how)
-        )
+        return evaluate_people(path, **how) if several else evaluate(path, **how)
     except (VoodooError, OSError) as error:
         return (PeopleScore if several else Score)(path.name, path, failure=str(error)), None
 

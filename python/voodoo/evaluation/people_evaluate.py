@@ -14,7 +14,7 @@ from voodoo.evaluation.people import PeopleScore, motmetrics, score
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
 from voodoo.model.body import Body
-from voodoo.names import HumanModel
+from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
 from voodoo.pipeline.run import track
 from voodoo.recordings.loaders import open_recording
@@ -95,8 +95,9 @@ def evaluate_people(
     options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
-) -> PeopleScore:
-    """Track all persons in a recording and evaluate the result.
+    init: Automatic | None = None,
+) -> tuple[PeopleScore, None]:
+    """Track all persons in a recording and evaluate the result; without a table of frames.
 
     Args:
         path: of a recording with truth_people.csv beside it.
@@ -104,13 +105,14 @@ def evaluate_people(
         loader, options: see open_recording.
         model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
+        init: of no effect, since persons are always searched for.
 
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
     recording = open_recording(path, loader=loader, **(options or {}))
     people = People(None if model is None else Body.human(model=model), config=config)
-    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
+    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use)), None
 
 
 def truth_of(recording: Recording) -> PeopleTruth:

@@ -22,8 +22,7 @@ from voodoo.names import INPUTS, SEARCHING
 from voodoo.people import ONE, Followed, People, PeopleEstimate, everybody
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.starts.base import FoundStart, StartFrame
-from voodoo.pipeline.starts.chosen import Starts, automatic_starts
+from voodoo.pipeline.starts import FoundStart, StartFrame, Starts, automatic_starts
 from voodoo.sensors.adapters import NOBODY, Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sensor import KeypointReport

@@ -15,7 +15,7 @@ from voodoo.people import People
 from voodoo.pipeline.front_end import E, FrontEnd, Steps
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.start import Init, check_findable, start_tracker
-from voodoo.pipeline.starts.chosen import Starts
+from voodoo.pipeline.starts import Starts
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings

@@ -21,7 +21,7 @@ from voodoo.model.joint import short, valid
 from voodoo.model.legs import legs_body
 from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
-from voodoo.pipeline.starts.chosen import Starts
+from voodoo.pipeline.starts import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
 from voodoo.pipeline.starts.legs import serves
 from voodoo.recordings.marker_files import MarkerMap
