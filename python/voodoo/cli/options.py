@@ -27,24 +27,15 @@ RecordingArgument = Annotated[
         help="ROS bag, Azure Kinect .mkv, UTD-MHAD *_depth.mat, folder of videos, Pose2Sim or PNGs, .trc.",
     ),
 ]
-LoaderOption = Annotated[
-    str | None,
-    typer.Option("--loader", metavar="NAME", help=f"Loader instead of the detected one: {', '.join(LOADERS)}."),
-]
 ConfigOption = Annotated[
-    Path | None, typer.Option("--config", metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
-]
-BodyOption = Annotated[
-    Path | None, typer.Option("--body", metavar="FILE", help="Body to track, as TOML; `voodoo body` prints the human.")
+    Path | None, typer.Option(metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
 ]
 HeightOption = Annotated[
-    float | None,
-    typer.Option("--height", metavar="M", min=0.3, max=3.0, help="Stature of the default human in meters."),
+    float | None, typer.Option(metavar="M", min=0.3, max=3.0, help="Stature of the default human in meters.")
 ]
 InitOption = Annotated[
     str | None,
     typer.Option(
-        "--init",
         metavar="FILE|auto",
         help="First pose as JSON, or an earlier result (.csv, .npz); auto: search for a person, even if there is a start beside "
         "the recording. By default the recording's start; auto if it has none.",
@@ -52,24 +43,14 @@ InitOption = Annotated[
 ]
 AutoOption = Annotated[
     Automatic | None,
-    typer.Option("--init", metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
+    typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
 ]
 OnlyOption = Annotated[
-    list[str] | None,
-    typer.Option("--only", metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'."),
-]
-DetectorOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--detector",
-        metavar="FILE.onnx",
-        help="A network that detects persons in depth images, instead of the shipped one (pip install 'voodoo-tracker[onnx]').",
-    ),
+    list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
 ]
 ExcludeOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--exclude",
         metavar="X0,Y0,Z0,X1,Y1,Z1",
         help="A box in the root frame, two corners in meters, in which no person is searched for or tracked; repeatable.",
     ),
@@ -77,28 +58,14 @@ ExcludeOption = Annotated[
 ModelOption = Annotated[
     HumanModel | None,
     typer.Option(
-        "--model",
-        help="The human: measured (eighteen limbs; default), full (the same, centered on their joints), or papers (ten limbs).",
+        help="The human: measured (eighteen limbs; default), full (the same, centered on their joints), or papers (ten limbs)."
     ),
 ]
 PeopleOption = Annotated[
     str,
     typer.Option(
-        "--people",
         metavar="any|N",
         help="Number of persons: 1 (default), the most visible person; any, or at most N, each with a persistent id.",
-    ),
-]
-FrameOption = Annotated[
-    str | None,
-    typer.Option("--frame", metavar="NAME", help="Root frame of the result, instead of the recording's own."),
-]
-TopicOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--topic",
-        metavar="KIND=NAME",
-        help=f"Topic of a bag with several of a kind: {', '.join(TOPICS)}; repeatable; several depth cameras are used together.",
     ),
 ]
 StrictOption = Annotated[
@@ -107,39 +74,12 @@ StrictOption = Annotated[
         "--strict", help="Reject a damaged recording; by default unusable measurements are left out and counted."
     ),
 ]
-BackgroundOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--background",
-        metavar="DIR",
-        help="Images of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
-    ),
-]
 NUMBERS = ("rate", "meters_per_unit", "tf_max_age", "unpacked_gb")
 """Options of loaders that are numbers."""
 
-LoaderNumberOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--option",
-        metavar="NAME=NUMBER",
-        help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit "
-        "(depth of bags; calibrations of Pose2Sim and videos), "
-        "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
-    ),
-]
-LayoutOption = Annotated[
-    str | None,
-    typer.Option(
-        "--layout",
-        metavar="NAME",
-        help=f"Layout of all keypoints: {', '.join(LAYOUTS)}; by default told by their number and the shape of the persons.",
-    ),
-]
 KeypointsOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--keypoints",
         metavar="NETWORK|SENSOR=DIR",
         help="A network to run on color images: mediapipe[:FILE.task], rtmpose[:MODE or :DETECTOR.onnx,POSE.onnx], or "
         "MODULE:FUNCTION of yours; or OpenPose JSON files, one for each image of SENSOR; repeatable.",
@@ -148,38 +88,20 @@ KeypointsOption = Annotated[
 UseOption = Annotated[
     str | None,
     typer.Option(
-        "--use",
         metavar="KIND,...",
         help=f"Inputs to use: {', '.join(INPUTS)}. By default all; color only if no other input determines the pose.",
-    ),
-]
-DepthRangeOption = Annotated[
-    str | None,
-    typer.Option(
-        "--depth-range",
-        metavar="NEAR,FAR",
-        help="Remove depth outside these limits in meters, and flying pixels at edges.",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout, and nothing else there.")]
 ViewOption = Annotated[
     bool, typer.Option("--view", help="Show every step in Rerun (pip install 'voodoo-tracker[view]').")
 ]
-UprightOption = Annotated[
-    bool,
-    typer.Option(
-        "--upright",
-        help="Put every result on the floor that is seen, else under the feet: z up, x forward, z = 0 on it.",
-    ),
-]
 RESULTS = (
     "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, .foxglove.mcap, a folder (ROS 2 bag), or - for CSV on "
     "stdout; repeatable"
 )
-OutOption = Annotated[list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}.")]
-OutOrNameOption = Annotated[
-    list[Path] | None, typer.Option("--out", metavar="FILE", help=f"{RESULTS}; by default NAME.csv.")
-]
+OutOption = Annotated[list[Path] | None, typer.Option(metavar="FILE", help=f"{RESULTS}.")]
+OutOrNameOption = Annotated[list[Path] | None, typer.Option(metavar="FILE", help=f"{RESULTS}; by default NAME.csv.")]
 
 
 def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
@@ -242,11 +164,36 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 class Reading:
     """How a recording is read."""
 
-    topic: TopicOption = None
-    frame: FrameOption = None
-    loader: LoaderOption = None
-    option: LoaderNumberOption = None
-    layout: LayoutOption = None
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=NAME",
+            help=f"Topic of a bag with several of a kind: {', '.join(TOPICS)}; repeatable; several depth cameras are used "
+            "together.",
+        ),
+    ] = None
+    frame: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Root frame of the result, instead of the recording's own.")
+    ] = None
+    loader: Annotated[
+        str | None, typer.Option(metavar="NAME", help=f"Loader instead of the detected one: {', '.join(LOADERS)}.")
+    ] = None
+    option: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=NUMBER",
+            help="Of the loader: rate (Pose2Sim, 60 images/s; numbered images, 30), meters_per_unit "
+            "(depth of bags; calibrations of Pose2Sim and videos), "
+            "tf_max_age (bags, 0.5 s), unpacked_gb (bags, 2); repeatable.",
+        ),
+    ] = None
+    layout: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=f"Layout of all keypoints: {', '.join(LAYOUTS)}; by default told by their number and the shape of the persons.",
+        ),
+    ] = None
 
     def words(self) -> dict[str, Any]:
         """Options of `open_recording` but for the loader, without those that are not given.
@@ -263,7 +210,9 @@ class Reading:
 class Human:
     """Whom to track."""
 
-    body: BodyOption = None
+    body: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Body to track, as TOML; `voodoo body` prints the human.")
+    ] = None
     height: HeightOption = None
     model: ModelOption = None
 
@@ -287,8 +236,20 @@ class Tracking(Human):
 
     init: InitOption = None
     config: ConfigOption = None
-    detector: DetectorOption = None
+    detector: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.onnx",
+            help="A network that detects persons in depth images, instead of the shipped one "
+            "(pip install 'voodoo-tracker[onnx]').",
+        ),
+    ] = None
     people: PeopleOption = "1"
     use: UseOption = None
-    depth_range: DepthRangeOption = None
+    depth_range: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NEAR,FAR", help="Remove depth outside these limits in meters, and flying pixels at edges."
+        ),
+    ] = None
     exclude: ExcludeOption = None

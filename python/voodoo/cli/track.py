@@ -35,7 +35,13 @@ def track_command(
     recording: options.RecordingArgument,
     tracking: options.Tracking,
     out: options.OutOrNameOption = None,
-    upright: options.UprightOption = False,
+    upright: Annotated[
+        bool,
+        typer.Option(
+            "--upright",
+            help="Put every result on the floor that is seen, else under the feet: z up, x forward, z = 0 on it.",
+        ),
+    ] = False,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a video.")
     ] = None,
@@ -58,7 +64,13 @@ def track_command(
         typer.Option(metavar="FILE", help="TOML that assigns the markers of .trc and .c3d files to sites."),
     ] = None,
     reading: options.Reading,
-    background: options.BackgroundOption = None,
+    background: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Images of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
+        ),
+    ] = None,
     strict: options.StrictOption = False,
 ) -> None:
     """Find a person in a recording, track them, and write one row per frame.
