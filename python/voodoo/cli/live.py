@@ -123,11 +123,11 @@ def live_command(
         how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
         source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
         recover_before([*wanted.targets, *([record] if record is not None else [])])
-        done = run(source, start, wanted, duration=duration)
-        for path in done.written:
+        written, ended, with_pose = run(source, start, wanted, duration=duration)
+        for path in written:
             if path != STDOUT:
                 print_message(f"wrote {path}")
-        if done.ended:
+        if ended:
             raise typer.Exit(INTERRUPTED)
-        if not done.with_pose:
+        if not with_pose:
             raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")

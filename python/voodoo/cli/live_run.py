@@ -8,7 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -64,15 +64,6 @@ class Outputs:
     serve: str | None
 
 
-@dataclass
-class Done:
-    """Result of a session: whether a signal ended it, the number of steps with a person, and the written files."""
-
-    ended: bool = False
-    with_pose: int = 0
-    written: list[Path] = field(default_factory=list)
-
-
 def entered(
     words: Sequence[str],
     calibrations: Sequence[Path],
@@ -104,13 +95,15 @@ def entered(
     return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
-def run(live: Live, start: Start, wanted: Outputs, *, duration: float | None) -> Done:
+def run(live: Live, start: Start, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
+
+    Returns:
+        The written files, whether a signal ended the session, and the number of steps with a person.
 
     Raises:
         VoodooError, OSError: a source or an output failed.
     """
-    done = Done()
     warm_up()
     with _prompt_threads(), deferred() as ended, live:
         outputs, files = _outputs(live, wanted)
@@ -124,11 +117,8 @@ def run(live: Live, start: Start, wanted: Outputs, *, duration: float | None) ->
                 if wanted.report is not None:
                     write_whole(wanted.report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
-        done.ended, done.with_pose = ended.is_set(), session.with_pose
-        if files is not None:
-            done.written += files.written
-        done.written += [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
-    return done
+        others = [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
+        return [*(files.written if files is not None else ()), *others], ended.is_set(), session.with_pose
 
 
 def _check_states(session: Session, ended: threading.Event, duration: float | None) -> None:

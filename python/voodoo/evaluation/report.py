@@ -119,20 +119,17 @@ def write_reports(
         again = f"~{names[score.name]}" if names[score.name] > 1 else ""
         if table is not None:
             write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
-    sequences, summary, text, plot = (
-        folder / name for name in ("sequences.csv", "summary.csv", "summary.md", "errors.png")
-    )
-    write_sequences(sequences, scores)
-    write_summary(summary, summarize(scores))
-    write_whole(text, markdown(scores, tables))
-    if not picture:
-        return [sequences, summary, text]
-    plot_errors(plot, scores)
-    files = [sequences, summary, text, plot]
-    known = [each for group in deviations_of(scores, tables).values() for each in group]
-    if calibrate(known) is not None:
-        plot_calibration(folder / "calibration.png", known)
-        files.append(folder / "calibration.png")
+    files = [folder / name for name in ("sequences.csv", "summary.csv", "summary.md")]
+    write_sequences(files[0], scores)
+    write_summary(files[1], summarize(scores))
+    write_whole(files[2], markdown(scores, tables))
+    if picture:
+        files.append(folder / "errors.png")
+        plot_errors(files[-1], scores)
+        known = [each for group in deviations_of(scores, tables).values() for each in group]
+        if calibrate(known) is not None:
+            files.append(folder / "calibration.png")
+            plot_calibration(files[-1], known)
     return files
 
 

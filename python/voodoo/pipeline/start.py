@@ -87,8 +87,7 @@ class Init(FirstPose):
             return self
         about = recording.info()
         pose = recording.root_from(str(self.frame), about.start_stamp if self.stamp_s is None else self.stamp_s)
-        moved = {"frame": recording.root_frame, "joints": self.moved(pose)}
-        return type(self).model_validate({**self.model_dump(), **moved})
+        return self.model_copy(update={"frame": recording.root_frame, "joints": self.moved(pose)})
 
     @classmethod
     def of(cls, recording: Recording) -> Init | None:

@@ -233,7 +233,12 @@ class Viewer:
             logged = self._shapes.get(place)
             if not _alike(logged, limb.shape):
                 self._shapes[place] = limb.shape
-                self._stream.log(place, self._mesh(limb.shape, colors[limb.name], known=logged is not None))
+                vertices, triangles, normals = limb_mesh(limb.shape)
+                mesh = rr.Mesh3D.from_fields(vertex_positions=vertices)
+                if logged is None:
+                    about = {"vertex_normals": normals, "albedo_factor": (*colors[limb.name], 150)}
+                    mesh = rr.Mesh3D(vertex_positions=vertices, triangle_indices=triangles, **about)
+                self._stream.log(place, mesh)
             pose = estimate.world_from_limb[limb.name]
             self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
         self._stream.log(
@@ -242,15 +247,6 @@ class Viewer:
         )
         self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
-
-    def _mesh(self, shape: TaperedEllipticCylinder, color: tuple[int, int, int], *, known: bool) -> object:
-        """Log the surface of a limb; for a `known` mesh only the vertices."""
-        vertices, triangles, normals = limb_mesh(shape)
-        if known:
-            return self._rr.Mesh3D.from_fields(vertex_positions=vertices)
-        return self._rr.Mesh3D(
-            vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=(*color, 150)
-        )
 
     def _log_spread(self, path: str, estimate: Estimate) -> None:
         """Ellipsoids of one standard deviation of the joints."""
