@@ -8,12 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    print_message,
-    print_text,
-    refuse_both,
-)
+from voodoo.cli.common import clear_errors, print_message, print_text, refuse_both
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError, VoodooError
 
