@@ -10,7 +10,7 @@ from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of
 from voodoo.errors import VoodooError
 from voodoo.model.projection import CameraView, TopView, limb_silhouette
 from voodoo.recordings import ColorImage, RecordedFrame
-from voodoo.visualization import film as film_module
+from voodoo.visualization import image_writer as film_module
 from voodoo.visualization.body_drawing import side_color
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.overlay import Overlay

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from voodoo.errors import VoodooError
-from voodoo.evaluation.tables import cell
+from voodoo.evaluation.summary import cell
 
 DONE, FAILED = "done", "failed"
 REPORTS = "reports"

@@ -122,7 +122,7 @@ def eval_command(
 
 def _show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
     """Print and write the table of several persons."""
-    from voodoo.evaluation.people_report import DERIVED, people_markdown, write_people
+    from voodoo.evaluation.people_evaluate import DERIVED, people_markdown, write_people
 
     if report is not None:
         report["people"] = [{**vars(score), **{name: getattr(score, name) for name in DERIVED}} for score in scores]

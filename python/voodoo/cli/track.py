@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,7 +27,7 @@ from voodoo.names import SEARCHING
 if TYPE_CHECKING:
     from voodoo.export.spool import Spool
     from voodoo.recordings.left_out import LeftOut
-    from voodoo.recordings.recording import Recording
+    from voodoo.recordings.recording import Recording, RecordingInfo
 
 
 def track_command(
@@ -119,8 +120,8 @@ def track_command(
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from voodoo.cli.closing import closing_doubts, closing_lines
     from voodoo.cli.running import Start, opened, refuse_unused, run, spool_of, turn_of
+    from voodoo.cli.track import closing_doubts, closing_lines
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
@@ -247,3 +248,44 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
         raise NoPoseError(
             f"{source.name}: nobody was found in {spool.frames} frames; voodoo info doubts what is unlikely"
         )
+
+
+STATUS_PAGE = "docs/how-to/read-the-status.md"
+_USUAL_M = (0.8, 2.1)
+"""Statures from a small child to a tall adult."""
+_TOLD = 0.06
+"""A stature that differs from what was told by a larger fraction is doubted: sizes of limbs are found to some percent."""
+_LEAST_TRACKING = 0.5
+
+
+def closing_lines(
+    states: Counter[str], seconds: Sequence[float], about: RecordingInfo, *, stature: float | None
+) -> list[str]:
+    """Stature, speed, root frame, and share of the frames by status (status -> frames)."""
+    time = sum(seconds)
+    parts = [] if stature is None else [f"stature {stature:.2f} m"]
+    parts += [f"{len(seconds) / time:.0f} frames a second"] if time > 0.0 else []
+    camera = " (a camera, not level)" if about.camera_root else ""
+    shares = (f"{100 * count / states.total():.0f} % {word}" for word, count in states.items())
+    return [
+        "; ".join([*parts, f"root frame {about.root_frame}{camera}"]),
+        f"{', '.join(shares)} ({STATUS_PAGE} says what that means)",
+    ]
+
+
+def closing_doubts(states: Counter[str], *, stature: float | None, told: float | None) -> list[str]:
+    """What is unlikely in poses of these statuses (status -> frames); told: the stature that was given [m]."""
+    doubts = []
+    low, high = _USUAL_M
+    if stature is not None and told is not None and abs(stature - told) > _TOLD * told:
+        doubts.append(
+            f"the stature is {stature:.2f} m, where {told:.2f} m was told: is the scale of depth or calibration right?"
+        )
+    elif stature is not None and told is None and not low <= stature <= high:
+        doubts.append(f"the stature is {stature:.2f} m, which few people have ({low} to {high} m): is the scale right?")
+    share = states["tracking"] / states.total()
+    if share <= _LEAST_TRACKING:
+        doubts.append(
+            f"only {100 * share:.0f} % of the frames are tracking: look at --overlay look.mp4, and see {STATUS_PAGE}"
+        )
+    return doubts

@@ -12,8 +12,7 @@ from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown
 from voodoo.evaluation.plot import plot_calibration, plot_errors
 from voodoo.evaluation.score import CM, LIMIT_EXACT_M, LIMIT_REFERENCE_M, PERCENT, RATIO, FrameTable, Score, written
-from voodoo.evaluation.summary import ALL_ROWS, KINDS, Summary, summarize
-from voodoo.evaluation.tables import write_frames, write_sequences, write_summary
+from voodoo.evaluation.summary import ALL_ROWS, KINDS, Summary, summarize, write_frames, write_sequences, write_summary
 from voodoo.whole import write_whole
 
 
