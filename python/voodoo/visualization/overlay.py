@@ -102,7 +102,9 @@ class Overlay:
                 canvas.rays(rays, estimate)
             canvas.finish()
         picture = in_rows([canvas.picture for canvas in canvases], columns=self._columns)
-        caption(picture, self._when(index, estimate.stamp), estimate)
+        self._origin = estimate.stamp if self._origin is None else self._origin
+        when = f"{index + 1}/{self._frames}   {estimate.stamp - self._origin:.2f} s"
+        caption(picture, when, estimate)
         return picture
 
     def _canvases(self, recorded: RecordedFrame) -> Iterator[Canvas]:
@@ -115,11 +117,6 @@ class Overlay:
             item = current.get(sensor, first)
             view = CameraView(item.camera, item.root_from_sensor, scale)
             yield Canvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
-
-    def _when(self, index: int, stamp: float) -> str:
-        """Number of a frame, and its time since the first one."""
-        self._origin = stamp if self._origin is None else self._origin
-        return f"{index + 1}/{self._frames}   {stamp - self._origin:.2f} s"
 
     def _background(self, item: Pictured | None, first: Pictured) -> Picture:
         """The image of the camera; a dark background if there is no new one, or only keypoints."""
