@@ -24,42 +24,10 @@ def live_command(
         ),
     ],
     tracking: options.Tracking,
-    out: options.OutOption = None,
-    record: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.mcap",
-            help="Write inputs and results to a file for voodoo track; it contains images of people.",
-        ),
-    ] = None,
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Write rate, latency, drops and faults at the end.")
-    ] = None,
+    outputs: options.Outputs,
     duration: Annotated[float | None, typer.Option(metavar="S", min=0.0, help="End after this time.")] = None,
     rate: Annotated[float, typer.Option(metavar="N", help="Speed factor for a recording.")] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="Repeat a recording.")] = False,
-    to: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Send poses to vmc://HOST[:PORT] or ros2://, or serve them at ws://[HOST][:PORT] or "
-            "foxglove://[HOST][:PORT]; repeatable (pip install 'voodoo-tracker[stream,foxglove]').",
-        ),
-    ] = None,
-    publish: Annotated[
-        bool | None,
-        typer.Option(
-            "--publish/--no-publish",
-            help="Publish transforms, joint states and markers on ROS 2; by default if a source is ros2.",
-        ),
-    ] = None,
-    view: options.ViewOption = False,
-    serve: Annotated[
-        str | None,
-        typer.Option(
-            metavar="[HOST:]PORT", help="Show it in a browser with Rerun's web viewer; on 127.0.0.1 by default."
-        ),
-    ] = None,
     calibration: Annotated[
         list[Path] | None,
         typer.Option(
@@ -90,25 +58,24 @@ def live_command(
     """
     from dataclasses import replace
 
-    from voodoo.cli.live_run import Outputs, entered, run
+    from voodoo.cli.live_run import entered, run
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import Start
     from voodoo.export.files import STDOUT, check_target
     from voodoo.pipeline.inputs import keypoint_words
 
     with clear_errors():
-        refuse_both("--view", view or None, **{"--serve": serve})
+        refuse_both("--view", outputs.view or None, **{"--serve": outputs.serve})
         if list(sources) == ["ros2:"]:
             from voodoo.live.ros2.listing import listing
 
             print_text("\n".join(listing() or ["nothing is published on this network"]))
             return
-        for target in out or ():
+        for target in outputs.out or ():
             check_target(target)
         start = Start.of(tracking)
-        if publish is None:
-            publish = any(source.startswith("ros2:") for source in sources)
-        wanted = Outputs(out or (), record, report, to or (), publish=publish, view=view, serve=serve)
+        if outputs.publish is None:
+            outputs = replace(outputs, publish=any(source.startswith("ros2:") for source in sources))
         folders, network = keypoint_words(keypoints or (), reading.layout)
         if folders:
             raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
@@ -117,8 +84,8 @@ def live_command(
             words["loader"] = reading.loader
         how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
         source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
-        recover_before([*wanted.targets, *([record] if record is not None else [])])
-        written, ended, with_pose = run(source, start, wanted, duration=duration)
+        recover_before([*(outputs.out or ()), *([outputs.record] if outputs.record is not None else [])])
+        written, ended, with_pose = run(source, start, outputs, duration=duration)
         for path in written:
             if path != STDOUT:
                 print_message(f"wrote {path}")

@@ -8,13 +8,13 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from voodoo._core import Estimate
 from voodoo.cli.common import print_message
+from voodoo.cli.options import Outputs
 from voodoo.cli.running import Start
 from voodoo.cli.signals import deferred
 from voodoo.errors import VoodooError, reason
@@ -49,19 +49,6 @@ _NO_SCREEN = "--save FILE.rrd writes a file"
 """Advice in the error of `Viewer` without a screen."""
 _SWITCH_S = 5e-4
 """Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Files and addresses of the command line."""
-
-    targets: Sequence[Path]
-    record: Path | None
-    report: Path | None
-    to: Sequence[str]
-    publish: bool
-    view: bool
-    serve: str | None
 
 
 def entered(
@@ -143,11 +130,13 @@ def _follower(start: Start, first: FirstFrame) -> Follower:
 
 def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | None]:
     # Addresses come first: one that is of no use leaves no file behind.
-    addresses = [*wanted.to, *([ROS2] if wanted.publish and ROS2 not in wanted.to else [])]
+    addresses = list(wanted.to or ())
+    if wanted.publish and ROS2 not in addresses:
+        addresses.append(ROS2)
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
-    if wanted.targets:
-        files = FileOutput(wanted.targets, root_frame=lambda: live.root_frame)
+    if wanted.out:
+        files = FileOutput(wanted.out, root_frame=lambda: live.root_frame)
         outputs.append(files)
     if wanted.record is not None:
         outputs.append(Recorder(wanted.record, root_frame=lambda: live.root_frame))

@@ -100,7 +100,6 @@ RESULTS = (
     "Result: .csv, .npz, .bvh, .trc, .c3d, .mot, .sto, .glb, .mcap, .foxglove.mcap, a folder (ROS 2 bag), or - for CSV on "
     "stdout; repeatable"
 )
-OutOption = Annotated[list[Path] | None, typer.Option(metavar="FILE", help=f"{RESULTS}.")]
 OutOrNameOption = Annotated[list[Path] | None, typer.Option(metavar="FILE", help=f"{RESULTS}; by default NAME.csv.")]
 
 
@@ -253,3 +252,42 @@ class Tracking(Human):
         ),
     ] = None
     exclude: ExcludeOption = None
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where the poses of a live session go."""
+
+    out: Annotated[list[Path] | None, typer.Option(metavar="FILE", help=f"{RESULTS}.")] = None
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mcap",
+            help="Write inputs and results to a file for voodoo track; it contains images of people.",
+        ),
+    ] = None
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Write rate, latency, drops and faults at the end.")
+    ] = None
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Send poses to vmc://HOST[:PORT] or ros2://, or serve them at ws://[HOST][:PORT] or "
+            "foxglove://[HOST][:PORT]; repeatable (pip install 'voodoo-tracker[stream,foxglove]').",
+        ),
+    ] = None
+    publish: Annotated[
+        bool | None,
+        typer.Option(
+            "--publish/--no-publish",
+            help="Publish transforms, joint states and markers on ROS 2; by default if a source is ros2.",
+        ),
+    ] = None
+    view: ViewOption = False
+    serve: Annotated[
+        str | None,
+        typer.Option(
+            metavar="[HOST:]PORT", help="Show it in a browser with Rerun's web viewer; on 127.0.0.1 by default."
+        ),
+    ] = None
