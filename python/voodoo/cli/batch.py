@@ -68,12 +68,10 @@ def batch_command(
     from voodoo.batch.summary import DONE, FAILED
     from voodoo.batch.task import Settings
     from voodoo.cli.running import config_of, kinds_of, limit_of
-    from voodoo.config import Config
     from voodoo.errors import NoPoseError, VoodooError
     from voodoo.whole import check_outputs
 
     with clear_errors(), reporting(as_json) as told:
-        chosen, plain = config_of(config), Config()
         settings = Settings(
             use=kinds_of(use),
             init=init,
@@ -82,7 +80,7 @@ def batch_command(
             options=reading.words(),
             people=limit_of(people),
             strict=strict,
-            config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},
+            config=config_of(config).model_dump(exclude_defaults=True),
             version=__version__,
         )
         sources = find_sources(recordings, only=only or ())

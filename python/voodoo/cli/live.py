@@ -60,7 +60,7 @@ def live_command(
 
     from voodoo.cli.live_run import entered, run
     from voodoo.cli.recover import recover_before
-    from voodoo.cli.running import Start
+    from voodoo.cli.running import ParsedTracking
     from voodoo.export.files import STDOUT, check_target
     from voodoo.pipeline.inputs import keypoint_words
 
@@ -73,7 +73,7 @@ def live_command(
             return
         for target in outputs.out or ():
             check_target(target)
-        start = Start.of(tracking)
+        start = ParsedTracking.of(tracking)
         if outputs.publish is None:
             outputs = replace(outputs, publish=any(source.startswith("ros2:") for source in sources))
         folders, network = keypoint_words(keypoints or (), reading.layout)

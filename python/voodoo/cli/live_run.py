@@ -15,7 +15,7 @@ from typing import Any
 from voodoo._core import Estimate
 from voodoo.cli.common import print_message
 from voodoo.cli.options import Outputs
-from voodoo.cli.running import Start
+from voodoo.cli.running import ParsedTracking
 from voodoo.cli.signals import deferred
 from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import cdr, description, instant
@@ -82,7 +82,7 @@ def entered(
     return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
-def run(live: Live, start: Start, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
+def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
 
     Returns:
@@ -121,7 +121,7 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
             print_message(session.line())
 
 
-def _follower(start: Start, first: FirstFrame) -> Follower:
+def _follower(start: ParsedTracking, first: FirstFrame) -> Follower:
     if start.limit != 1:
         return Follower(people=lambda: start.tracker(first), settings=start.settings(first))
     starts = starts_of(start.beginning, first)

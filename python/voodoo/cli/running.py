@@ -54,7 +54,7 @@ class Run(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Start:
+class ParsedTracking:
     """How a tracker starts, by the options of a command.
 
     Args:
@@ -70,7 +70,7 @@ class Start:
     filters: Mapping[str, Any]
 
     @classmethod
-    def of(cls, asked: Tracking) -> Start:
+    def of(cls, asked: Tracking) -> ParsedTracking:
         """Parse the options.
 
         Raises:

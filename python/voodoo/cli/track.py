@@ -120,7 +120,7 @@ def track_command(
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from voodoo.cli.running import Start, opened, refuse_unused, run, spool_of, turn_of
+    from voodoo.cli.running import ParsedTracking, opened, refuse_unused, run, spool_of, turn_of
     from voodoo.cli.track import closing_doubts, closing_lines
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
@@ -136,7 +136,7 @@ def track_command(
         refuse_both("--view", view or None, **{"--save": save})
         if offset and not with_:
             raise typer.BadParameter("--offset is for the stamps of --with, give both")
-        start, layout, left_out = Start.of(tracking), reading.layout, None if strict else LeftOut()
+        start, layout, left_out = ParsedTracking.of(tracking), reading.layout, None if strict else LeftOut()
         several, bare = start.limit != 1, start.beginning is not None
         markers = None if marker_map is None else MarkerMap.load(marker_map)
         numbers, others = options.numbers_of(reading.option), with_ or ()
