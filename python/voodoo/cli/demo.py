@@ -12,6 +12,9 @@ from voodoo.cli.common import clear_errors, refuse_missing, states
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError
 
+_SHEET = 0.3
+"""Scale of the pictures in the sheet."""
+
 
 def demo_command(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for result and pictures.")] = Path("voodoo-demo"),
@@ -21,6 +24,7 @@ def demo_command(
     No start is given: the person is detected first. Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the
     recording's exact ground truth.
     """
+    import cv2
     import numpy as np
 
     from voodoo._core import Estimate
@@ -32,7 +36,7 @@ def demo_command(
     from voodoo.recordings.sample import sample_path
     from voodoo.visualization.image_writer import save_picture
     from voodoo.visualization.overlay import legend
-    from voodoo.visualization.sheet import contact_sheet
+    from voodoo.visualization.sheet import in_rows
 
     with clear_errors():
         source = opened(sample_path(), options.Reading())
@@ -47,8 +51,9 @@ def demo_command(
         result = Track.of(estimates, body=tracker.body)
         result.save(out / "pose.csv")
         refuse_missing(failures, f"wrote {out / 'pose.csv'}")
-        pictures = contact_sheet(sheet, columns=3)
-        save_picture(out / "sheet.png", np.vstack([pictures, legend(pictures.shape[1])]))
+        whole = in_rows(sheet, columns=3)
+        pictures = cv2.resize(whole, None, fx=_SHEET, fy=_SHEET, interpolation=cv2.INTER_AREA)
+        save_picture(out / "sheet.png", np.vstack([pictures.astype(np.uint8), legend(pictures.shape[1])]))
         if not result.found.any():
             raise NoPoseError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
         errors = compare(source, result)

@@ -9,11 +9,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.drawing.ink import INK, Picture
+from voodoo.drawing.ink import Picture
 
 
 def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
-    """Images in rows of `columns`, scaled to the height of the first one in a row, all rows to the width of the first one."""
+    """Images in rows of `columns`, scaled to the height of the first one in a row, all rows to the width of the first one;
+    black where there are too few."""
+    pictures = [*pictures, *[np.zeros_like(pictures[0])] * (-len(pictures) % columns)]
     starts = range(0, len(pictures), columns)
     rows = [np.hstack(_fitted(pictures[start : start + columns], 0)) for start in starts]
     return np.asarray(np.vstack(_fitted(rows, 1)), dtype=np.uint8)
@@ -27,26 +29,3 @@ def _fitted(pictures: Sequence[Picture], axis: int) -> list[npt.NDArray[Any]]:
         height, width = (round(side * size / picture.shape[axis]) for side in picture.shape[:2])
         fitted.append(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
     return fitted
-
-
-def contact_sheet(pictures: Sequence[Picture], *, columns: int, width: int = 1600, gap: int = 6) -> Picture:
-    """Images of one size in a grid.
-
-    Args:
-        pictures: at least one.
-        columns: number per row.
-        width: of the sheet [px].
-        gap: gap between the images [px].
-    """
-    columns = min(columns, len(pictures))
-    rows = -(-len(pictures) // columns)
-    cell = (width - (columns - 1) * gap) // columns
-    height = round(pictures[0].shape[0] * cell / pictures[0].shape[1])
-    sheet = np.full((rows * height + (rows - 1) * gap, width, 3), INK, dtype=np.uint8)
-    for index, picture in enumerate(pictures):
-        row, column = divmod(index, columns)
-        top, left = row * (height + gap), column * (cell + gap)
-        sheet[top : top + height, left : left + cell] = cv2.resize(
-            picture, (cell, height), interpolation=cv2.INTER_AREA
-        )
-    return sheet
