@@ -13,8 +13,7 @@ from voodoo.recordings import ColorImage, RecordedFrame
 from voodoo.visualization import image_writer as film_module
 from voodoo.visualization.body_drawing import side_color
 from voodoo.visualization.image_writer import PictureWriter
-from voodoo.visualization.overlay import Overlay
-from voodoo.visualization.sheet import in_rows
+from voodoo.visualization.overlay import Overlay, in_rows
 
 STILL = RecordedFrame(0.0, (depth_of(T_POSE),))
 

@@ -22,8 +22,7 @@ from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, RecordedFrame, Recording, RecordingInfo, Reference
 from voodoo.recordings.loaders import guess_loader, options_of
-from voodoo.visualization.overlay import Overlay
-from voodoo.visualization.sheet import in_rows
+from voodoo.visualization.overlay import Overlay, in_rows
 
 BONES = tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
 BONES += tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), ("knee", "ankle")))

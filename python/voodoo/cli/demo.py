@@ -35,8 +35,7 @@ def demo_command(
     from voodoo.pipeline.start import AUTO, start_tracker
     from voodoo.recordings.sample import sample_path
     from voodoo.visualization.image_writer import save_picture
-    from voodoo.visualization.overlay import legend
-    from voodoo.visualization.sheet import in_rows
+    from voodoo.visualization.overlay import in_rows, legend
 
     with clear_errors():
         source = opened(sample_path(), options.Reading())

@@ -18,12 +18,11 @@ from voodoo.export.skeleton import bones
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.joint import short, valid
-from voodoo.model.legs import legs_body
 from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
 from voodoo.pipeline.starts import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
-from voodoo.pipeline.starts.legs import serves
+from voodoo.pipeline.starts.legs import legs_body, serves
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.truth import FirstPose
