@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, cores, print_interrupted, print_message, progressing, reporting
+from voodoo.cli.common import cores, print_interrupted, print_message, progressing, reporting
 from voodoo.cli.signals import deferred
 
 
@@ -71,7 +71,7 @@ def batch_command(
     from voodoo.errors import NoPoseError, VoodooError
     from voodoo.whole import check_outputs
 
-    with clear_errors(), reporting(as_json) as told:
+    with reporting(as_json) as told:
         settings = Settings(
             use=kinds_of(use),
             init=init,

@@ -10,7 +10,6 @@ import typer
 
 from voodoo.cli import options
 from voodoo.cli.common import (
-    clear_errors,
     cores,
     print_interrupted,
     print_text,
@@ -84,7 +83,7 @@ def eval_command(
     from voodoo.evaluation.summary import summarize
     from voodoo.whole import check_outputs
 
-    with clear_errors(), reporting(as_json) as report:
+    with reporting(as_json) as report:
         words = reading.words()
         settings = config_of(config)
         paths = find_recordings(recordings, only=only or ())

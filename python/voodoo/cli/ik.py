@@ -9,15 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    print_interrupted,
-    print_message,
-    print_result,
-    refuse_missing,
-    states,
-    wrote,
-)
+from voodoo.cli.common import print_interrupted, print_message, print_result, refuse_missing, states, wrote
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError
 
@@ -79,37 +71,36 @@ def ik_command(
     from voodoo.pipeline.run import first_pose
     from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
 
-    with clear_errors():
-        beginning = beginning_of(init)
-        source = opened(recording, reading)
-        files, keeping = spool_of(source, out, context, suffix="_ik.csv")
-        with keeping as spool:
-            positions = known_positions(source, None if targets is None else Track.load(targets))
-            tracker = start_tracker(source, init=beginning, **human.start())
-            if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
-                raise NoPoseError(
-                    f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
-                )
-            known = None if sites is None else tuple(name.strip() for name in sites.split(","))
-            how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
-            errors: Counter[str] = Counter()
-            compared: Counter[str] = Counter()
+    beginning = beginning_of(init)
+    source = opened(recording, reading)
+    files, keeping = spool_of(source, out, context, suffix="_ik.csv")
+    with keeping as spool:
+        positions = known_positions(source, None if targets is None else Track.load(targets))
+        tracker = start_tracker(source, init=beginning, **human.start())
+        if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
+            raise NoPoseError(
+                f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
+            )
+        known = None if sites is None else tuple(name.strip() for name in sites.split(","))
+        how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
+        errors: Counter[str] = Counter()
+        compared: Counter[str] = Counter()
 
-            def take(step: Solved) -> None:
-                errors.update(step.errors)
-                compared.update(step.errors.keys())
-                spool.add(step.track, {ONE: tracker.body})
+        def take(step: Solved) -> None:
+            errors.update(step.errors)
+            compared.update(step.errors.keys())
+            spool.add(step.track, {ONE: tracker.body})
 
-            steps = follow(source, tracker, positions, **how)
-            with deferred():
-                done = run(source, steps, take=take)
-                turn = turn_of(source, spool.sample(), files)
-                written, failed = spool.write(turn=turn)
-        for name, count in compared.items():
-            print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", files)
-        message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
-        refuse_missing([*failed, *done.failures], message)
-        print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
-        print_result(message, files)
-        if words := upright_words(written, turn):
-            print_message(words)
+        steps = follow(source, tracker, positions, **how)
+        with deferred():
+            done = run(source, steps, take=take)
+            turn = turn_of(source, spool.sample(), files)
+            written, failed = spool.write(turn=turn)
+    for name, count in compared.items():
+        print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", files)
+    message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
+    refuse_missing([*failed, *done.failures], message)
+    print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
+    print_result(message, files)
+    if words := upright_words(written, turn):
+        print_message(words)

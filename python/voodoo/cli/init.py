@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors
 from voodoo.errors import NoPoseError, VoodooError
 
 
@@ -50,26 +49,25 @@ def init_command(
     from voodoo.sensors.settings import FrontEndSettings
     from voodoo.whole import write_whole
 
-    with clear_errors():
-        kinds, boxes = kinds_of(use), boxes_of(exclude)
-        left_out = LeftOut()
-        source = opened(recording, reading, bare=True, left_out=left_out)
-        about = source.info()
-        after = about.start_stamp
-        if at is not None:
-            after = at if at > about.duration else about.start_stamp + at
-            if not about.start_stamp <= after <= about.start_stamp + about.duration:
-                raise VoodooError(
-                    f"--at: expected 0 to {about.duration:.3f} s, or a stamp from {about.start_stamp:.3f} s on, found {at}"
-                )
-        tracker = start_tracker(source, init=AUTO, **human.start(), config=config_of(config), use=kinds)
-        settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
-        estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
-        if estimate is None:
-            raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
-        text = pose_as_init(estimate, tracker.body).to_json()
-        if out is None:
-            typer.echo(text)
-        else:
-            write_whole(out, text + "\n")
-            typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")
+    kinds, boxes = kinds_of(use), boxes_of(exclude)
+    left_out = LeftOut()
+    source = opened(recording, reading, bare=True, left_out=left_out)
+    about = source.info()
+    after = about.start_stamp
+    if at is not None:
+        after = at if at > about.duration else about.start_stamp + at
+        if not about.start_stamp <= after <= about.start_stamp + about.duration:
+            raise VoodooError(
+                f"--at: expected 0 to {about.duration:.3f} s, or a stamp from {about.start_stamp:.3f} s on, found {at}"
+            )
+    tracker = start_tracker(source, init=AUTO, **human.start(), config=config_of(config), use=kinds)
+    settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
+    estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
+    if estimate is None:
+        raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
+    text = pose_as_init(estimate, tracker.body).to_json()
+    if out is None:
+        typer.echo(text)
+    else:
+        write_whole(out, text + "\n")
+        typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, print_message, print_text, refuse_both
+from voodoo.cli.common import print_message, print_text, refuse_both
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError, VoodooError
 
@@ -64,32 +64,31 @@ def live_command(
     from voodoo.export.files import STDOUT, check_target
     from voodoo.pipeline.inputs import keypoint_words
 
-    with clear_errors():
-        refuse_both("--view", outputs.view or None, **{"--serve": outputs.serve})
-        if list(sources) == ["ros2:"]:
-            from voodoo.live.ros2.listing import listing
+    refuse_both("--view", outputs.view or None, **{"--serve": outputs.serve})
+    if list(sources) == ["ros2:"]:
+        from voodoo.live.ros2.listing import listing
 
-            print_text("\n".join(listing() or ["nothing is published on this network"]))
-            return
-        for target in outputs.out or ():
-            check_target(target)
-        start = ParsedTracking.of(tracking)
-        if outputs.publish is None:
-            outputs = replace(outputs, publish=any(source.startswith("ros2:") for source in sources))
-        folders, network = keypoint_words(keypoints or (), reading.layout)
-        if folders:
-            raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
-        words = replace(reading, frame=None, layout=reading.layout if network is None else None).words()
-        if reading.loader is not None:
-            words["loader"] = reading.loader
-        how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
-        source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
-        recover_before([*(outputs.out or ()), *([outputs.record] if outputs.record is not None else [])])
-        written, ended, with_pose = run(source, start, outputs, duration=duration)
-        for path in written:
-            if path != STDOUT:
-                print_message(f"wrote {path}")
-        if ended:
-            raise typer.Exit(INTERRUPTED)
-        if not with_pose:
-            raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")
+        print_text("\n".join(listing() or ["nothing is published on this network"]))
+        return
+    for target in outputs.out or ():
+        check_target(target)
+    start = ParsedTracking.of(tracking)
+    if outputs.publish is None:
+        outputs = replace(outputs, publish=any(source.startswith("ros2:") for source in sources))
+    folders, network = keypoint_words(keypoints or (), reading.layout)
+    if folders:
+        raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
+    words = replace(reading, frame=None, layout=reading.layout if network is None else None).words()
+    if reading.loader is not None:
+        words["loader"] = reading.loader
+    how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
+    source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
+    recover_before([*(outputs.out or ()), *([outputs.record] if outputs.record is not None else [])])
+    written, ended, with_pose = run(source, start, outputs, duration=duration)
+    for path in written:
+        if path != STDOUT:
+            print_message(f"wrote {path}")
+    if ended:
+        raise typer.Exit(INTERRUPTED)
+    if not with_pose:
+        raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")

@@ -23,13 +23,13 @@ _FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
 
 
 class Checked(TyperCommand):
-    """A command that begins only if nothing it writes is in the place of what it reads, and that signals end."""
+    """A command that begins only if nothing it writes is in the place of what it reads, and that signals end; its errors are
+    lines."""
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - Typer brings its own Click, or uses the installed one
         """Check the options, then run the command."""
-        with clear_errors():
+        with ending(), clear_errors():
             check_paths(ctx)
-        with ending():
             return super().invoke(ctx)
 
 

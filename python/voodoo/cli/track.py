@@ -10,16 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    print_interrupted,
-    print_message,
-    print_result,
-    refuse_both,
-    refuse_missing,
-    states,
-    wrote,
-)
+from voodoo.cli.common import print_interrupted, print_message, print_result, refuse_both, refuse_missing, states, wrote
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError, VoodooError
 from voodoo.names import SEARCHING
@@ -132,95 +123,94 @@ def track_command(
     from voodoo.recordings.marker_files import MarkerMap
     from voodoo.visualization.rerun_viewer import Viewer
 
-    with clear_errors():
-        refuse_both("--view", view or None, **{"--save": save})
-        if offset and not with_:
-            raise typer.BadParameter("--offset is for the stamps of --with, give both")
-        start, layout, left_out = ParsedTracking.of(tracking), reading.layout, None if strict else LeftOut()
-        several, bare = start.limit != 1, start.beginning is not None
-        markers = None if marker_map is None else MarkerMap.load(marker_map)
-        numbers, others = options.numbers_of(reading.option), with_ or ()
-        about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": start.options["use"]}
-        asked = loader_options(recording, reading.loader, **about)
-        if background is not None:
-            asked["background"] = background
-        # A number that no other recording accepts belongs to this one, whose loader may reject it.
-        taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
-        asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
-        folders, network = keypoint_words(keypoints or (), layout)
-        source = join(
-            opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked),
-            keypoints=folders,
-            network=network,
-            layout=layout,
-            others=others,
-            offset=offset,
-            markers=markers,
-            numbers=numbers,
-            left_out=left_out,
-            bare=bare,
-        )
-        for words in source.assumed:
-            print_message(words)
-        for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
-            if given:
-                raise VoodooError(f"{name}: expected none with --people any or N, it is for one person")
-        used = start.settings(source)
-        places = ("depth", "points", "scan")
-        refuse_unused(
-            used_kinds(source, used.use),
-            depth_range=(tracking.depth_range, ("depth",)),
-            detector=(tracking.detector, ("depth",)),
-            exclude=(tracking.exclude, places),
-            layout=(layout, ("keypoints",)),
-            marker_map=(marker_map, ("markers",)),
-            draw_regions=(draw_regions, ("color",)),
-            background=(background, ("color",)),
-        )
-        targets, keeping = spool_of(source, out, context, upright=upright)
-        shown = Viewer(save=save, name=source.name) if view or save is not None else nullcontext()
-        with keeping as spool, shown as viewer:
-            how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
-            settings = replace(used, draw_regions=draw_regions)
-            tracker = start.tracker(source, markers=markers)
-            starts = starts_of(start.beginning, source)
-            steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
-            refusals: Counter[str] = Counter()
+    refuse_both("--view", view or None, **{"--save": save})
+    if offset and not with_:
+        raise typer.BadParameter("--offset is for the stamps of --with, give both")
+    start, layout, left_out = ParsedTracking.of(tracking), reading.layout, None if strict else LeftOut()
+    several, bare = start.limit != 1, start.beginning is not None
+    markers = None if marker_map is None else MarkerMap.load(marker_map)
+    numbers, others = options.numbers_of(reading.option), with_ or ()
+    about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": start.options["use"]}
+    asked = loader_options(recording, reading.loader, **about)
+    if background is not None:
+        asked["background"] = background
+    # A number that no other recording accepts belongs to this one, whose loader may reject it.
+    taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
+    asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
+    folders, network = keypoint_words(keypoints or (), layout)
+    source = join(
+        opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked),
+        keypoints=folders,
+        network=network,
+        layout=layout,
+        others=others,
+        offset=offset,
+        markers=markers,
+        numbers=numbers,
+        left_out=left_out,
+        bare=bare,
+    )
+    for words in source.assumed:
+        print_message(words)
+    for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
+        if given:
+            raise VoodooError(f"{name}: expected none with --people any or N, it is for one person")
+    used = start.settings(source)
+    places = ("depth", "points", "scan")
+    refuse_unused(
+        used_kinds(source, used.use),
+        depth_range=(tracking.depth_range, ("depth",)),
+        detector=(tracking.detector, ("depth",)),
+        exclude=(tracking.exclude, places),
+        layout=(layout, ("keypoints",)),
+        marker_map=(marker_map, ("markers",)),
+        draw_regions=(draw_regions, ("color",)),
+        background=(background, ("color",)),
+    )
+    targets, keeping = spool_of(source, out, context, upright=upright)
+    shown = Viewer(save=save, name=source.name) if view or save is not None else nullcontext()
+    with keeping as spool, shown as viewer:
+        how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
+        settings = replace(used, draw_regions=draw_regions)
+        tracker = start.tracker(source, markers=markers)
+        starts = starts_of(start.beginning, source)
+        steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+        refusals: Counter[str] = Counter()
 
-            def take(step: TrackedFrame[Any]) -> None:
-                refusals.update([tracker.refusal] if tracker.refusal else [])
-                spool.add(step.estimate, step.front_end.bodies)
+        def take(step: TrackedFrame[Any]) -> None:
+            refusals.update([tracker.refusal] if tracker.refusal else [])
+            spool.add(step.estimate, step.front_end.bodies)
 
-            with deferred():
-                done = run(source, steps, take=take, **how)
-                sample = spool.sample()
-                turn = turn_of(source, sample, targets, upright=upright)
-                files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
-        turned = upright_words(files, turn, every=upright)
-        if several:
-            count, rows = len(spool.persons), spool.states.total()
-            found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
-        else:
-            found = states(spool.states.elements())
-        message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
-        if turned:
-            print_message(turned)
-        refuse_missing([*failed, *done.failures], message)
-        print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
-        size = None if several or not spool.found else stature_of(tracker.body)
-        if not several:
-            message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
-        print_result(message, targets)
-        for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
-            print_message(f"{source.name}: {doubt}")
-        told = tracking.height or getattr(start.beginning, "height_m", None)
-        if told is None and start.beginning is None and source.start is not None:
-            told = source.start.get("height_m")
-        # Frames before a given start are meant to be without a pose.
-        begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
-        for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
-            print_message(f"{source.name}: {doubt}")
-        _print_warnings(source, spool, left_out, refusals)
+        with deferred():
+            done = run(source, steps, take=take, **how)
+            sample = spool.sample()
+            turn = turn_of(source, sample, targets, upright=upright)
+            files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
+    turned = upright_words(files, turn, every=upright)
+    if several:
+        count, rows = len(spool.persons), spool.states.total()
+        found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
+    else:
+        found = states(spool.states.elements())
+    message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
+    if turned:
+        print_message(turned)
+    refuse_missing([*failed, *done.failures], message)
+    print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
+    size = None if several or not spool.found else stature_of(tracker.body)
+    if not several:
+        message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
+    print_result(message, targets)
+    for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
+        print_message(f"{source.name}: {doubt}")
+    told = tracking.height or getattr(start.beginning, "height_m", None)
+    if told is None and start.beginning is None and source.start is not None:
+        told = source.start.get("height_m")
+    # Frames before a given start are meant to be without a pose.
+    begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
+    for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
+        print_message(f"{source.name}: {doubt}")
+    _print_warnings(source, spool, left_out, refusals)
 
 
 def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, refusals: Counter[str]) -> None:
