@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -77,7 +78,7 @@ def batch_command(
             init=init,
             model=model,
             loader=reading.loader,
-            options=reading.words(),
+            options=replace(reading, loader=None).words(),
             people=limit_of(people),
             strict=strict,
             config=config_of(config).model_dump(exclude_defaults=True),

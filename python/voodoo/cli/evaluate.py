@@ -92,11 +92,11 @@ def eval_command(
         if result is not None:
             if len(paths) != 1:
                 raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-            _show_people([evaluate_result(paths[0], result, loader=reading.loader, options=words)], out, report=report)
+            _show_people([evaluate_result(paths[0], result, options=words)], out, report=report)
             return
         if out is not None and not all(map(has_people, paths)):
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        how: dict[str, Any] = {"config": settings, "loader": reading.loader, "options": words, "model": model}
+        how: dict[str, Any] = {"config": settings, "options": words, "model": model}
         kinds = ("depth",) if depth_only else kinds_of(use)
         done = evaluate_all(paths, **how, use=kinds, init=init, jobs=jobs or cores())
         finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))

@@ -79,8 +79,6 @@ def live_command(
     if folders:
         raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
     words = replace(reading, frame=None, layout=reading.layout if network is None else None).words()
-    if reading.loader is not None:
-        words["loader"] = reading.loader
     how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
     source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
     recover_before([*(outputs.out or ()), *([outputs.record] if outputs.record is not None else [])])

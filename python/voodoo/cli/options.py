@@ -195,12 +195,12 @@ class Reading:
     ] = None
 
     def words(self) -> dict[str, Any]:
-        """Options of `open_recording` but for the loader, without those that are not given.
+        """Options of `open_recording`, without those that are not given.
 
         Raises:
             VoodooError: see `topics_of` and `numbers_of`.
         """
-        given = {"root_frame": self.frame, "layout": self.layout}
+        given = {"loader": self.loader, "root_frame": self.frame, "layout": self.layout}
         named = {name: word for name, word in given.items() if word is not None}
         return topics_of(self.topic) | numbers_of(self.option) | named
 

@@ -100,7 +100,7 @@ class ParsedTracking:
 
 def opened(path: Path, reading: Reading, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
     """Open a recording."""
-    return open_recording(path, **{"loader": reading.loader} | reading.words() | options)
+    return open_recording(path, **reading.words() | options)
 
 
 def limit_of(word: str) -> int | None:

@@ -57,7 +57,6 @@ def evaluate(
     path: Path,
     *,
     config: Config | None = None,
-    loader: str | None = None,
     options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
@@ -68,7 +67,7 @@ def evaluate(
     Args:
         path: of the recording.
         config: None means the defaults.
-        loader, options: see open_recording.
+        options: see open_recording.
         model: see start_tracker.
         use: kinds of inputs; None: all.
         init: "auto" ignores the start of the recording and searches for a person, as for recordings without a start.
@@ -76,7 +75,8 @@ def evaluate(
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, **{"loader": loader, **(options or {})} | pictures_alone(path, loader, use))
+    how = dict(options or {})
+    recording = open_recording(path, **how | pictures_alone(path, how.get("loader"), use))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []

@@ -42,20 +42,18 @@ def has_people(path: Path) -> bool:
     return find_beside(path, PEOPLE_TRUTH_FILE) is not None
 
 
-def evaluate_result(
-    path: Path, result: Path, *, loader: str | None = None, options: Mapping[str, Any] | None = None
-) -> PeopleScore:
+def evaluate_result(path: Path, result: Path, *, options: Mapping[str, Any] | None = None) -> PeopleScore:
     """Evaluate a result file, see voodoo.export.table.opened_result.
 
     Args:
         path: of the recording, with truth_people.csv beside it.
         result: .csv or .npz in the recording's root frame.
-        loader, options: see open_recording.
+        options: see open_recording.
 
     Raises:
         VoodooError: one of them cannot be read, or their stamps do not match.
     """
-    recording = open_recording(path, loader=loader, **(options or {}))
+    recording = open_recording(path, **(options or {}))
     truth = truth_of(recording)
     rows = read_rows(result)
     stamps = rows["stamps"]
@@ -104,7 +102,6 @@ def evaluate_people(
     path: Path,
     *,
     config: Config | None = None,
-    loader: str | None = None,
     options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
@@ -115,7 +112,7 @@ def evaluate_people(
     Args:
         path: of a recording with truth_people.csv beside it.
         config: None means the defaults.
-        loader, options: see open_recording.
+        options: see open_recording.
         model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
         init: of no effect, since persons are always searched for.
@@ -123,7 +120,7 @@ def evaluate_people(
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, loader=loader, **(options or {}))
+    recording = open_recording(path, **(options or {}))
     people = People(None if model is None else Body.human(model=model), config=config)
     return judge(recording, people, settings=FrontEndSettings.of(recording, use=use)), None
 
