@@ -103,17 +103,6 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:
-    """The items up to Ctrl-C, and whether it was pressed."""
-    found: list[T] = []
-    try:
-        for item in items:
-            found.append(item)
-    except KeyboardInterrupt:
-        return found, True
-    return found, False
-
-
 def print_interrupted(interrupted: bool, done: str) -> None:
     """After Ctrl-C, print what was done on stderr and exit with its code.
 

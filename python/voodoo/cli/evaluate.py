@@ -9,21 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    cores,
-    print_interrupted,
-    print_text,
-    print_written,
-    progressing,
-    reporting,
-    until_interrupted,
-)
+from voodoo.cli.common import cores, print_interrupted, print_text, print_written, progressing, reporting
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError, VoodooError
 
 if TYPE_CHECKING:
     from voodoo.evaluation.people import PeopleScore
-    from voodoo.evaluation.score import Score
 
 
 def eval_command(
@@ -99,7 +90,12 @@ def eval_command(
         how: dict[str, Any] = {"config": settings, "options": words, "model": model}
         kinds = ("depth",) if depth_only else kinds_of(use)
         done = evaluate_all(paths, **how, use=kinds, init=init, jobs=jobs or cores())
-        finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
+        finished, interrupted = [], False
+        try:
+            for item in progressing(done, "evaluating", len(paths)):
+                finished.append(item)
+        except KeyboardInterrupt:
+            interrupted = True
         finished.sort(key=lambda item: item[0])
         scores = [score for _, score, _ in finished if isinstance(score, Score)]
         several = [score for _, score, _ in finished if isinstance(score, PeopleScore)]
@@ -116,7 +112,11 @@ def eval_command(
                 tables = [table for _, score, table in finished if isinstance(score, Score)]
                 print_written(write_reports(out, scores, tables, picture=not interrupted), aside=as_json)
         print_interrupted(interrupted, f"{len(finished)} of {len(paths)} recordings are done")
-        _refuse_failures([score for _, score, _ in finished])
+        failures = [score.failure for _, score, _ in finished if score.failure]
+        if failures:
+            raise VoodooError(f"{len(failures)} of {len(finished)} recordings failed, the first: {failures[0]}")
+        if finished and all(score.nobody for _, score, _ in finished):
+            raise NoPoseError(f"nobody was found in {', '.join(score.name for _, score, _ in finished[:3])}")
 
 
 def _show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
@@ -129,17 +129,3 @@ def _show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dic
         typer.echo(people_markdown(scores))
     if out is not None:
         print_written(write_people(out, scores), aside=report is not None)
-
-
-def _refuse_failures(scores: Sequence[PeopleScore | Score]) -> None:
-    """Raise an error if a recording could not be tracked to its end, or nobody was found in any.
-
-    Raises:
-        VoodooError: names the first.
-        NoPoseError: nobody was found.
-    """
-    failures = [score for score in scores if score.failure]
-    if failures:
-        raise VoodooError(f"{len(failures)} of {len(scores)} recordings failed, the first: {failures[0].failure}")
-    if scores and all(score.nobody for score in scores):
-        raise NoPoseError(f"nobody was found in {', '.join(score.name for score in scores[:3])}")
