@@ -65,13 +65,8 @@ class Init(FirstPose):
 
     def to_json(self) -> str:
         """JSON text that `load` reads, one joint per line."""
-        entries = {
-            "format_version": self.format_version,
-            "height_m": self.height_m,
-            "stamp_s": self.stamp_s,
-            "frame": self.frame,
-        }
-        lines = [f'  "{name}": {json.dumps(value)}' for name, value in entries.items() if value is not None]
+        entries = self.model_dump(exclude={"joints"}, exclude_none=True)
+        lines = [f'  "{name}": {json.dumps(value)}' for name, value in entries.items()]
         joints = [f'    "{name}": {json.dumps(place)}' for name, place in self.joints.items()]
         lines.append('  "joints": {\n' + ",\n".join(joints) + "\n  }")
         return "{\n" + ",\n".join(lines) + "\n}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from voodoo.pipeline.starts.base import FoundStart as FoundStart
 from voodoo.pipeline.starts.base import StartFinder as StartFinder
@@ -19,15 +19,12 @@ class Starts:
     """Sources of the first pose for a front end.
 
     Args:
-        finders: evaluated in this order in every frame.
+        finders: evaluated in this order in every frame; by default those of markers, keypoints of several cameras, keypoints
+            with depth, and legs in a laser.
         by_tracker: if none of them finds a person, the tracker itself searches the depth images.
     """
 
-    finders: Sequence[StartFinder]
+    finders: Sequence[StartFinder] = field(
+        default_factory=lambda: (MarkersStart(), CamerasStart(), KeypointsDepthStart(), LegsStart())
+    )
     by_tracker: bool = True
-
-
-def automatic_starts() -> Starts:
-    """All sources for the inputs of a recording: markers, keypoints of several cameras, keypoints with depth, depth, legs in a
-    laser."""
-    return Starts((MarkersStart(), CamerasStart(), KeypointsDepthStart(), LegsStart()))
