@@ -23,7 +23,7 @@ from voodoo.drawing.rerun_log import Log, bands, entity, limb_colors
 from voodoo.errors import VoodooError, installed
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
-from voodoo.model.limb_mesh import limb_mesh
+from voodoo.model.projection import limb_mesh
 from voodoo.model.rotations import quaternions
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
