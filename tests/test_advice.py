@@ -12,7 +12,7 @@ import typer.main
 import voodoo
 from commands import run
 from voodoo.cli import app
-from voodoo.cli.common import numbers_of, topics_of
+from voodoo.cli.options import numbers_of, topics_of
 from voodoo.cli.running import kinds_of
 from voodoo.config import Config
 from voodoo.model.toml_io import parse_toml

@@ -98,7 +98,7 @@ def test_zero_distortion_is_no_distortion_and_cameras_compare_by_value():
         ({"fx": 0.0}, "fx"),
         ({"fy": float("nan")}, "fy"),
         ({"cx": "a"}, "cx"),
-        ({"distortion": (1.0, 2.0)}, "0 or 4 or 5 coefficients"),
+        ({"distortion": (1.0, 2.0)}, "0, 4 or 5 coefficients"),
         ({"distortion": (float("inf"), 0, 0, 0)}, "finite"),
         ({"distortion": None}, "distortion: expected numbers, found None"),
         ({"distortion": 0.1}, "distortion: expected numbers, found 0.1"),

@@ -3,7 +3,7 @@
 from collections import Counter
 
 from commands import run
-from voodoo.cli.closing import closing_doubts
+from voodoo.cli.track import closing_doubts
 from voodoo.recordings import sample_path
 
 

@@ -91,7 +91,7 @@ def test_what_is_far_beyond_the_world_is_refused_without_a_trace():
     "size", [(100_000, 100_000), (2**31 - 1, 1), (2**31 - 1, 2**31 - 1), (10**400, 1), (8192, 4097)]
 )
 def test_cameras_have_a_greatest_size(size):
-    with pytest.raises(CameraError, match=r"camera size: expected at most 33554432 pixels"):
+    with pytest.raises(CameraError, match=r"camera (size|width): expected .*\b1 to 33554432\b.*, found "):
         voodoo.Camera(*size, 500.0, 500.0, 0.0, 0.0)
     assert voodoo.Camera(8192, 4096, 500.0, 500.0, 0.0, 0.0).width * 4096 == MOST_PIXELS
 

@@ -22,8 +22,7 @@ from voodoo.live import Follower, Live
 from voodoo.live.session import Output, Session
 from voodoo.live.sources.played import PlayedSource
 from voodoo.measurements import ColorImage, DepthImage, KeypointImage
-from voodoo.pipeline.detected import Detected
-from voodoo.pipeline.inputs import keypoint_words
+from voodoo.pipeline.inputs import Detected, keypoint_words
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording, sample_path

@@ -10,11 +10,10 @@ from core_fakes import BASE_FROM_CAMERA, CAMERA, T_POSE, FakeRecording, depth_of
 from voodoo.errors import VoodooError
 from voodoo.model.projection import CameraView, TopView, limb_silhouette
 from voodoo.recordings import ColorImage, RecordedFrame
-from voodoo.visualization import film as film_module
+from voodoo.visualization import image_writer as film_module
 from voodoo.visualization.body_drawing import side_color
 from voodoo.visualization.image_writer import PictureWriter
-from voodoo.visualization.overlay import Overlay
-from voodoo.visualization.sheet import contact_sheet
+from voodoo.visualization.overlay import Overlay, in_rows
 
 STILL = RecordedFrame(0.0, (depth_of(T_POSE),))
 
@@ -167,9 +166,9 @@ def test_other_films_and_blocked_folders_are_refused(tmp_path):
         PictureWriter(tmp_path / "file", rate_hz=30.0)
 
 
-def test_contact_sheet_places_pictures_row_by_row():
+def test_pictures_are_placed_row_by_row():
     pictures = [np.full((30, 40, 3), value, np.uint8) for value in (10, 20, 30, 40)]
-    sheet = contact_sheet(pictures, columns=3, width=132, gap=6)
-    assert sheet.shape == (66, 132, 3)
-    assert [sheet[15, x, 0] for x in (20, 66, 112)] == [10, 20, 30]
-    assert sheet[50, 20, 0] == 40
+    sheet = in_rows(pictures, columns=3)
+    assert sheet.shape == (60, 120, 3)
+    assert [sheet[15, x, 0] for x in (20, 60, 100)] == [10, 20, 30]
+    assert [sheet[45, x, 0] for x in (20, 60, 100)] == [40, 0, 0]

@@ -12,8 +12,7 @@ from voodoo.cli import app
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.people import PeopleScore, score, together
-from voodoo.evaluation.people_evaluate import read_rows
-from voodoo.evaluation.people_report import people_markdown
+from voodoo.evaluation.people_evaluate import people_markdown, read_rows
 from voodoo.export.table import save_result
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PeopleTruth

@@ -12,14 +12,14 @@ from scene import standing_joints, turn
 from voodoo.errors import BodyError, MeasurementError, VoodooError
 from voodoo.measurements import DepthImage, KeypointImage, LaserScan, MarkerSet, RecordedFrame
 from voodoo.model.camera import Camera
-from voodoo.model.legs import legs_body
 from voodoo.pipeline.front_end import FrontEnd
-from voodoo.pipeline.start import Init, first_pose, pose_as_init, start_tracker, starts_of, stature
+from voodoo.pipeline.run import first_pose
+from voodoo.pipeline.start import Init, pose_as_init, start_tracker, starts_of, stature
 from voodoo.pipeline.starts import StartFrame, Starts
 from voodoo.pipeline.starts.cameras import CamerasStart
 from voodoo.pipeline.starts.given import GivenStart
 from voodoo.pipeline.starts.keypoints_depth import KeypointsDepthStart
-from voodoo.pipeline.starts.legs import LegsStart
+from voodoo.pipeline.starts.legs import LegsStart, legs_body
 from voodoo.pipeline.starts.markers import MarkersStart
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.keypoint_layouts import layout_of

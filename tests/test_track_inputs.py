@@ -18,7 +18,7 @@ from voodoo.cli import running
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.export import write_trc
 from voodoo.export.track import Track
-from voodoo.pipeline.inputs import join, keypoint_folders
+from voodoo.pipeline.inputs import join
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import ColorImage, DepthImage, KeypointImage, MarkerSet, Recording, open_recording, sample_path
@@ -176,7 +176,7 @@ def test_keypoints_of_the_recordings_own_camera(run, tmp_path):
     recording = open_recording(sample_path())
     keypoint_files(tmp_path / "few", recording, skip=1)
     with pytest.raises(RecordingError, match="found 88"):
-        join(recording, keypoints=keypoint_folders([f"{COLOR}={tmp_path / 'few'}"]))
+        join(recording, keypoints={COLOR: tmp_path / "few"})
     with pytest.raises(RecordingError, match="'/rear'"):
         join(recording, keypoints={"/rear": tmp_path / "few"})
     keypoint_files(tmp_path / "all", recording)

@@ -11,10 +11,9 @@ from scipy.spatial.transform import Rotation
 
 import voodoo
 from made_up import two_people
-from voodoo.drawing.body_geometry import bands, nearest_limb
-from voodoo.drawing.rerun_log import rounded_millimeters
+from voodoo.drawing.rerun_log import bands, nearest_limb, rounded_millimeters
 from voodoo.errors import VoodooError
-from voodoo.model.limb_mesh import limb_mesh
+from voodoo.model.projection import limb_mesh
 from voodoo.people import PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.pipeline.pairing import paired

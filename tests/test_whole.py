@@ -16,7 +16,7 @@ from commands import refused
 from voodoo.cli import app
 from voodoo.cli.paths import OUTPUTS
 from voodoo.evaluation.plot import plot_errors
-from voodoo.evaluation.tables import write_sequences
+from voodoo.evaluation.summary import write_sequences
 from voodoo.export.files import ONE_PERSON
 from voodoo.export.track import Track
 from voodoo.recordings import open_recording, sample_path

@@ -12,7 +12,6 @@ import argparse
 import csv
 import math
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,13 +90,9 @@ def ablate(
 
     A recording that fails is one of the ablation's `failures`; the rest goes on.
     """
-    with tempfile.TemporaryDirectory(prefix="voodoo-ablate-") as folder:
-        for index, variant in enumerate(variants(Config() if config is None else config)):
-            # The worker processes read their configuration from a file.
-            file = Path(folder) / f"{index}.toml"
-            file.write_text(variant.config.to_toml(), encoding="utf-8")
-            done = evaluate_all(paths, config_file=file, use=use, jobs=jobs)
-            yield Ablation(variant.name, tuple(score for _, score, _ in sorted(done, key=lambda item: item[0])))
+    for variant in variants(Config() if config is None else config):
+        done = evaluate_all(paths, config=variant.config, use=use, jobs=jobs)
+        yield Ablation(variant.name, tuple(score for _, score, _ in sorted(done, key=lambda item: item[0])))
 
 
 def table(ablations: Sequence[Ablation]) -> str:

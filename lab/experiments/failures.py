@@ -22,8 +22,7 @@ from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import DepthImage, RecordedFrame, Recording, RecordingInfo, Reference
 from voodoo.recordings.loaders import guess_loader, options_of
-from voodoo.visualization.overlay import Overlay
-from voodoo.visualization.sheet import contact_sheet
+from voodoo.visualization.overlay import Overlay, in_rows
 
 BONES = tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("shoulder", "elbow"), ("elbow", "wrist")))
 BONES += tuple((f"{s}_{a}", f"{s}_{b}") for s in "lr" for a, b in (("hip", "knee"), ("knee", "ankle")))
@@ -116,9 +115,7 @@ def main() -> None:
         tiles += [] if tile is None else [tile]
     if tiles:
         arguments.out.parent.mkdir(parents=True, exist_ok=True)
-        cv2.imwrite(
-            str(arguments.out), contact_sheet(tiles, columns=min(len(tiles), 4), width=min(len(tiles), 4) * WIDTH)
-        )
+        cv2.imwrite(str(arguments.out), in_rows(tiles, columns=min(len(tiles), 4)))
 
 
 if __name__ == "__main__":

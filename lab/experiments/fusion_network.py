@@ -11,7 +11,7 @@ import numpy as np
 from voodoo.evaluation.evaluate import compare
 from voodoo.evaluation.metrics import JOINTS
 from voodoo.export.track import Track
-from voodoo.pipeline.detected import Detected
+from voodoo.pipeline.inputs import Detected
 from voodoo.pipeline.run import track
 from voodoo.pipeline.start import start_tracker
 from voodoo.recordings.loaders import open_recording

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import voodoo
 from voodoo.evaluation.people import PeopleScore, together
-from voodoo.evaluation.people_evaluate import judge
-from voodoo.evaluation.people_report import people_markdown
+from voodoo.evaluation.people_evaluate import judge, people_markdown
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 

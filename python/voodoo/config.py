@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 import voodoo._core as _core
 from voodoo.errors import ConfigError, naming
 from voodoo.model.joint import valid
-from voodoo.model.toml_io import commented, parse_toml, read_text
+from voodoo.model.toml_io import parse_toml, read_text
 
 _FIELDS = {name: row for name, *row in _core.config_fields()}
 
@@ -69,16 +69,19 @@ class Config(ConfigFields, frozen=True):
 
     def to_toml(self) -> str:
         """The configuration as TOML, each entry with its meaning, unit and range."""
-        notes = {}
+        from tomlkit import item
+
+        blocks = ["# Configuration of the voodoo tracker. Lengths in meters, times in seconds, angles in radians."]
         for name, (doc, unit, _, limits, words) in _FIELDS.items():
             facts = [f"unit: {unit}"] if unit else []
             if limits:
                 facts.append(f"range: {limits[0]:g} to {limits[1]:g}")
             if words:
                 facts.append("one of: " + ", ".join(words))
-            notes[name] = [*doc.splitlines(), *([f"({'; '.join(facts)})"] if facts else [])]
-        title = "Configuration of the voodoo tracker. Lengths in meters, times in seconds, angles in radians."
-        return commented(self.values(), title=title, notes=notes)
+            notes = [*doc.splitlines(), *([f"({'; '.join(facts)})"] if facts else [])]
+            entry = f"{name} = {item(getattr(self, name)).as_string()}"
+            blocks.append("\n".join([*(f"# {line}" for line in notes), entry]))
+        return "\n\n".join(blocks) + "\n"
 
     @classmethod
     def words(cls, key: str) -> tuple[str, ...]:

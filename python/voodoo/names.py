@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias, get_args
 
+Automatic: TypeAlias = Literal["auto"]
+"""Requests a search, even if a first pose comes with the recording."""
 HumanModel: TypeAlias = Literal["measured", "full", "papers"]
 """Models of the default human, see `voodoo.Body.human`."""
 TopicKind: TypeAlias = Literal["depth", "points", "scan", "color"]

@@ -187,7 +187,7 @@ class Tracker:
         """
         self._core._learn_colors(of_kind("frame", frame, Frame, MeasurementError), self._ordered(world_from_limb))
 
-    def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.NDArray[np.float64]] | None:
+    def _ordered(self, world_from_limb: Mapping[str, npt.ArrayLike] | None) -> list[npt.ArrayLike] | None:
         return None if world_from_limb is None else ordered_poses(self.body, world_from_limb)
 
     def predict(self, stamp: float) -> dict[str, npt.NDArray[np.float64]]:

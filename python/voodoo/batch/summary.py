@@ -14,7 +14,7 @@ from urllib.parse import quote
 from pydantic import TypeAdapter
 
 from voodoo.errors import VoodooError
-from voodoo.evaluation.tables import cell
+from voodoo.evaluation.summary import cell
 
 DONE, FAILED = "done", "failed"
 REPORTS = "reports"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from voodoo.cli.evaluate import eval_command
 from voodoo.cli.ik import ik_command
 from voodoo.cli.init import init_command
 from voodoo.cli.live import live_command
+from voodoo.cli.options import grouped
 from voodoo.cli.paths import Checked
 from voodoo.cli.recover import recover_command
 from voodoo.cli.report import report_command
@@ -68,16 +70,19 @@ def voodoo_command(
     context.with_resource(redirect_stderr(Escaped(sys.stderr)))
 
 
-# In the order of `voodoo --help`.
-app.command("track", cls=Checked, short_help="Track the body through a recording: a row a frame.")(track_command)
-app.command("live", cls=Checked, short_help="Track what a camera, ROS 2 or a played recording measures.")(live_command)
-app.command("demo", cls=Checked, short_help="Track the bundled recording and draw what is found.")(demo_command)
-app.command("init", cls=Checked, short_help="Find the first pose and write it, to edit and give back.")(init_command)
-app.command("ik", cls=Checked, short_help="Find postures from a few known sites and silhouettes.")(ik_command)
-app.command("eval", cls=Checked, short_help="Measure the tracker on recordings with a truth.")(eval_command)
-app.command("batch", cls=Checked, short_help="Track a thousand recordings, one task each.")(batch_command)
-app.command("report", cls=Checked, short_help="Write a result as a web page to look at.")(report_command)
-app.command("recover", cls=Checked, short_help="Make the files of commands that were killed.")(recover_command)
-app.command("info", cls=Checked, short_help="Say what is in a recording.")(info_command)
-app.command("config", cls=Checked, short_help="Print the default configuration as commented TOML.")(config_command)
-app.command("body", cls=Checked, short_help="Print a body as TOML: the default human, or a file.")(body_command)
+_COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
+    "track": (track_command, "Track the body through a recording: a row a frame."),
+    "live": (live_command, "Track what a camera, ROS 2 or a played recording measures."),
+    "demo": (demo_command, "Track the bundled recording and draw what is found."),
+    "init": (init_command, "Find the first pose and write it, to edit and give back."),
+    "ik": (ik_command, "Find postures from a few known sites and silhouettes."),
+    "eval": (eval_command, "Measure the tracker on recordings with a truth."),
+    "batch": (batch_command, "Track a thousand recordings, one task each."),
+    "report": (report_command, "Write a result as a web page to look at."),
+    "recover": (recover_command, "Make the files of commands that were killed."),
+    "info": (info_command, "Say what is in a recording."),
+    "config": (config_command, "Print the default configuration as commented TOML."),
+    "body": (body_command, "Print a body as TOML: the default human, or a file."),
+}
+for name, (command, words) in _COMMANDS.items():
+    app.command(name, cls=Checked, short_help=words)(grouped(command))

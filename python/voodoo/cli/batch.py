@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import os
+from dataclasses import replace
 from typing import Annotated
 
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, loader_words, print_interrupted, print_message, progressing, reporting
+from voodoo.cli.common import cores, print_interrupted, print_message, progressing, reporting
 from voodoo.cli.signals import deferred
 
 
 def batch_command(
+    *,
     recordings: Annotated[
         list[str], typer.Argument(metavar="RECORDING...", help="Recordings, folders of recordings, or URLs of either.")
     ],
@@ -23,13 +24,8 @@ def batch_command(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A running Dask scheduler, tcp://HOST:PORT.")
     ] = None,
-    init: Annotated[
-        str | None,
-        typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
-    ] = None,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
-    ] = None,
+    init: options.AutoOption = None,
+    only: options.OnlyOption = None,
     time_limit: Annotated[
         float | None, typer.Option(metavar="S", min=0.001, help="A recording that takes longer has failed.")
     ] = None,
@@ -37,11 +33,7 @@ def batch_command(
     model: options.ModelOption = None,
     use: options.UseOption = None,
     people: options.PeopleOption = "1",
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
     strict: options.StrictOption = False,
     pages: Annotated[
         bool,
@@ -76,26 +68,20 @@ def batch_command(
     from voodoo.batch.storage import find_sources, is_local, local_path
     from voodoo.batch.summary import DONE, FAILED
     from voodoo.batch.task import Settings
-    from voodoo.cli.people import limit_of
-    from voodoo.cli.running import config_of, kinds_of
-    from voodoo.config import Config
+    from voodoo.cli.running import config_of, kinds_of, limit_of
     from voodoo.errors import NoPoseError, VoodooError
-    from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
-    with clear_errors(), reporting(as_json) as told:
-        if init not in (None, AUTO):
-            raise typer.BadParameter(f"--init: expected auto, found {init!r}")
-        chosen, plain = config_of(config), Config()
+    with reporting(as_json) as told:
         settings = Settings(
             use=kinds_of(use),
             init=init,
             model=model,
-            loader=loader,
-            options=loader_words(topic, option, frame=frame, layout=layout),
+            loader=reading.loader,
+            options=replace(reading, loader=None).words(),
             people=limit_of(people),
             strict=strict,
-            config={name: value for name, value in chosen.model_dump().items() if value != getattr(plain, name)},
+            config=config_of(config).model_dump(exclude_defaults=True),
             version=__version__,
         )
         sources = find_sources(recordings, only=only or ())
@@ -115,11 +101,8 @@ def batch_command(
         before = len(sources) - len(batch.jobs)
         interrupted = False
         if batch.jobs:
-            count = workers or (
-                len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-            )
             with deferred() as stop:
-                rows = run(batch.jobs, workers=count, scheduler=scheduler, stop=stop)
+                rows = run(batch.jobs, workers=workers or cores(), scheduler=scheduler, stop=stop)
                 try:
                     for row in progressing(rows, "tracking", len(batch.jobs)):
                         batch.take(row)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
-from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 import typer
 
-from voodoo.cli.options import NUMBERS, TOPICS
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.cli.terminal import READER_LEFT, Escaped
 from voodoo.errors import NoPoseError, VoodooError, reason
@@ -35,54 +34,6 @@ EXIT_CODES = {
     READER_LEFT: "what read the output has ended, as `head` does (128 + SIGPIPE); nothing more is said",
 }
 """What the exit codes of all commands mean; Typer uses 2."""
-
-
-def topics_of(words: Sequence[str] | None) -> dict[str, str | list[str]]:
-    """Options of the loader from words like "depth=/front/depth/image".
-
-    Raises:
-        VoodooError: another form or kind, or several calibrations.
-    """
-    names: dict[str, list[str]] = {}
-    for word in words or ():
-        kind, _, name = word.partition("=")
-        if kind not in TOPICS or not name:
-            raise VoodooError(f"topic: expected KIND=NAME with one of {', '.join(TOPICS)}, found {word!r}")
-        names.setdefault(kind, []).append(name)
-    if len(names.get("camera_info", ())) > 1:
-        raise VoodooError(f"topic: expected one camera_info, found {', '.join(names['camera_info'])}")
-    return {f"{kind}_topic": found if len(found) > 1 else found[0] for kind, found in names.items()}
-
-
-def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
-    """Options of the loader from words like "rate=30".
-
-    Raises:
-        VoodooError: another form or name.
-    """
-    numbers: dict[str, float] = {}
-    for word in words or ():
-        name, _, value = word.partition("=")
-        try:
-            number = float(value) if name in NUMBERS else None
-        except ValueError:
-            number = None
-        if number is None:
-            raise VoodooError(f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}")
-        numbers[name] = number
-    return numbers
-
-
-def loader_words(
-    topic: Sequence[str] | None, option: Sequence[str] | None, *, frame: str | None = None, layout: str | None = None
-) -> dict[str, Any]:
-    """Options of `open_recording` from --topic, --option, --frame and --layout, without those that are not given.
-
-    Raises:
-        VoodooError: see `topics_of` and `numbers_of`.
-    """
-    given = {"root_frame": frame, "layout": layout}
-    return topics_of(topic) | numbers_of(option) | {name: word for name, word in given.items() if word is not None}
 
 
 def refuse_both(name: str, value: object, **others: object) -> None:
@@ -147,15 +98,9 @@ def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
             yield from progress.track(items, total=total, description=words)
 
 
-def until_interrupted(items: Iterable[T]) -> tuple[list[T], bool]:
-    """The items up to Ctrl-C, and whether it was pressed."""
-    found: list[T] = []
-    try:
-        for item in items:
-            found.append(item)
-    except KeyboardInterrupt:
-        return found, True
-    return found, False
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def print_interrupted(interrupted: bool, done: str) -> None:
@@ -205,9 +150,9 @@ def print_text(text: str, *, err: bool = False) -> None:
 
 def print_json(value: object) -> None:
     """A value on stdout as JSON: dataclasses are objects, what is not known (NaN) is null."""
-    import json
+    from pydantic_core import to_json
 
-    typer.echo(json.dumps(_plain(value), indent=2, ensure_ascii=False))
+    typer.echo(to_json(value, indent=2, inf_nan_mode="null", fallback=str).decode("utf-8"))
 
 
 @contextmanager
@@ -219,17 +164,6 @@ def reporting(as_json: bool) -> Iterator[dict[str, Any] | None]:
     finally:
         if report:
             print_json(report)
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401
-    value = {name: getattr(value, name) for name in getattr(value, "__dataclass_fields__", ())} or value
-    if isinstance(value, Mapping):
-        return {str(name): _plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if isfinite(value) else None
-    return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
 def _fail(message: str, hint: str = "", *, code: int = FAILED) -> None:

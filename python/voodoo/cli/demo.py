@@ -7,9 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from voodoo.cli.common import clear_errors, refuse_missing, states
+from voodoo.cli import options
+from voodoo.cli.common import refuse_missing, states
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError
+
+_SHEET = 0.3
+"""Scale of the pictures in the sheet."""
 
 
 def demo_command(
@@ -20,6 +24,7 @@ def demo_command(
     No start is given: the person is detected first. Writes pose.csv, overlay.mp4 and sheet.png and compares the pose with the
     recording's exact ground truth.
     """
+    import cv2
     import numpy as np
 
     from voodoo._core import Estimate
@@ -30,30 +35,27 @@ def demo_command(
     from voodoo.pipeline.start import AUTO, start_tracker
     from voodoo.recordings.loaders import sample_path
     from voodoo.visualization.image_writer import save_picture
-    from voodoo.visualization.overlay import legend
-    from voodoo.visualization.sheet import contact_sheet
+    from voodoo.visualization.overlay import in_rows, legend
 
-    with clear_errors():
-        source = opened(sample_path(), None, None)
-        tracker = start_tracker(source, init=AUTO)
-        estimates: list[Estimate] = []
-        steps = track(source, tracker)
-        how: dict[str, Any] = {"overlay": out / "overlay.mp4", "sheet": 6}
-        done = run(source, steps, take=lambda step: estimates.append(step.estimate), **how)
-        seconds, sheet, interrupted, _, failures = done
-        if interrupted:
-            raise typer.Exit(INTERRUPTED)
-        result = Track.of(estimates, body=tracker.body)
-        result.save(out / "pose.csv")
-        refuse_missing(failures, f"wrote {out / 'pose.csv'}")
-        pictures = contact_sheet(sheet, columns=3)
-        save_picture(out / "sheet.png", np.vstack([pictures, legend(pictures.shape[1])]))
-        if not result.found.any():
-            raise NoPoseError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
-        errors = compare(source, result)
-        typer.echo(f"{source.name}: {len(result)} frames, {states(result.status)}")
-        typer.echo(
-            f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)"
-        )
-        typer.echo(f"mean joint error  {100 * np.nanmean(errors):.1f} cm against exact truth, twelve joints")
-        typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")
+    source = opened(sample_path(), options.Reading())
+    tracker = start_tracker(source, init=AUTO)
+    estimates: list[Estimate] = []
+    steps = track(source, tracker)
+    how: dict[str, Any] = {"overlay": out / "overlay.mp4", "sheet": 6}
+    done = run(source, steps, take=lambda step: estimates.append(step.estimate), **how)
+    seconds, sheet, interrupted, _, failures = done
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
+    result = Track.of(estimates, body=tracker.body)
+    result.save(out / "pose.csv")
+    refuse_missing(failures, f"wrote {out / 'pose.csv'}")
+    whole = in_rows(sheet, columns=3)
+    pictures = cv2.resize(whole, None, fx=_SHEET, fy=_SHEET, interpolation=cv2.INTER_AREA)
+    save_picture(out / "sheet.png", np.vstack([pictures.astype(np.uint8), legend(pictures.shape[1])]))
+    if not result.found.any():
+        raise NoPoseError(f"{source.name}: expected somebody, found nobody in {len(result)} frames")
+    errors = compare(source, result)
+    typer.echo(f"{source.name}: {len(result)} frames, {states(result.status)}")
+    typer.echo(f"time of a frame   {1e3 * np.mean(seconds):.2f} ms (mean), {1e3 * np.median(seconds):.2f} ms (median)")
+    typer.echo(f"mean joint error  {100 * np.nanmean(errors):.1f} cm against exact truth, twelve joints")
+    typer.echo(f"wrote             {out / 'pose.csv'}, {out / 'overlay.mp4'}, {out / 'sheet.png'}")

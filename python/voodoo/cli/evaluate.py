@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    loader_words,
-    print_interrupted,
-    print_text,
-    print_written,
-    progressing,
-    reporting,
-    until_interrupted,
-)
+from voodoo.cli.common import cores, print_interrupted, print_text, print_written, progressing, reporting
 from voodoo.cli.signals import deferred
+from voodoo.errors import NoPoseError, VoodooError
+
+if TYPE_CHECKING:
+    from voodoo.evaluation.people import PeopleScore
 
 
 def eval_command(
+    *,
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING...", help="Recordings, or folders of recordings.")
     ],
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for tables and plots.")] = None,
-    init: Annotated[
-        str | None,
-        typer.Option(metavar="auto", help="auto: search for the person instead of using the recordings' starts."),
-    ] = None,
+    init: options.AutoOption = None,
     config: options.ConfigOption = None,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Number of parallel recordings; by default one per core.")
     ] = None,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Only recordings whose name matches, e.g. 'a0?_s1_*'.")
-    ] = None,
+    only: options.OnlyOption = None,
     model: options.ModelOption = None,
     use: options.UseOption = None,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="The same as --use depth.")] = False,
@@ -47,11 +38,7 @@ def eval_command(
             metavar="FILE.csv", help="Evaluate this result of several persons in one RECORDING, instead of tracking."
         ),
     ] = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
     as_json: options.JsonOption = False,
 ) -> None:
     """Track recordings with ground truth or a reference skeleton, and evaluate the result.
@@ -76,63 +63,69 @@ def eval_command(
 
     voodoo eval two_walk/ --result theirs.csv
     """
-    from voodoo.cli.people import refuse_failures, show_people
     from voodoo.cli.running import config_of, kinds_of
     from voodoo.evaluation.evaluate import evaluate_all
-    from voodoo.evaluation.figure import new_figure
-    from voodoo.evaluation.people_evaluate import evaluate_all_people, evaluate_result, has_people
+    from voodoo.evaluation.people import PeopleScore
+    from voodoo.evaluation.people_evaluate import evaluate_result, has_people
+    from voodoo.evaluation.plot import new_figure
     from voodoo.evaluation.report import brief, write_reports
+    from voodoo.evaluation.score import Score
     from voodoo.evaluation.search import find_recordings
     from voodoo.evaluation.summary import summarize
-    from voodoo.pipeline.start import AUTO
     from voodoo.whole import check_outputs
 
-    with clear_errors(), reporting(as_json) as report:
-        if init not in (None, AUTO):
-            raise typer.BadParameter(f"--init: expected auto, found {init!r}")
-        automatic = None if init is None else AUTO
-        words = loader_words(topic, option, frame=frame, layout=layout)
-        config_of(config)  # an invalid file is one error here instead of one per recording
+    with reporting(as_json) as report:
+        words = reading.words()
+        settings = config_of(config)
         paths = find_recordings(recordings, only=only or ())
         if out is not None:
             check_outputs([out], paths)
         if result is not None:
             if len(paths) != 1:
                 raise typer.BadParameter(f"--result is the result of one recording, found {len(paths)}")
-            show_people([evaluate_result(paths[0], result, loader=loader, options=words)], out, report=report)
+            _show_people([evaluate_result(paths[0], result, options=words)], out, report=report)
             return
-        jobs = jobs if jobs is not None else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-        kinds = ("depth",) if depth_only else kinds_of(use)
-        several = [path for path in paths if has_people(path)]
-        how: dict[str, Any] = {
-            "config_file": config,
-            "loader": loader,
-            "options": words,
-            "model": model,
-            "use": kinds,
-        }
-        judgments = list(progressing(evaluate_all_people(several, **how), "following everybody", len(several)))
-        if several:
-            show_people(judgments, out, report=report)
-            refuse_failures(judgments)
-        paths = [path for path in paths if path not in several]
-        if not paths:
-            return
-        if out is not None:
+        if out is not None and not all(map(has_people, paths)):
             new_figure(1.0, 1.0)  # a missing library is reported before the work
-        done = evaluate_all(paths, **how, init=automatic, jobs=jobs)
-        finished, interrupted = until_interrupted(progressing(done, "evaluating", len(paths)))
-        ordered = sorted(finished, key=lambda item: item[0])
-        scores, tables = [item[1] for item in ordered], [item[2] for item in ordered]
-        if report is not None:
-            report |= {"summaries": summarize(scores), "recordings": scores}
-        elif scores:
-            print_text(brief(scores))
-            if out is None:
-                typer.echo("--out DIR writes all measures, a row for every recording, and one for every frame")
-        if out is not None and scores:
-            with deferred():
-                files = write_reports(out, scores, tables, picture=not interrupted)
-            print_written(files, aside=as_json)
-        print_interrupted(interrupted, f"{len(scores)} of {len(paths)} recordings are done")
-        refuse_failures(scores)
+        how: dict[str, Any] = {"config": settings, "options": words, "model": model}
+        kinds = ("depth",) if depth_only else kinds_of(use)
+        done = evaluate_all(paths, **how, use=kinds, init=init, jobs=jobs or cores())
+        finished, interrupted = [], False
+        try:
+            for item in progressing(done, "evaluating", len(paths)):
+                finished.append(item)
+        except KeyboardInterrupt:
+            interrupted = True
+        finished.sort(key=lambda item: item[0])
+        scores = [score for _, score, _ in finished if isinstance(score, Score)]
+        several = [score for _, score, _ in finished if isinstance(score, PeopleScore)]
+        with deferred():
+            if several:
+                _show_people(several, out, report=report)
+            if report is not None:
+                report |= {"summaries": summarize(scores), "recordings": scores}
+            elif scores:
+                print_text(brief(scores))
+                if out is None:
+                    typer.echo("--out DIR writes all measures, a row for every recording, and one for every frame")
+            if out is not None and scores:
+                tables = [table for _, score, table in finished if isinstance(score, Score)]
+                print_written(write_reports(out, scores, tables, picture=not interrupted), aside=as_json)
+        print_interrupted(interrupted, f"{len(finished)} of {len(paths)} recordings are done")
+        failures = [score.failure for _, score, _ in finished if score.failure]
+        if failures:
+            raise VoodooError(f"{len(failures)} of {len(finished)} recordings failed, the first: {failures[0]}")
+        if finished and all(score.nobody for _, score, _ in finished):
+            raise NoPoseError(f"nobody was found in {', '.join(score.name for _, score, _ in finished[:3])}")
+
+
+def _show_people(scores: Sequence[PeopleScore], out: Path | None, *, report: dict[str, Any] | None) -> None:
+    """Print and write the table of several persons."""
+    from voodoo.evaluation.people_evaluate import DERIVED, people_markdown, write_people
+
+    if report is not None:
+        report["people"] = [{**vars(score), **{name: getattr(score, name) for name in DERIVED}} for score in scores]
+    else:
+        typer.echo(people_markdown(scores))
+    if out is not None:
+        print_written(write_people(out, scores), aside=report is not None)

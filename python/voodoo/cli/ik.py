@@ -9,22 +9,13 @@ from typing import Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    loader_words,
-    print_interrupted,
-    print_message,
-    print_result,
-    refuse_both,
-    refuse_missing,
-    states,
-    wrote,
-)
+from voodoo.cli.common import print_interrupted, print_message, print_result, refuse_missing, states, wrote
 from voodoo.cli.signals import deferred
 from voodoo.errors import NoPoseError
 
 
 def ik_command(
+    *,
     context: typer.Context,
     recording: options.RecordingArgument,
     targets: Annotated[
@@ -50,9 +41,7 @@ def ik_command(
         ),
     ] = True,
     init: options.InitOption = None,
-    body: options.BodyOption = None,
-    height: options.HeightOption = None,
-    model: options.ModelOption = None,
+    human: options.Human,
     out: Annotated[
         list[Path] | None,
         typer.Option(
@@ -60,11 +49,7 @@ def ik_command(
             help=f"{options.RESULTS}; by default NAME_ik.csv.",
         ),
     ] = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
 ) -> None:
     """Compute postures and joint angles from a few known sites and the person's silhouettes (inverse kinematics).
 
@@ -81,49 +66,41 @@ def ik_command(
     from voodoo.cli.running import opened, run, spool_of, turn_of
     from voodoo.export.files import upright_words
     from voodoo.export.track import Track
-    from voodoo.model.body import Body
     from voodoo.people import ONE
     from voodoo.pipeline.ik import Solved, follow, known_positions
-    from voodoo.pipeline.start import beginning_of, first_pose, start_tracker, starts_of
+    from voodoo.pipeline.run import first_pose
+    from voodoo.pipeline.start import beginning_of, start_tracker, starts_of
 
-    with clear_errors():
-        refuse_both("--body", body, **{"--height": height, "--model": model})
-        beginning = beginning_of(init)
-        source = opened(recording, loader, frame, **loader_words(topic, option, layout=layout))
-        files, keeping = spool_of(source, out, context, suffix="_ik.csv")
-        with keeping as spool:
-            positions = known_positions(source, None if targets is None else Track.load(targets))
-            tracker = start_tracker(
-                source,
-                init=beginning,
-                body=None if body is None else Body.load(body),
-                height=height,
-                model=model,
+    beginning = beginning_of(init)
+    source = opened(recording, reading)
+    files, keeping = spool_of(source, out, context, suffix="_ik.csv")
+    with keeping as spool:
+        positions = known_positions(source, None if targets is None else Track.load(targets))
+        tracker = start_tracker(source, init=beginning, **human.start())
+        if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
+            raise NoPoseError(
+                f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
             )
-            if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
-                raise NoPoseError(
-                    f"{source.name}: expected somebody to start from, found nobody; give a pose with --init FILE"
-                )
-            known = None if sites is None else tuple(name.strip() for name in sites.split(","))
-            how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
-            errors: Counter[str] = Counter()
-            compared: Counter[str] = Counter()
+        known = None if sites is None else tuple(name.strip() for name in sites.split(","))
+        how: Any = {"sites": known, "pictures": pictures, "warm": not alone, "rest": rest}
+        errors: Counter[str] = Counter()
+        compared: Counter[str] = Counter()
 
-            def take(step: Solved) -> None:
-                errors.update(step.errors)
-                compared.update(step.errors.keys())
-                spool.add(step.track, {ONE: tracker.body})
+        def take(step: Solved) -> None:
+            errors.update(step.errors)
+            compared.update(step.errors.keys())
+            spool.add(step.track, {ONE: tracker.body})
 
-            steps = follow(source, tracker, positions, **how)
-            with deferred():
-                done = run(source, steps, take=take)
-                turn = turn_of(source, spool.sample(), files)
-                written, failed = spool.write(turn=turn)
-        for name, count in compared.items():
-            print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", files)
-        message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
-        refuse_missing([*failed, *done.failures], message)
-        print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
-        print_result(message, files)
-        if words := upright_words(written, turn):
-            print_message(words)
+        steps = follow(source, tracker, positions, **how)
+        with deferred():
+            done = run(source, steps, take=take)
+            turn = turn_of(source, spool.sample(), files)
+            written, failed = spool.write(turn=turn)
+    for name, count in compared.items():
+        print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", files)
+    message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
+    refuse_missing([*failed, *done.failures], message)
+    print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
+    print_result(message, files)
+    if words := upright_words(written, turn):
+        print_message(words)

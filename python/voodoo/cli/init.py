@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, loader_words, refuse_both
 from voodoo.errors import NoPoseError, VoodooError
 
 
 def init_command(
+    *,
     recording: options.RecordingArgument,
     at: Annotated[
         float | None,
@@ -22,17 +22,11 @@ def init_command(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write; by default stdout.")] = None,
-    body: options.BodyOption = None,
-    height: options.HeightOption = None,
-    model: options.ModelOption = None,
+    human: options.Human,
     config: options.ConfigOption = None,
     use: options.UseOption = None,
     exclude: options.ExcludeOption = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
 ) -> None:
     """Find the first pose and write it as JSON for --init of voodoo track.
 
@@ -49,42 +43,31 @@ def init_command(
     from dataclasses import replace
 
     from voodoo.cli.running import boxes_of, config_of, kinds_of, opened
-    from voodoo.model.body import Body
-    from voodoo.pipeline.start import AUTO, first_pose, pose_as_init, start_tracker
+    from voodoo.pipeline.run import first_pose
+    from voodoo.pipeline.start import AUTO, pose_as_init, start_tracker
     from voodoo.recordings.left_out import LeftOut
     from voodoo.sensors.settings import FrontEndSettings
     from voodoo.whole import write_whole
 
-    with clear_errors():
-        refuse_both("--body", body, **{"--height": height, "--model": model})
-        kinds, boxes = kinds_of(use), boxes_of(exclude)
-        left_out = LeftOut()
-        words = loader_words(topic, option, layout=layout)
-        source = opened(recording, loader, frame, bare=True, left_out=left_out, **words)
-        about = source.info()
-        after = about.start_stamp
-        if at is not None:
-            after = at if at > about.duration else about.start_stamp + at
-            if not about.start_stamp <= after <= about.start_stamp + about.duration:
-                raise VoodooError(
-                    f"--at: expected 0 to {about.duration:.3f} s, or a stamp from {about.start_stamp:.3f} s on, found {at}"
-                )
-        tracker = start_tracker(
-            source,
-            init=AUTO,
-            body=None if body is None else Body.load(body),
-            height=height,
-            model=model,
-            config=config_of(config),
-            use=kinds,
-        )
-        settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
-        estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
-        if estimate is None:
-            raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
-        text = pose_as_init(estimate, tracker.body).to_json()
-        if out is None:
-            typer.echo(text)
-        else:
-            write_whole(out, text + "\n")
-            typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")
+    kinds, boxes = kinds_of(use), boxes_of(exclude)
+    left_out = LeftOut()
+    source = opened(recording, reading, bare=True, left_out=left_out)
+    about = source.info()
+    after = about.start_stamp
+    if at is not None:
+        after = at if at > about.duration else about.start_stamp + at
+        if not about.start_stamp <= after <= about.start_stamp + about.duration:
+            raise VoodooError(
+                f"--at: expected 0 to {about.duration:.3f} s, or a stamp from {about.start_stamp:.3f} s on, found {at}"
+            )
+    tracker = start_tracker(source, init=AUTO, **human.start(), config=config_of(config), use=kinds)
+    settings = replace(FrontEndSettings.of(source, use=kinds), exclude=boxes)
+    estimate = first_pose(source, tracker, settings=settings, after=after, left_out=left_out)
+    if estimate is None:
+        raise NoPoseError(f"{source.name}: expected somebody from {after:.3f} s on, found nobody")
+    text = pose_as_init(estimate, tracker.body).to_json()
+    if out is None:
+        typer.echo(text)
+    else:
+        write_whole(out, text + "\n")
+        typer.echo(f"{source.name}: pose at {estimate.stamp:.3f} s; wrote {out}")

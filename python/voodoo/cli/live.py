@@ -8,18 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    loader_words,
-    print_message,
-    print_text,
-    refuse_both,
-)
+from voodoo.cli.common import print_message, print_text, refuse_both
 from voodoo.cli.signals import INTERRUPTED
 from voodoo.errors import NoPoseError, VoodooError
 
 
 def live_command(
+    *,
     sources: Annotated[
         list[str],
         typer.Argument(
@@ -28,64 +23,19 @@ def live_command(
             "recording to play.",
         ),
     ],
-    init: options.InitOption = None,
-    body: options.BodyOption = None,
-    height: options.HeightOption = None,
-    model: options.ModelOption = None,
-    config: options.ConfigOption = None,
-    detector: options.DetectorOption = None,
-    people: options.PeopleOption = "1",
-    out: options.OutOption = None,
-    record: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.mcap",
-            help="Write inputs and results to a file for voodoo track; it contains images of people.",
-        ),
-    ] = None,
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Write rate, latency, drops and faults at the end.")
-    ] = None,
+    tracking: options.Tracking,
+    outputs: options.Outputs,
     duration: Annotated[float | None, typer.Option(metavar="S", min=0.0, help="End after this time.")] = None,
     rate: Annotated[float, typer.Option(metavar="N", help="Speed factor for a recording.")] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="Repeat a recording.")] = False,
-    to: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Send poses to vmc://HOST[:PORT] or ros2://, or serve them at ws://[HOST][:PORT] or "
-            "foxglove://[HOST][:PORT]; repeatable (pip install 'voodoo-tracker[stream,foxglove]').",
-        ),
-    ] = None,
-    publish: Annotated[
-        bool | None,
-        typer.Option(
-            "--publish/--no-publish",
-            help="Publish transforms, joint states and markers on ROS 2; by default if a source is ros2.",
-        ),
-    ] = None,
-    view: options.ViewOption = False,
-    serve: Annotated[
-        str | None,
-        typer.Option(
-            metavar="[HOST:]PORT", help="Show it in a browser with Rerun's web viewer; on 127.0.0.1 by default."
-        ),
-    ] = None,
-    use: options.UseOption = None,
-    depth_range: options.DepthRangeOption = None,
     calibration: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="FILE.toml", help="Pose of a camera (root_frame, root_from_sensor): one for each SOURCE, in order."
         ),
     ] = None,
-    exclude: options.ExcludeOption = None,
-    frame: options.FrameOption = None,
-    topic: options.TopicOption = None,
-    option: options.LoaderNumberOption = None,
-    loader: options.LoaderOption = None,
+    reading: options.Reading,
     keypoints: options.KeypointsOption = None,
-    layout: options.LayoutOption = None,
 ) -> None:
     """Track live measurements of a source: always the newest frame; frames that arrive too fast are dropped and counted.
 
@@ -106,59 +56,37 @@ def live_command(
 
     voodoo live ros2:/camera/depth/image_rect_raw --people any --report live.json
     """
-    from voodoo.cli.live_run import Wishes, entered, run
-    from voodoo.cli.people import limit_of, no_starts
+    from dataclasses import replace
+
+    from voodoo.cli.live_run import entered, run
     from voodoo.cli.recover import recover_before
-    from voodoo.cli.running import boxes_of, config_of, depth_filter_of, detector_of, kinds_of
+    from voodoo.cli.running import ParsedTracking
     from voodoo.export.files import STDOUT, check_target
-    from voodoo.model.body import Body
     from voodoo.pipeline.inputs import keypoint_words
-    from voodoo.pipeline.start import beginning_of
 
-    with clear_errors():
-        refuse_both("--body", body, **{"--height": height, "--model": model})
-        refuse_both("--view", view or None, **{"--serve": serve})
-        if list(sources) == ["ros2:"]:
-            from voodoo.live.sources.ros2 import listing
+    refuse_both("--view", outputs.view or None, **{"--serve": outputs.serve})
+    if list(sources) == ["ros2:"]:
+        from voodoo.live.sources.ros2 import listing
 
-            print_text("\n".join(listing() or ["nothing is published on this network"]))
-            return
-        limit = limit_of(people)
-        for target in out or ():
-            check_target(target)
-        wishes = Wishes(
-            limit=limit,
-            beginning=beginning_of(init) if limit == 1 else no_starts(init),
-            start={
-                "body": None if body is None else Body.load(body),
-                "height": height,
-                "model": model,
-                "config": config_of(config),
-                "use": kinds_of(use),
-                "detector": detector_of(detector),
-            },
-            settings={"depth_filter": depth_filter_of(depth_range), "exclude": boxes_of(exclude)},
-            targets=out or (),
-            record=record,
-            to=to or (),
-            view=view,
-            serve=serve,
-            publish=any(source.startswith("ros2:") for source in sources) if publish is None else publish,
-        )
-        folders, network = keypoint_words(keypoints or (), layout)
-        if folders:
-            raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
-        words = loader_words(topic, option, layout=layout if network is None else None)
-        if loader is not None:
-            words["loader"] = loader
-        how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": frame, "options": words}
-        source = entered(sources, calibration or (), several=limit != 1, network=network, **how)
-        recover_before([*wishes.targets, *([record] if record is not None else [])])
-        done = run(source, wishes, duration=duration, report=report)
-        for path in done.written:
-            if path != STDOUT:
-                print_message(f"wrote {path}")
-        if done.ended:
-            raise typer.Exit(INTERRUPTED)
-        if not done.with_pose:
-            raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")
+        print_text("\n".join(listing() or ["nothing is published on this network"]))
+        return
+    for target in outputs.out or ():
+        check_target(target)
+    start = ParsedTracking.of(tracking)
+    if outputs.publish is None:
+        outputs = replace(outputs, publish=any(source.startswith("ros2:") for source in sources))
+    folders, network = keypoint_words(keypoints or (), reading.layout)
+    if folders:
+        raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
+    words = replace(reading, frame=None, layout=reading.layout if network is None else None).words()
+    how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
+    source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
+    recover_before([*(outputs.out or ()), *([outputs.record] if outputs.record is not None else [])])
+    written, ended, with_pose = run(source, start, outputs, duration=duration)
+    for path in written:
+        if path != STDOUT:
+            print_message(f"wrote {path}")
+    if ended:
+        raise typer.Exit(INTERRUPTED)
+    if not with_pose:
+        raise NoPoseError("not one pose was published: nothing could be used, or nobody was found")

@@ -8,14 +8,14 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from voodoo._core import Estimate
 from voodoo.cli.common import print_message
+from voodoo.cli.options import Outputs
+from voodoo.cli.running import ParsedTracking
 from voodoo.cli.signals import deferred
 from voodoo.errors import VoodooError, reason
 from voodoo.export.ros2 import cdr, description, instant
@@ -29,24 +29,16 @@ from voodoo.live.session import Output, Session
 from voodoo.live.sinks.registry import sink_of
 from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
-from voodoo.measurements import DepthImage
 from voodoo.model.body import Body
-from voodoo.model.camera import Camera
 from voodoo.people import ONE, PeopleEstimate
-from voodoo.pipeline.start import Beginning, start_people, start_tracker, starts_of
+from voodoo.pipeline.start import starts_of
+from voodoo.recordings.loaders import open_recording
+from voodoo.recordings import sample_path
 from voodoo.sensors.keypoints.networks import KeypointNetwork
-from voodoo.sensors.settings import FrontEndSettings
-from voodoo.synthetic.render import render_depth
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
 from voodoo.whole import write_whole
 
-_STANDING = {
-    "l_shoulder": (2.4, 0.19, 1.42),
-    "r_shoulder": (2.4, -0.19, 1.42),
-    "l_hip": (2.4, 0.09, 0.93),
-    "r_hip": (2.4, -0.09, 0.93),
-}
 ROS2 = "ros2://"
 """Address of `--publish`."""
 _TICK_S = 0.05
@@ -57,31 +49,6 @@ _NO_SCREEN = "--save FILE.rrd writes a file"
 """Advice in the error of `Viewer` without a screen."""
 _SWITCH_S = 5e-4
 """Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """Settings of the command line: largest number of persons, options of start_tracker and of FrontEndSettings, outputs."""
-
-    limit: int | None
-    beginning: Beginning | None
-    start: Mapping[str, Any]
-    settings: Mapping[str, Any]
-    targets: Sequence[Path]
-    record: Path | None
-    to: Sequence[str]
-    view: bool
-    serve: str | None
-    publish: bool
-
-
-@dataclass
-class Done:
-    """Result of a session: whether a signal ended it, the number of steps with a person, and the written files."""
-
-    ended: bool = False
-    with_pose: int = 0
-    written: list[Path] = field(default_factory=list)
 
 
 def entered(
@@ -115,31 +82,30 @@ def entered(
     return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
-def run(live: Live, wishes: Wishes, *, duration: float | None, report: Path | None) -> Done:
+def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
+
+    Returns:
+        The written files, whether a signal ended the session, and the number of steps with a person.
 
     Raises:
         VoodooError, OSError: a source or an output failed.
     """
-    done = Done()
     warm_up()
     with _prompt_threads(), deferred() as ended, live:
-        outputs, files = _outputs(live, wishes)
-        session = Session(live, lambda frame: _follower(live, wishes, frame), outputs=outputs)
+        outputs, files = _outputs(live, wanted)
+        session = Session(live, lambda frame: _follower(start, FirstFrame(live, frame)), outputs=outputs)
         try:
             _check_states(session, ended, duration)
         finally:
             try:
                 session.finish()
             finally:
-                if report is not None:
-                    write_whole(report, json.dumps(session.report(), indent=2) + "\n")
+                if wanted.report is not None:
+                    write_whole(wanted.report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
-        done.ended, done.with_pose = ended.is_set(), session.with_pose
-        if files is not None:
-            done.written += files.written
-        done.written += [path for path in (wishes.record, report) if path is not None and path.exists()]
-    return done
+        others = [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
+        return [*(files.written if files is not None else ()), *others], ended.is_set(), session.with_pose
 
 
 def _check_states(session: Session, ended: threading.Event, duration: float | None) -> None:
@@ -155,29 +121,29 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
             print_message(session.line())
 
 
-def _follower(live: Live, wishes: Wishes, frame: LiveFrame) -> Follower:
-    first = FirstFrame(live, frame)
-    settings = replace(FrontEndSettings.of(first, use=wishes.start["use"]), **wishes.settings)
-    if wishes.limit != 1:
-        return Follower(people=lambda: start_people(first, limit=wishes.limit, **wishes.start), settings=settings)
-    tracker = start_tracker(first, init=wishes.beginning, **wishes.start)
-    return Follower(tracker, settings=settings, starts=starts_of(wishes.beginning, first))
+def _follower(start: ParsedTracking, first: FirstFrame) -> Follower:
+    if start.limit != 1:
+        return Follower(people=lambda: start.tracker(first), settings=start.settings(first))
+    starts = starts_of(start.beginning, first)
+    return Follower(start.tracker(first), settings=start.settings(first), starts=starts)
 
 
-def _outputs(live: Live, wishes: Wishes) -> tuple[list[Output], FileOutput | None]:
+def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | None]:
     # Addresses come first: one that is of no use leaves no file behind.
-    addresses = [*wishes.to, *([ROS2] if wishes.publish and ROS2 not in wishes.to else [])]
+    addresses = list(wanted.to or ())
+    if wanted.publish and ROS2 not in addresses:
+        addresses.append(ROS2)
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
     files = None
-    if wishes.targets:
-        files = FileOutput(wishes.targets, root_frame=lambda: live.root_frame)
+    if wanted.out:
+        files = FileOutput(wanted.out, root_frame=lambda: live.root_frame)
         outputs.append(files)
-    if wishes.record is not None:
-        outputs.append(Recorder(wishes.record, root_frame=lambda: live.root_frame))
-        print_message(f"{wishes.record} stores pictures of people")
-    if wishes.view or wishes.serve is not None:
+    if wanted.record is not None:
+        outputs.append(Recorder(wanted.record, root_frame=lambda: live.root_frame))
+        print_message(f"{wanted.record} stores pictures of people")
+    if wanted.view or wanted.serve is not None:
         try:
-            viewer = Viewer(name=live.sources[0].name, serve=wishes.serve)
+            viewer = Viewer(name=live.sources[0].name, serve=wanted.serve)
         except VoodooError as error:
             raise VoodooError(str(error).replace(_NO_SCREEN, "--serve PORT shows it in a browser")) from error
         outputs.append(ShowOutput(viewer))
@@ -256,18 +222,10 @@ def _prompt_threads() -> Iterator[None]:
 
 
 def warm_up() -> None:
-    """Run initialization that would delay the first frames: track a person in a small image and serialize the result."""
-    camera = Camera(80, 60, 66.0, 66.0, 39.5, 29.5)
-    body = Body.human()
-    tracker = Tracker(body)
-    tracker.reset(joints=_STANDING, fit_sizes=False)
-    pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
-    observed = render_depth(body, tracker.estimate.world_from_limb, camera=camera, world_from_sensor=pose).depth
-    image = np.where(np.isfinite(observed) & (observed > 0.0), observed, 4.0).astype(np.float32)
+    """Run initialization that would delay the first frames: track some of the bundled recording and serialize the result."""
     follower = Follower(Tracker(Body.human()))
-    for number in range(3):
-        item = DepthImage("warm", float(number), image + np.float32(0.001 * number), 1.0, camera, pose)
-        step = follower.step(LiveFrame(float(number), (item,), number, 0.0, 0.0, False))
+    for number, recorded in enumerate(islice(open_recording(sample_path()), 3)):
+        step = follower.step(LiveFrame(recorded.stamp, recorded.measurements, number, 0.0, 0.0, False))
     messages = instant(step.estimates[ONE], step.bodies[ONE], root_frame="base_link", person="p1")
     for message in (messages | description(step.bodies[ONE], "p1")).values():
         cdr(message)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +23,13 @@ _FILES = re.compile(r"\b(RECORDING|SOURCE|FILE|DIR|PATH)\b")
 
 
 class Checked(TyperCommand):
-    """A command that begins only if nothing it writes is in the place of what it reads, and that signals end."""
+    """A command that begins only if nothing it writes is in the place of what it reads, and that signals end; its errors are
+    lines."""
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - Typer brings its own Click, or uses the installed one
         """Check the options, then run the command."""
-        with clear_errors():
+        with ending(), clear_errors():
             check_paths(ctx)
-        with ending():
             return super().invoke(ctx)
 
 
@@ -48,7 +48,8 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
     outputs, inputs = list(default), []
     for option in context.command.params:
         if option.name is not None and option.metavar != SEARCHED and _FILES.search(option.metavar or ""):
-            words = list(_words(context.params.get(option.name)))
+            value = context.params.get(option.name)
+            words = [str(one) for one in (value if isinstance(value, list | tuple) else [value]) if one is not None]
             if option.name in OUTPUTS:
                 outputs += [Path(word) for word in words if "://" not in word]
             else:
@@ -57,11 +58,3 @@ def check_paths(context: typer.Context, default: Sequence[Path] = ()) -> None:
     folders = {folder for path in inputs for folder in (path.parent, path.parent.parent)}
     inputs += [folder / name for folder in sorted(folders) for name in _BESIDE]
     check_outputs(outputs, inputs, numbered=context.params.get("people") not in (None, "1"))
-
-
-def _words(value: object) -> Iterator[str]:
-    if isinstance(value, list | tuple):
-        for each in value:
-            yield from _words(each)
-    elif value is not None:
-        yield str(value)

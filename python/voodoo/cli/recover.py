@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors, print_message, refuse_missing, wrote
+from voodoo.cli.common import print_message, refuse_missing, wrote
 from voodoo.errors import VoodooError, reason
 
 
@@ -22,13 +22,12 @@ def recover_command(
     """
     from voodoo.export.spool import recover
 
-    with clear_errors():
-        if not folder.is_dir():
-            raise VoodooError(f"{folder}: expected a folder, found none")
-        done, failed = recover(folder)
-        message = f"{len(done)} files recovered{wrote(done)}"
-        refuse_missing(failed, message)
-        typer.echo(message)
+    if not folder.is_dir():
+        raise VoodooError(f"{folder}: expected a folder, found none")
+    done, failed = recover(folder)
+    message = f"{len(done)} files recovered{wrote(done)}"
+    refuse_missing(failed, message)
+    typer.echo(message)
 
 
 def recover_before(targets: Sequence[Path]) -> None:

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from voodoo.cli.common import clear_errors
 from voodoo.errors import VoodooError
 
 
@@ -32,10 +31,9 @@ def report_command(
     from voodoo.visualization.report_page import report_page
     from voodoo.whole import write_whole
 
-    with clear_errors():
-        if out.suffix != ".html":
-            raise VoodooError(f"{out}: expected a name that ends in .html, found {out.suffix!r}")
-        people = PeopleTrack.load(result)
-        tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
-        write_whole(out, report_page(result.stem, tracks, film=film))
-        typer.echo(f"wrote {out}")
+    if out.suffix != ".html":
+        raise VoodooError(f"{out}: expected a name that ends in .html, found {out.suffix!r}")
+    people = PeopleTrack.load(result)
+    tracks = {f"person {number}": people.unbroken(number) for number in people.tracks}
+    write_whole(out, report_page(result.stem, tracks, film=film))
+    typer.echo(f"wrote {out}")

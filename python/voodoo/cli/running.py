@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -12,6 +13,7 @@ import numpy as np
 import typer
 
 from voodoo.cli.common import print_message, progressing
+from voodoo.cli.options import Reading, Tracking
 from voodoo.cli.paths import check_paths
 from voodoo.cli.recover import recover_before
 from voodoo.cli.signals import deferred
@@ -25,11 +27,11 @@ from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, by_feet, by_floor, lying_words
 from voodoo.pipeline.floor import seen_floor
 from voodoo.pipeline.run import TrackedFrame
+from voodoo.pipeline.start import AUTO, Beginning, beginning_of, start_people, start_tracker
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
-from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.settings import LEVEL_FRAMES, Box, FrontEndSettings
 from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.overlay import Overlay
@@ -51,11 +53,65 @@ class Run(NamedTuple):
     failures: list[Exception]
 
 
-def opened(path: Path, loader: str | None, frame: str | None, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
-    """Open a recording, in the requested root frame."""
-    if frame is not None:
-        options["root_frame"] = frame
-    return open_recording(path, loader=loader, **options)
+@dataclass(frozen=True)
+class ParsedTracking:
+    """How a tracker starts, by the options of a command.
+
+    Args:
+        limit: largest number of persons; None: any.
+        beginning: first pose; with several persons they are searched for.
+        options: others of `start_tracker`.
+        filters: entries of FrontEndSettings.
+    """
+
+    limit: int | None
+    beginning: Beginning | None
+    options: Mapping[str, Any]
+    filters: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, asked: Tracking) -> ParsedTracking:
+        """Parse the options.
+
+        Raises:
+            typer.BadParameter: options that exclude each other.
+            VoodooError: an option of another form, or a file that is wrong.
+        """
+        limit = limit_of(asked.people)
+        if limit != 1 and asked.init not in (None, AUTO):
+            raise VoodooError(
+                f"init: expected none with --people any or N, where everybody is looked for, found {asked.init}"
+            )
+        detector: AnyDetector = "shipped" if asked.detector is None else OnnxDetector(asked.detector)
+        how = {"config": config_of(asked.config), "use": kinds_of(asked.use), "detector": detector}
+        filters = {"depth_filter": depth_filter_of(asked.depth_range), "exclude": boxes_of(asked.exclude)}
+        return cls(limit, beginning_of(asked.init) if limit == 1 else AUTO, asked.start() | how, filters)
+
+    def settings(self, source: Recording) -> FrontEndSettings:
+        """Those of the front end."""
+        return replace(FrontEndSettings.of(source, use=self.options["use"]), **self.filters)
+
+    def tracker(self, source: Recording, **more: Any) -> Any:  # noqa: ANN401 - of start_tracker; a Tracker or People
+        """The tracker of one person, or of several."""
+        if self.limit != 1:
+            return start_people(source, limit=self.limit, **self.options, **more)
+        return start_tracker(source, init=self.beginning, **self.options, **more)
+
+
+def opened(path: Path, reading: Reading, **options: Any) -> Recording:  # noqa: ANN401 - the loader checks them
+    """Open a recording."""
+    return open_recording(path, **reading.words() | options)
+
+
+def limit_of(word: str) -> int | None:
+    """Parse the largest number of persons, from 1, or "any": None.
+
+    Raises:
+        VoodooError: another word.
+    """
+    if word != "any" and (not word.isdecimal() or int(word) < 1):
+        raise VoodooError(f"people: expected any or a whole number from 1, found {word!r}")
+    return None if word == "any" else int(word)
 
 
 def kinds_of(words: str | None) -> tuple[str, ...] | None:
@@ -102,11 +158,6 @@ def refuse_unused(has: set[str], **options: tuple[object, tuple[str, ...]]) -> N
             )
 
 
-def used_inputs(source: Recording, settings: FrontEndSettings) -> set[str]:
-    """Kinds of inputs that a recording has and that are used."""
-    return {kind for sensor in source.info().sensors for kind in inputs_of(sensor.kind)} & set(settings.use)
-
-
 def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
     """Parse boxes of the form "X0,Y0,Z0,X1,Y1,Z1", lower corner first.
 
@@ -129,15 +180,6 @@ def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
 def config_of(path: Path | None) -> Config:
     """Load a configuration; None: the defaults."""
     return Config() if path is None else Config.load(path)
-
-
-def detector_of(path: Path | None) -> AnyDetector:
-    """Load the network of an ONNX file; None: the shipped detector.
-
-    Raises:
-        ConfigError: the file is not such a network.
-    """
-    return "shipped" if path is None else OnnxDetector(path)
 
 
 def spool_of(
@@ -268,8 +310,3 @@ def _apart(output: Target | None, serve: Callable[[Target, TrackedFrame[Any]], N
             serve(output, step)
         except Exception as error:
             output.failure = error
-
-
-def viewer_of(view: bool, save: Path | None, name: str) -> AbstractContextManager[Viewer | None]:
-    """Open the requested viewer before the work, so that a missing Rerun is reported immediately."""
-    return Viewer(save=save, name=name) if view or save is not None else nullcontext()

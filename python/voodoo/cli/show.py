@@ -8,16 +8,13 @@ from typing import Annotated
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import clear_errors, loader_words, print_json, print_text, refuse_both
+from voodoo.cli.common import print_json, print_text, refuse_both
 
 
 def info_command(
+    *,
     recording: options.RecordingArgument,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    layout: options.LayoutOption = None,
+    reading: options.Reading,
     as_json: options.JsonOption = False,
 ) -> None:
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
@@ -26,23 +23,22 @@ def info_command(
     from voodoo.recordings.first_images import depth_range, doubts, first_images
     from voodoo.recordings.left_out import LeftOut
 
-    with clear_errors():
-        left_out = LeftOut()
-        source = opened(recording, loader, frame, left_out=left_out, **loader_words(topic, option, layout=layout))
-        about = source.info()
-        with left_out.aside():
-            depth = depth_range(source)
-        images, damage = first_images(source)
-        notes = [*doubts(about, left_out, images), damage, "" if depth is None else depth.warning]
-        if as_json:
-            print_json(
-                {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}
-                | {"notes": [*about.notes, *filter(None, notes)]}
-            )
-            return
-        lines = [str(about), *(f"  image      {image}" for image in images)]
-        lines += [] if depth is None else [f"  depths     {depth}"]
-        print_text("\n".join([*lines, *(f"  note       {note}" for note in notes if note)]))
+    left_out = LeftOut()
+    source = opened(recording, reading, left_out=left_out)
+    about = source.info()
+    with left_out.aside():
+        depth = depth_range(source)
+    images, damage = first_images(source)
+    notes = [*doubts(about, left_out, images), damage, "" if depth is None else depth.warning]
+    if as_json:
+        print_json(
+            {**vars(about), "camera_root": about.camera_root, "images": images, "depths": depth}
+            | {"notes": [*about.notes, *filter(None, notes)]}
+        )
+        return
+    lines = [str(about), *(f"  image      {image}" for image in images)]
+    lines += [] if depth is None else [f"  depths     {depth}"]
+    print_text("\n".join([*lines, *(f"  note       {note}" for note in notes if note)]))
 
 
 def config_command() -> None:
@@ -65,10 +61,9 @@ def body_command(
     """Print a body as TOML: the default human of a stature, or a file after checking it."""
     from voodoo.model.body import Body
 
-    with clear_errors():
-        refuse_both("FILE", file, **{"--height": height, "--model": model})
-        if file is not None:
-            body = Body.load(file)
-        else:
-            body = Body.human(1.75 if height is None else height, model=model or "full")
-        typer.echo(body.to_toml(), nl=False)
+    refuse_both("FILE", file, **{"--height": height, "--model": model})
+    if file is not None:
+        body = Body.load(file)
+    else:
+        body = Body.human(1.75 if height is None else height, model=model or "full")
+    typer.echo(body.to_toml(), nl=False)

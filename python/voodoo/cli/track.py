@@ -3,45 +3,37 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from voodoo.cli import options
-from voodoo.cli.common import (
-    clear_errors,
-    numbers_of,
-    print_message,
-    print_result,
-    refuse_both,
-    refuse_missing,
-    states,
-    topics_of,
-    wrote,
-)
-from voodoo.cli.signals import INTERRUPTED, deferred
-from voodoo.errors import NoPoseError
+from voodoo.cli.common import print_interrupted, print_message, print_result, refuse_both, refuse_missing, states, wrote
+from voodoo.cli.signals import deferred
+from voodoo.errors import NoPoseError, VoodooError
 from voodoo.names import SEARCHING
 
 if TYPE_CHECKING:
     from voodoo.export.spool import Spool
     from voodoo.recordings.left_out import LeftOut
-    from voodoo.recordings.recording import Recording
+    from voodoo.recordings.recording import Recording, RecordingInfo
 
 
 def track_command(
+    *,
     context: typer.Context,
     recording: options.RecordingArgument,
-    init: options.InitOption = None,
-    body: options.BodyOption = None,
-    height: options.HeightOption = None,
-    model: options.ModelOption = None,
-    config: options.ConfigOption = None,
-    detector: options.DetectorOption = None,
-    people: options.PeopleOption = "1",
+    tracking: options.Tracking,
     out: options.OutOrNameOption = None,
-    upright: options.UprightOption = False,
+    upright: Annotated[
+        bool,
+        typer.Option(
+            "--upright",
+            help="Put every result on the floor that is seen, else under the feet: z up, x forward, z = 0 on it.",
+        ),
+    ] = False,
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR|FILE.mp4", help="Draw the model over every frame: PNG files or a video.")
     ] = None,
@@ -53,25 +45,24 @@ def track_command(
     ] = False,
     view: options.ViewOption = False,
     save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write the data of --view to a file.")] = None,
-    use: options.UseOption = None,
-    depth_range: options.DepthRangeOption = None,
     with_: Annotated[
         list[Path] | None,
         typer.Option("--with", metavar="PATH", help="Another recording or .trc/.c3d of this scene; repeatable."),
     ] = None,
     offset: Annotated[float, typer.Option(metavar="S", help="Seconds to add to the stamps of --with.")] = 0.0,
     keypoints: options.KeypointsOption = None,
-    layout: options.LayoutOption = None,
     marker_map: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="TOML that assigns the markers of .trc and .c3d files to sites."),
     ] = None,
-    topic: options.TopicOption = None,
-    frame: options.FrameOption = None,
-    loader: options.LoaderOption = None,
-    option: options.LoaderNumberOption = None,
-    exclude: options.ExcludeOption = None,
-    background: options.BackgroundOption = None,
+    reading: options.Reading,
+    background: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Images of the empty scene, CAMERA_0.png, ..., for color; by default background/ beside the recording.",
+        ),
+    ] = None,
     strict: options.StrictOption = False,
 ) -> None:
     """Find a person in a recording, track them, and write one row per frame.
@@ -117,142 +108,109 @@ def track_command(
 
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
+    from contextlib import nullcontext
     from dataclasses import replace
 
-    from voodoo.cli.closing import closing_doubts, closing_lines
-    from voodoo.cli.people import limit_of, no_starts, refuse_several
-    from voodoo.cli.running import (
-        boxes_of,
-        config_of,
-        depth_filter_of,
-        detector_of,
-        kinds_of,
-        opened,
-        refuse_unused,
-        run,
-        spool_of,
-        turn_of,
-        used_inputs,
-        viewer_of,
-    )
+    from voodoo.cli.running import ParsedTracking, opened, refuse_unused, run, spool_of, turn_of
+    from voodoo.cli.track import closing_doubts, closing_lines
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
-    from voodoo.model.body import Body
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
     from voodoo.pipeline.run import TrackedFrame, track
-    from voodoo.pipeline.start import AUTO, beginning_of, start_people, start_tracker, starts_of
+    from voodoo.pipeline.start import AUTO, starts_of, used_kinds
     from voodoo.pipeline.start import stature as stature_of
     from voodoo.recordings.left_out import LeftOut
     from voodoo.recordings.marker_files import MarkerMap
-    from voodoo.sensors.settings import FrontEndSettings
+    from voodoo.visualization.rerun_viewer import Viewer
 
-    with clear_errors():
-        refuse_both("--body", body, **{"--height": height, "--model": model})
-        refuse_both("--view", view or None, **{"--save": save})
-        if offset and not with_:
-            raise typer.BadParameter("--offset is for the stamps of --with, give both")
-        kinds, left_out = kinds_of(use), None if strict else LeftOut()
-        depth_filter, boxes = depth_filter_of(depth_range), boxes_of(exclude)
-        limit = limit_of(people)
-        several = limit != 1
-        beginning = no_starts(init) if several else beginning_of(init)
-        bare = beginning is not None
-        markers = None if marker_map is None else MarkerMap.load(marker_map)
-        numbers, others = numbers_of(option), with_ or ()
-        about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": kinds}
-        asked = topics_of(topic) | loader_options(recording, loader, **about)
-        if background is not None:
-            asked["background"] = background
-        # A number that no other recording accepts belongs to this one, whose loader may reject it.
-        taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
-        asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
-        folders, network = keypoint_words(keypoints or (), layout)
-        source = join(
-            opened(recording, asked.pop("loader", loader), frame, left_out=left_out, bare=bare, **asked),
-            keypoints=folders,
-            network=network,
-            layout=layout,
-            others=others,
-            offset=offset,
-            markers=markers,
-            numbers=numbers,
-            left_out=left_out,
-            bare=bare,
-        )
-        for words in source.assumed:
-            print_message(words)
-        if several:
-            refuse_several(draw_regions=draw_regions, background=background)
-        used = replace(FrontEndSettings.of(source, use=kinds), depth_filter=depth_filter, exclude=boxes)
-        places = ("depth", "points", "scan")
-        refuse_unused(
-            used_inputs(source, used),
-            depth_range=(depth_range, ("depth",)),
-            detector=(detector, ("depth",)),
-            exclude=(exclude, places),
-            layout=(layout, ("keypoints",)),
-            marker_map=(marker_map, ("markers",)),
-            draw_regions=(draw_regions, ("color",)),
-            background=(background, ("color",)),
-        )
-        targets, keeping = spool_of(source, out, context, upright=upright)
-        with keeping as spool, viewer_of(view, save, source.name) as viewer:
-            how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
-            settings = replace(used, draw_regions=draw_regions)
-            start: dict[str, Any] = {
-                "body": None if body is None else Body.load(body),
-                "height": height,
-                "model": model,
-                "config": config_of(config),
-                "markers": markers,
-                "use": kinds,
-                "detector": detector_of(detector),
-            }
-            tracker: Any
-            if several:
-                tracker = start_people(source, limit=limit, **start)
-            else:
-                tracker = start_tracker(source, init=beginning, **start)
-            starts = starts_of(beginning, source)
-            steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
-            refusals: Counter[str] = Counter()
+    refuse_both("--view", view or None, **{"--save": save})
+    if offset and not with_:
+        raise typer.BadParameter("--offset is for the stamps of --with, give both")
+    start, layout, left_out = ParsedTracking.of(tracking), reading.layout, None if strict else LeftOut()
+    several, bare = start.limit != 1, start.beginning is not None
+    markers = None if marker_map is None else MarkerMap.load(marker_map)
+    numbers, others = options.numbers_of(reading.option), with_ or ()
+    about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": start.options["use"]}
+    asked = loader_options(recording, reading.loader, **about)
+    if background is not None:
+        asked["background"] = background
+    # A number that no other recording accepts belongs to this one, whose loader may reject it.
+    taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
+    asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
+    folders, network = keypoint_words(keypoints or (), layout)
+    source = join(
+        opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked),
+        keypoints=folders,
+        network=network,
+        layout=layout,
+        others=others,
+        offset=offset,
+        markers=markers,
+        numbers=numbers,
+        left_out=left_out,
+        bare=bare,
+    )
+    for words in source.assumed:
+        print_message(words)
+    for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
+        if given:
+            raise VoodooError(f"{name}: expected none with --people any or N, it is for one person")
+    used = start.settings(source)
+    places = ("depth", "points", "scan")
+    refuse_unused(
+        used_kinds(source, used.use),
+        depth_range=(tracking.depth_range, ("depth",)),
+        detector=(tracking.detector, ("depth",)),
+        exclude=(tracking.exclude, places),
+        layout=(layout, ("keypoints",)),
+        marker_map=(marker_map, ("markers",)),
+        draw_regions=(draw_regions, ("color",)),
+        background=(background, ("color",)),
+    )
+    targets, keeping = spool_of(source, out, context, upright=upright)
+    shown = Viewer(save=save, name=source.name) if view or save is not None else nullcontext()
+    with keeping as spool, shown as viewer:
+        how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
+        settings = replace(used, draw_regions=draw_regions)
+        tracker = start.tracker(source, markers=markers)
+        starts = starts_of(start.beginning, source)
+        steps = track(source, tracker, settings=settings, starts=starts, left_out=left_out)
+        refusals: Counter[str] = Counter()
 
-            def take(step: TrackedFrame[Any]) -> None:
-                refusals.update([tracker.refusal] if tracker.refusal else [])
-                spool.add(step.estimate, step.front_end.bodies)
+        def take(step: TrackedFrame[Any]) -> None:
+            refusals.update([tracker.refusal] if tracker.refusal else [])
+            spool.add(step.estimate, step.front_end.bodies)
 
-            with deferred():
-                done = run(source, steps, take=take, **how)
-                sample = spool.sample()
-                turn = turn_of(source, sample, targets, upright=upright)
-                files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
-        turned = upright_words(files, turn, every=upright)
-        if several:
-            count, rows = len(spool.persons), spool.states.total()
-            found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
-        else:
-            found = states(spool.states.elements())
-        message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
-        if turned:
-            print_message(turned)
-        refuse_missing([*failed, *done.failures], message)
-        if done.interrupted:
-            print_message(f"interrupted, the rest of {len(source)} frames is missing: {message}")
-            raise typer.Exit(INTERRUPTED)
-        size = None if several or not spool.found else stature_of(tracker.body)
-        if not several:
-            message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
-        print_result(message, targets)
-        for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
-            print_message(f"{source.name}: {doubt}")
-        told = height or getattr(beginning, "height_m", None)
-        if told is None and beginning is None and source.start is not None:
-            told = source.start.get("height_m")
-        # Frames before a given start are meant to be without a pose.
-        begun = spool.states - Counter({SEARCHING: 0 if beginning in (None, AUTO) else len(source)})
-        for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
-            print_message(f"{source.name}: {doubt}")
-        _print_warnings(source, spool, left_out, refusals)
+        with deferred():
+            done = run(source, steps, take=take, **how)
+            sample = spool.sample()
+            turn = turn_of(source, sample, targets, upright=upright)
+            files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
+    turned = upright_words(files, turn, every=upright)
+    if several:
+        count, rows = len(spool.persons), spool.states.total()
+        found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
+    else:
+        found = states(spool.states.elements())
+    message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
+    if turned:
+        print_message(turned)
+    refuse_missing([*failed, *done.failures], message)
+    print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
+    size = None if several or not spool.found else stature_of(tracker.body)
+    if not several:
+        message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
+    print_result(message, targets)
+    for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
+        print_message(f"{source.name}: {doubt}")
+    told = tracking.height or getattr(start.beginning, "height_m", None)
+    if told is None and start.beginning is None and source.start is not None:
+        told = source.start.get("height_m")
+    # Frames before a given start are meant to be without a pose.
+    begun = spool.states - Counter({SEARCHING: 0 if start.beginning in (None, AUTO) else len(source)})
+    for doubt in closing_doubts(begun, stature=size, told=told) if spool.found and not several else ():
+        print_message(f"{source.name}: {doubt}")
+    _print_warnings(source, spool, left_out, refusals)
 
 
 def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, refusals: Counter[str]) -> None:
@@ -280,3 +238,44 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
         raise NoPoseError(
             f"{source.name}: nobody was found in {spool.frames} frames; voodoo info doubts what is unlikely"
         )
+
+
+STATUS_PAGE = "docs/how-to/read-the-status.md"
+_USUAL_M = (0.8, 2.1)
+"""Statures from a small child to a tall adult."""
+_TOLD = 0.06
+"""A stature that differs from what was told by a larger fraction is doubted: sizes of limbs are found to some percent."""
+_LEAST_TRACKING = 0.5
+
+
+def closing_lines(
+    states: Counter[str], seconds: Sequence[float], about: RecordingInfo, *, stature: float | None
+) -> list[str]:
+    """Stature, speed, root frame, and share of the frames by status (status -> frames)."""
+    time = sum(seconds)
+    parts = [] if stature is None else [f"stature {stature:.2f} m"]
+    parts += [f"{len(seconds) / time:.0f} frames a second"] if time > 0.0 else []
+    camera = " (a camera, not level)" if about.camera_root else ""
+    shares = (f"{100 * count / states.total():.0f} % {word}" for word, count in states.items())
+    return [
+        "; ".join([*parts, f"root frame {about.root_frame}{camera}"]),
+        f"{', '.join(shares)} ({STATUS_PAGE} says what that means)",
+    ]
+
+
+def closing_doubts(states: Counter[str], *, stature: float | None, told: float | None) -> list[str]:
+    """What is unlikely in poses of these statuses (status -> frames); told: the stature that was given [m]."""
+    doubts = []
+    low, high = _USUAL_M
+    if stature is not None and told is not None and abs(stature - told) > _TOLD * told:
+        doubts.append(
+            f"the stature is {stature:.2f} m, where {told:.2f} m was told: is the scale of depth or calibration right?"
+        )
+    elif stature is not None and told is None and not low <= stature <= high:
+        doubts.append(f"the stature is {stature:.2f} m, which few people have ({low} to {high} m): is the scale right?")
+    share = states["tracking"] / states.total()
+    if share <= _LEAST_TRACKING:
+        doubts.append(
+            f"only {100 * share:.0f} % of the frames are tracking: look at --overlay look.mp4, and see {STATUS_PAGE}"
+        )
+    return doubts

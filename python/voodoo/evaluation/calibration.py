@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from voodoo._core import Estimate
 from voodoo.evaluation import metrics
-from voodoo.evaluation.figure import new_figure, save_figure
 from voodoo.evaluation.metrics import BoolArray, FloatArray, mean_or_nan
 
 DROPPED = 0.2
@@ -19,8 +16,8 @@ DROPPED = 0.2
 NORMAL = (0.683, 0.954)
 """Fractions within one and two standard deviations of a normal distribution."""
 
-_ARM = np.array([name.split("_")[1] in ("shoulder", "elbow", "wrist") for name in metrics.JOINTS])
-_TRUNK = np.array([name.split("_")[1] in ("shoulder", "hip") for name in metrics.JOINTS])
+ARM = np.array([name.split("_")[1] in ("shoulder", "elbow", "wrist") for name in metrics.JOINTS])
+TRUNK = np.array([name.split("_")[1] in ("shoulder", "hip") for name in metrics.JOINTS])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,20 +86,20 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
     """Compare errors with their standard deviations; None if no joint has both."""
     if not found:
         return None
-    errors, sigma, measured, known = _together(found)
+    errors, sigma, measured, known = together(found)
     if not known.any():
         return None
     coverages = [
         _coverage(name, errors[chosen & known], sigma[chosen & known])
         for name, chosen in (
             ("all joints", np.ones_like(known)),
-            ("shoulders and hips", np.broadcast_to(_TRUNK, known.shape)),
-            ("ends of measured limbs", ~_TRUNK & measured),
-            ("ends of other limbs", ~_TRUNK & ~measured),
+            ("shoulders and hips", np.broadcast_to(TRUNK, known.shape)),
+            ("ends of measured limbs", ~TRUNK & measured),
+            ("ends of other limbs", ~TRUNK & ~measured),
         )
     ]
     quartiles = []
-    for limbs, chosen in (("arms", _ARM), ("legs", ~_ARM)):
+    for limbs, chosen in (("arms", ARM), ("legs", ~ARM)):
         own = known & chosen
         order = np.argsort(sigma[own].ravel(), kind="stable")
         parts = zip(("surest", "second", "third", "least sure"), np.array_split(order, 4), strict=True)
@@ -121,7 +118,7 @@ def calibrate(found: Sequence[Deviations]) -> UncertaintyCalibration | None:
     )
 
 
-def _together(found: Sequence[Deviations]) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
+def together(found: Sequence[Deviations]) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
     """Errors, standard deviations, whether the limb is measured, and which joints (F, 12) have both."""
     errors, sigma = (np.concatenate([getattr(each, name) for each in found]) for name in ("errors", "sigma"))
     known = np.isfinite(errors).all(axis=2) & np.isfinite(sigma).all(axis=2)
@@ -161,39 +158,3 @@ def calibration_markdown(calibration: UncertaintyCalibration, against: str) -> s
         f"{calibration.ratio:.2f} times.\n"
     )
     return "\n".join(lines)
-
-
-def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
-    """Plot the cumulative distribution of normalized errors, and error over standard deviation."""
-    errors, sigma, measured, known = _together(found)
-    figure = new_figure(9.6, 4.2)
-    left, right = figure.subplots(1, 2)
-    steps = np.linspace(0.0, 4.0, 81)
-    normal = [math.erf(step / math.sqrt(2.0)) for step in steps]
-    left.plot(steps, normal, color="#333333", linestyle="--", linewidth=1.0, label="normal distribution")
-    groups = (
-        ("shoulders and hips", np.broadcast_to(_TRUNK, known.shape), "#7a8ca3"),
-        ("measured limbs", ~_TRUNK & measured, "#4c8c6b"),
-        ("other limbs", ~_TRUNK & ~measured, "#c8553d"),
-    )
-    for name, chosen, color in groups:
-        own = known & chosen
-        if own.any():
-            ratios = np.sort((np.abs(errors[own]) / sigma[own]).ravel())
-            left.plot(steps, np.searchsorted(ratios, steps, side="right") / ratios.size, color=color, label=name)
-    left.set_xlabel("standard deviations")
-    left.set_ylabel("share of errors within")
-    left.legend(frameon=False, fontsize=8)
-    for name, chosen, color in (("arms", _ARM, "#c87f3d"), ("legs", ~_ARM, "#3d6fc8")):
-        own = known & chosen
-        if own.any():
-            order = np.argsort(sigma[own].ravel(), kind="stable")
-            bins = np.array_split(order, 20)
-            x = [100 * float(np.sqrt(np.mean(sigma[own].ravel()[part] ** 2))) for part in bins if part.size]
-            y = [100 * float(np.sqrt(np.mean(errors[own].ravel()[part] ** 2))) for part in bins if part.size]
-            right.plot(x, y, "o-", color=color, label=name, markersize=4)
-    reach = [0.5, 20.0]
-    right.plot(reach, reach, color="#333333", linestyle="--", linewidth=1.0)
-    right.set(xscale="log", yscale="log", xlabel="standard deviation [cm]", ylabel="root mean square error [cm]")
-    right.legend(frameon=False, fontsize=8)
-    save_figure(figure, path)

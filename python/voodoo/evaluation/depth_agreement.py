@@ -95,15 +95,14 @@ def witness(
             valid = np.ones(len(points), dtype=bool)
         else:
             continue
-        if selection == "truth":
-            chosen = near_joints(points, truth)
-        else:
-            chosen = np.ones(len(points), dtype=bool) if box is None else _in_box(points, *box)
+        near = near_joints(points, truth)
+        inside = np.ones(len(points), dtype=bool) if box is None else _in_box(points, *box)
+        chosen = near if selection == "truth" else inside
         person = np.zeros(len(valid), dtype=bool)
-        person[valid], points = chosen, points[chosen]
-        if len(points):
-            distances.append(np.abs(tracker.distance(points)).astype(np.float64))
-            about.append(np.ones(len(points), dtype=bool) if selection == "truth" else near_joints(points, truth))
+        person[valid] = chosen
+        if chosen.any():
+            distances.append(np.abs(tracker.distance(points[chosen])).astype(np.float64))
+            about.append(near[chosen])
         if isinstance(item, DepthImage):
             overlaps.append(np.array([_overlap(item, person, tracker.body, estimate)]))
     return FrameWitness(np.concatenate(distances), np.concatenate(about), mean_or_nan(np.concatenate(overlaps)))

@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,14 +23,16 @@ from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import Deviations, sigma_of
-from voodoo.evaluation.depth_agreement import FrameWitness, Selection, witness
+from voodoo.evaluation.depth_agreement import Selection, witness
 from voodoo.evaluation.metrics import BoolArray, FloatArray
+from voodoo.evaluation.people import PeopleScore
+from voodoo.evaluation.people_evaluate import evaluate_people, has_people
 from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
 from voodoo.export.track import Track
-from voodoo.names import SEARCHING, HumanModel
+from voodoo.names import SEARCHING, Automatic, HumanModel
 from voodoo.pipeline.inputs import pictures_alone
 from voodoo.pipeline.run import track
-from voodoo.pipeline.start import Automatic, start_tracker
+from voodoo.pipeline.start import start_tracker
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
@@ -55,7 +57,6 @@ def evaluate(
     path: Path,
     *,
     config: Config | None = None,
-    loader: str | None = None,
     options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
@@ -66,7 +67,7 @@ def evaluate(
     Args:
         path: of the recording.
         config: None means the defaults.
-        loader, options: see open_recording.
+        options: see open_recording.
         model: see start_tracker.
         use: kinds of inputs; None: all.
         init: "auto" ignores the start of the recording and searches for a person, as for recordings without a start.
@@ -74,7 +75,8 @@ def evaluate(
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
-    recording = open_recording(path, **{"loader": loader, **(options or {})} | pictures_alone(path, loader, use))
+    how = dict(options or {})
+    recording = open_recording(path, **how | pictures_alone(path, how.get("loader"), use))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
     steps = []
@@ -84,7 +86,8 @@ def evaluate(
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         observed = witness(frame.recorded, tracker, estimate, truth, selection)
         known = joints, called_measured(estimate), sigma_of(estimate)
-        steps.append(_Step(float(estimate.stamp), str(estimate.status), frame.seconds, observed, *known))
+        # The images of a whole recording would fill the memory.
+        steps.append((float(estimate.stamp), str(estimate.status), frame.seconds, observed, *known))
     if not steps:
         raise RecordingError(f"{path}: expected at least one frame, found none")
     return _score(recording, path, selection, steps)
@@ -98,7 +101,7 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
 
 def differences(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
     """Errors by coordinate, (F, 12, 3): estimate minus reference."""
-    positions = _joints(result.joint_names, result.joints)
+    positions = metrics.places_of(result.joint_names, result.joints)
     reference = _reference_positions(recording, result.stamps)
     lag = metrics.best_lag(positions, reference) if at_best_lag else 0
     return np.asarray(positions - metrics.shifted(reference, lag))
@@ -125,21 +128,20 @@ def select_by(recording: Recording) -> Selection:
 def evaluate_all(
     paths: Sequence[Path],
     *,
-    config_file: Path | None = None,
     jobs: int = 1,
     **how: Any,  # noqa: ANN401 - of evaluate
-) -> Iterator[tuple[int, Score, FrameTable | None]]:
+) -> Iterator[tuple[int, Score | PeopleScore, FrameTable | None]]:
     """Evaluate recordings in parallel processes; yields (index in `paths`, score, frames) in the order of completion.
 
-    A recording that fails yields a score with `failure` set and no frames. jobs=1 stays in this process.
+    One with the truth of several persons yields their score, and no frames. A recording that fails yields a score with `failure`
+    set and no frames. jobs=1 stays in this process.
 
     Args:
         paths: of the recordings.
-        config_file: None means the defaults.
         jobs: number of processes.
-        **how: the other options of `evaluate`.
+        **how: other options of `evaluate`.
     """
-    task = partial(_task, config_file, how)
+    task = partial(_task, how)
     if jobs == 1 or len(paths) == 1:
         for index, path in enumerate(paths):
             yield index, *task(path)
@@ -182,17 +184,16 @@ def _deaf_children() -> Iterator[None]:
 
 def _one_thread() -> None:
     """Initialize a worker: one thread each, because the processes run in parallel."""
-    for number in _OF_TERMINALS:
-        signal.signal(number, signal.SIG_IGN)
     os.environ["RAYON_NUM_THREADS"] = "1"
     cv2.setNumThreads(1)
 
 
-def _task(config_file: Path | None, how: Mapping[str, Any], path: Path) -> tuple[Score, FrameTable | None]:
+def _task(how: Mapping[str, Any], path: Path) -> tuple[Score | PeopleScore, FrameTable | None]:
+    several = has_people(path)
     try:
-        return evaluate(path, config=None if config_file is None else Config.load(config_file), **how)
+        return evaluate_people(path, **how) if several else evaluate(path, **how)
     except (VoodooError, OSError) as error:
-        return Score(path.name, path, failure=str(error)), None
+        return (PeopleScore if several else Score)(path.name, path, failure=str(error)), None
 
 
 def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
@@ -209,19 +210,9 @@ def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
     return dict(zip(reference.names, positions, strict=True))
 
 
-class _Step(NamedTuple):
-    """Data kept from a frame; the images of a whole recording would fill the memory."""
-
-    stamp: float
-    status: str
-    seconds: float
-    witness: FrameWitness
-    joints: FloatArray
-    measured: BoolArray
-    sigma: FloatArray
-
-
-def _score(recording: Recording, path: Path, selection: Selection, steps: Sequence[_Step]) -> tuple[Score, FrameTable]:
+def _score(
+    recording: Recording, path: Path, selection: Selection, steps: Sequence[tuple[Any, ...]]
+) -> tuple[Score, FrameTable]:
     stamp, status, time, seen, joints, known, spread = zip(*steps, strict=True)
     stamps, seconds, positions, measured, sigma = map(np.array, (stamp, time, joints, known, spread))
     overlaps, within = (np.array([getattr(one, name) for one in seen]) for name in ("iou", "within"))
@@ -304,20 +295,11 @@ def _first_pose(
     return max(float(stamps[found[0]] - stamps[known[0]]), 0.0), metrics.mean_or_nan(errors[found[0]])
 
 
-def _joints(names: Sequence[str], positions: FloatArray) -> FloatArray:
-    """Of positions (F, J, 3) those of metrics.JOINTS (F, 12, 3); NaN where a joint is missing."""
-    chosen = np.full((len(positions), len(metrics.JOINTS), 3), np.nan)
-    for index, name in enumerate(metrics.JOINTS):
-        if name in names:
-            chosen[:, index] = positions[:, names.index(name)]
-    return chosen
-
-
 def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     """Reference of the twelve joints at the stamps, (F, 12, 3); NaN where there is none."""
     reference = recording.reference
     if reference is None:
         return np.full((len(stamps), len(metrics.JOINTS), 3), np.nan)
-    table = _joints(reference.names, reference.positions)
+    table = metrics.places_of(reference.names, reference.positions)
     period = float(np.median(np.diff(reference.stamps))) if len(reference.stamps) > 1 else 1.0 / 30.0
     return metrics.match_reference(stamps, reference.stamps, table, tolerance=0.5 * period)

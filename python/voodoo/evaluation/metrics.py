@@ -5,6 +5,7 @@ F is the number of frames, J the number of joints; distances are in meters, NaN 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -35,6 +36,15 @@ _BONES = tuple(
     for side in ("l", "r")
 )
 _STAMP_TOLERANCE_S = 1e-6
+
+
+def places_of(names: Sequence[str], positions: FloatArray, wanted: Sequence[str] = JOINTS) -> FloatArray:
+    """Of positions (F, J, 3) those of the wanted joints; NaN where one is missing."""
+    chosen = np.full((len(positions), len(wanted), 3), np.nan)
+    for index, name in enumerate(wanted):
+        if name in names:
+            chosen[:, index] = positions[:, names.index(name)]
+    return chosen
 
 
 def match_reference(

@@ -208,16 +208,11 @@ def _frames(truth: PeopleTruth, rows: Arrays) -> _Frames:
     return _Frames(stamps[order], of_truth[order], [np.flatnonzero(row_frame == index) for index in range(len(stamps))])
 
 
-def _places(rows: Arrays, name: str) -> FloatArray:
-    """Positions (R, 3) [m] of a site; NaN where it is missing."""
-    names, unknown = rows["joint_names"].tolist(), np.full((len(rows["stamps"]), 3), np.nan)
-    return np.asarray(rows["joints"][:, names.index(name)]) if name in names else unknown
-
-
 def match(truth: PeopleTruth, rows: Arrays, frames: _Frames) -> Matches:
     """Match persons and ids frame by frame, jointly for all persons and keeping the pairs of the previous frame."""
     mm = motmetrics()
-    roots, own = truth.of(ROOT), _places(rows, ROOT)
+    roots = truth.of(ROOT)
+    own = metrics.places_of(rows["joint_names"].tolist(), rows["joints"], (ROOT,))[:, 0]
     posed = np.asarray(np.isfinite(own).all(axis=1))
     ids = np.unique(rows["person"][posed])
     of_person = np.full((len(frames.stamps), len(truth.persons)), NOBODY, dtype=np.int64)
@@ -296,7 +291,7 @@ def _false_bodies(found: Matches) -> tuple[int, int]:
 def _joint_errors(truth: PeopleTruth, rows: Arrays, frames: _Frames, found: Matches) -> FloatArray:
     """Distances (N, 12) [m] of metrics.JOINTS in all matches of persons who are in view."""
     truth_positions = np.stack([truth.of(name) for name in metrics.JOINTS], axis=2)
-    own = np.stack([_places(rows, name) for name in metrics.JOINTS], axis=1)
+    own = metrics.places_of(rows["joint_names"].tolist(), rows["joints"])
     pairs = []
     for index, person in np.argwhere(found.of_person >= 0):
         place = frames.truth[index]

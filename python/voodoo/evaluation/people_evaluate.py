@@ -1,8 +1,9 @@
-"""Evaluates results of several persons, of voodoo or other programs."""
+"""Evaluates results of several persons, of voodoo or other programs, and writes what is found as Markdown and .csv."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,22 @@ import numpy as np
 
 from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.evaluation.people import PeopleScore, motmetrics, score
+from voodoo.evaluation.people import (
+    ABSENT_S,
+    IN_VIEW,
+    JOINTS_IN_VIEW,
+    MATCH_M,
+    PeopleScore,
+    motmetrics,
+    score,
+    together,
+)
+from voodoo.evaluation.score import RATIO, written
+from voodoo.evaluation.summary import write_table
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
 from voodoo.model.body import Body
-from voodoo.names import HumanModel
+from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
 from voodoo.pipeline.run import track
 from voodoo.recordings.loaders import open_recording
@@ -22,6 +34,7 @@ from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.truth import PEOPLE_TRUTH_FILE, find_beside
 from voodoo.sensors.settings import FrontEndSettings
+from voodoo.whole import write_whole
 
 
 def has_people(path: Path) -> bool:
@@ -29,20 +42,18 @@ def has_people(path: Path) -> bool:
     return find_beside(path, PEOPLE_TRUTH_FILE) is not None
 
 
-def evaluate_result(
-    path: Path, result: Path, *, loader: str | None = None, options: Mapping[str, Any] | None = None
-) -> PeopleScore:
+def evaluate_result(path: Path, result: Path, *, options: Mapping[str, Any] | None = None) -> PeopleScore:
     """Evaluate a result file, see voodoo.export.table.opened_result.
 
     Args:
         path: of the recording, with truth_people.csv beside it.
         result: .csv or .npz in the recording's root frame.
-        loader, options: see open_recording.
+        options: see open_recording.
 
     Raises:
         VoodooError: one of them cannot be read, or their stamps do not match.
     """
-    recording = open_recording(path, loader=loader, **(options or {}))
+    recording = open_recording(path, **(options or {}))
     truth = truth_of(recording)
     rows = read_rows(result)
     stamps = rows["stamps"]
@@ -87,32 +98,31 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
     return score(recording.name, recording.path, truth, rows, seconds=about.duration, step_s=seconds)
 
 
-def evaluate_all_people(
-    paths: Sequence[Path],
+def evaluate_people(
+    path: Path,
     *,
-    config_file: Path | None = None,
-    loader: str | None = None,
+    config: Config | None = None,
     options: Mapping[str, Any] | None = None,
     model: HumanModel | None = None,
     use: Sequence[str] | None = None,
-) -> Iterator[PeopleScore]:
-    """Track all persons in recordings, without a start, and evaluate the results; one that fails yields a score with a `failure`.
+    init: Automatic | None = None,
+) -> tuple[PeopleScore, None]:
+    """Track all persons in a recording and evaluate the result; without a table of frames.
 
     Args:
-        paths: of recordings with truth_people.csv beside them.
-        config_file: None means the defaults.
-        loader, options: see open_recording.
+        path: of a recording with truth_people.csv beside it.
+        config: None means the defaults.
+        options: see open_recording.
         model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
+        init: of no effect, since persons are always searched for.
+
+    Raises:
+        VoodooError: it cannot be read, or a frame was refused.
     """
-    for path in paths:
-        try:
-            config = None if config_file is None else Config.load(config_file)
-            recording = open_recording(path, loader=loader, **(options or {}))
-            people = People(None if model is None else Body.human(model=model), config=config)
-            yield judge(recording, people, settings=FrontEndSettings.of(recording, use=use))
-        except (VoodooError, OSError) as error:
-            yield PeopleScore(path.name, path, failure=str(error))
+    recording = open_recording(path, **(options or {}))
+    people = People(None if model is None else Body.human(model=model), config=config)
+    return judge(recording, people, settings=FrontEndSettings.of(recording, use=use)), None
 
 
 def truth_of(recording: Recording) -> PeopleTruth:
@@ -124,3 +134,73 @@ def truth_of(recording: Recording) -> PeopleTruth:
     if recording.people is None:
         raise RecordingError(f"{recording.path}: expected {PEOPLE_TRUTH_FILE} beside the recording, found none")
     return recording.people
+
+
+DERIVED = ("mota", "idf1", "false_a_minute")
+
+
+def people_markdown(scores: Sequence[PeopleScore]) -> str:
+    """A table with a row per recording, and one for all together."""
+    lines = [
+        "## Several people, against exact truth\n",
+        _row([name for name, _ in _COLUMNS]),
+        "|" + "---|" * len(_COLUMNS),
+    ]
+    lines += [_line(score) for score in scores]
+    if len([score for score in scores if not score.failure]) > 1:
+        lines.append(_line(together(scores)))
+    lines.append(
+        f"\nA match is a root within {MATCH_M:g} m of a person with {IN_VIEW:g} or more of their pixels in view; who is less in "
+        f"view may be followed or not. MOTA, IDF1 and switches are those of py-motmetrics. First pose: from "
+        f"{JOINTS_IN_VIEW:g} in view on. Return: after more than {ABSENT_S:g} s out of view. A false body is a stretch of an id "
+        "that matches nobody; one that follows on a match of this id is left behind. Joints count from "
+        f"{JOINTS_IN_VIEW:g} in view on.\n"
+    )
+    return "\n".join(lines)
+
+
+def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
+    """Write people.csv (a row per recording) and people.md; returns both paths.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    table, text = folder / "people.csv", folder / "people.md"
+    names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
+    write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
+    write_whole(text, people_markdown(scores))
+    return [table, text]
+
+
+def _line(score: PeopleScore) -> str:
+    if score.failure:
+        return _row((score.name, score.failure.replace("|", "/"), *[""] * (len(_COLUMNS) - 2)))
+    return _row([cell(score) for _, cell in _COLUMNS])
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _first_pose(score: PeopleScore) -> str:
+    wait = written(score.first_pose_s, RATIO)
+    return wait if wait == "-" else f"{wait} ({written(score.worst_first_pose_s, RATIO)})"
+
+
+_COLUMNS: tuple[tuple[str, Callable[[PeopleScore], str]], ...] = (
+    ("recording", lambda score: score.name),
+    ("persons", lambda score: f"{score.persons}"),
+    ("ids", lambda score: f"{score.ids}"),
+    ("MOTA", lambda score: written(score.mota, (1.0, ".3f", ""))),
+    ("IDF1", lambda score: written(score.idf1, (1.0, ".3f", ""))),
+    ("id switches", lambda score: f"{score.switches}"),
+    ("same id after return", lambda score: f"{score.returned} of {score.returns}" if score.returns else "-"),
+    ("first pose after, s (worst)", _first_pose),
+    ("never found", lambda score: f"{score.visits - score.visits_matched} of {score.visits}"),
+    ("false bodies a minute", lambda score: written(score.false_a_minute, (1.0, ".1f", ""))),
+    ("left behind", lambda score: f"{score.left_behind}"),
+    ("joint error, cm", lambda score: written(score.joint_error_m, (100.0, ".1f", ""))),
+    ("ms a frame", lambda score: written(score.step_s, (1000.0, ".1f", ""))),
+)
+"""Name and cell of each column."""

@@ -2,53 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from voodoo.evaluation import metrics
-from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown, plot_calibration
-from voodoo.evaluation.plot import plot_errors
-from voodoo.evaluation.score import LIMIT_EXACT_M, LIMIT_REFERENCE_M, FrameTable, Score
-from voodoo.evaluation.summary import KINDS, Summary, summarize
-from voodoo.evaluation.tables import write_frames, write_sequences, write_summary
+from voodoo.evaluation.calibration import Deviations, calibrate, calibration_markdown
+from voodoo.evaluation.plot import plot_calibration, plot_errors
+from voodoo.evaluation.score import CM, LIMIT_EXACT_M, LIMIT_REFERENCE_M, PERCENT, RATIO, FrameTable, Score, written
+from voodoo.evaluation.summary import ALL_ROWS, KINDS, Summary, summarize, write_frames, write_sequences, write_summary
 from voodoo.whole import write_whole
-
-_LINES: tuple[tuple[str, str, Callable[[float], str]], ...] = (
-    ("error_m", "mean joint error", lambda value: f"{100 * value:.1f} cm"),
-    ("error_lag0_m", "... at lag 0", lambda value: f"{100 * value:.1f} cm"),
-    ("error_best_lag_m", "... at the best lag", lambda value: f"{100 * value:.1f} cm"),
-    ("error_without_offsets_m", "... each joint's constant offset removed", lambda value: f"{100 * value:.1f} cm"),
-    ("class_without_offsets", "... class average of that error", lambda value: f"{value:.2f}"),
-    ("lost_without_offsets", "... sequences that end with a joint lost by it", lambda value: f"{100 * value:.1f} %"),
-    ("first_pose_s", "first pose after", lambda value: f"{value:.2f} s"),
-    ("first_pose_error_m", "mean error in the first pose", lambda value: f"{100 * value:.1f} cm"),
-    ("within_5cm", "joints within 5 cm", lambda value: f"{100 * value:.1f} %"),
-    ("within_10cm", "joints within 10 cm", lambda value: f"{100 * value:.1f} %"),
-    ("depth_within_5cm", "depth within 5 cm of the model", lambda value: f"{100 * value:.1f} %"),
-    ("depth_median_m", "depth to model, median", lambda value: f"{1000 * value:.1f} mm"),
-    ("depth_p95_m", "depth to model, 95th percentile", lambda value: f"{1000 * value:.1f} mm"),
-    ("person_within_5cm", "within 5 cm, of depth about the known joints", lambda value: f"{100 * value:.1f} %"),
-    ("silhouette_iou", "silhouette IoU", lambda value: f"{value:.3f}"),
-    ("jitter_m", "second difference of the joints", lambda value: f"{1000 * value:.1f} mm"),
-    ("reference_jitter_m", "... of the reference", lambda value: f"{1000 * value:.1f} mm"),
-    ("standing_jitter_m", "second difference where the reference stands still", lambda value: f"{1000 * value:.1f} mm"),
-    ("reference_standing_jitter_m", "... of the reference itself there", lambda value: f"{1000 * value:.1f} mm"),
-    ("angle_error_deg", "error of the joint angles", lambda value: f"{value:.1f} deg"),
-    ("angle_spread_deg", "... its standard deviation", lambda value: f"{value:.1f} deg"),
-    ("degraded_share", "frames called degraded", lambda value: f"{100 * value:.1f} %"),
-    ("lost_share", "frames called lost", lambda value: f"{100 * value:.1f} %"),
-    ("searching_share", "frames without a pose", lambda value: f"{100 * value:.1f} %"),
-    ("lost_recall", "limbs off by 10 cm and not called measured", lambda value: f"{100 * value:.0f} %"),
-    ("false_alarm_rate", "nearer limbs not called measured", lambda value: f"{100 * value:.1f} %"),
-    ("lost_recall_together", "limbs off by 10 cm, all sequences together", lambda value: f"{100 * value:.1f} %"),
-    ("false_alarm_rate_together", "nearer limbs, all sequences together", lambda value: f"{100 * value:.1f} %"),
-    ("left_out_share", "joints of the reference left out, their bones off", lambda value: f"{100 * value:.1f} %"),
-    ("step_s", "time of a frame", lambda value: f"{1000 * value:.2f} ms"),
-)
 
 
 def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) -> str:
@@ -59,8 +24,8 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
     for summary in summarize(scores):
         text += _head(summary) if summary.sequences else ["## Not tracked\n"]
         if summary.sequences:
-            text += [f"| class average | {_word(summary.class_average, lambda value: f'{value:.2f}')} |"]
-            text += [f"| {words} | {_word(summary.means[name], form)} |" for name, words, form in _LINES]
+            text += [f"| class average | {written(summary.class_average, RATIO)} |"]
+            text += _rows(summary, ALL_ROWS)
             lags = ", ".join(f"{lag:+d}: {count}" for lag, count in summary.lags) or "-"
             text += [f"| best lag in frames: sequences | {lags} |", ""]
             group = [s for s in scores if not s.failure and KINDS[s.exact] == summary.kind]
@@ -85,11 +50,9 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
             continue
         cells = [
             score.name, str(score.frames), "-" if score.tracking_class is None else str(score.tracking_class),
-            _word(score.error_m, lambda value: f"{100 * value:.1f} cm"),
-            "-" if score.best_lag is None else f"{score.best_lag:+d}",
-            _word(score.within_10cm, lambda value: f"{100 * value:.0f} %"),
-            _word(score.depth_within_5cm, lambda value: f"{100 * value:.1f} %"),
-            _word(score.silhouette_iou, lambda value: f"{value:.2f}"), ", ".join(score.lost_joints) or "none",
+            written(score.error_m, CM), "-" if score.best_lag is None else f"{score.best_lag:+d}",
+            written(score.within_10cm, (100.0, ".0f", " %")), written(score.depth_within_5cm, PERCENT),
+            written(score.silhouette_iou, RATIO), ", ".join(score.lost_joints) or "none",
         ]  # fmt: skip
         text.append("| " + " | ".join(cells) + " |")
     text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
@@ -97,7 +60,7 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
 
 
 _BRIEF = (
-    "error_m", "within_10cm", "depth_within_5cm", "silhouette_iou", "angle_error_deg", "first_pose_s", "lost_share",
+    "error_m", "first_pose_s", "within_10cm", "depth_within_5cm", "silhouette_iou", "angle_error_deg", "lost_share",
     "searching_share", "step_s",
 )  # fmt: skip
 """What the first screen tells beside the classes."""
@@ -114,15 +77,18 @@ def _head(summary: Summary) -> list[str]:
     ]
 
 
+def _rows(summary: Summary, names: Iterable[str]) -> list[str]:
+    rows = [(ALL_ROWS[name], summary.means[name]) for name in names]
+    return [f"| {words} | {written(mean, form)} |" for (words, form), mean in rows]
+
+
 def brief(scores: Sequence[Score]) -> str:
     """The ten rows of `markdown` that tell most, for each kind of comparison, and the failures."""
     text = []
     for summary in summarize(scores):
         if summary.sequences:
             text += _head(summary)
-            text += [
-                f"| {words} | {_word(summary.means[name], form)} |" for name, words, form in _LINES if name in _BRIEF
-            ]
+            text += _rows(summary, _BRIEF)
     text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
     return "\n".join(text)
 
@@ -152,20 +118,17 @@ def write_reports(
         again = f"~{names[score.name]}" if names[score.name] > 1 else ""
         if table is not None:
             write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
-    sequences, summary, text, plot = (
-        folder / name for name in ("sequences.csv", "summary.csv", "summary.md", "errors.png")
-    )
-    write_sequences(sequences, scores)
-    write_summary(summary, summarize(scores))
-    write_whole(text, markdown(scores, tables))
-    if not picture:
-        return [sequences, summary, text]
-    plot_errors(plot, scores)
-    files = [sequences, summary, text, plot]
-    known = [each for group in deviations_of(scores, tables).values() for each in group]
-    if calibrate(known) is not None:
-        plot_calibration(folder / "calibration.png", known)
-        files.append(folder / "calibration.png")
+    files = [folder / name for name in ("sequences.csv", "summary.csv", "summary.md")]
+    write_sequences(files[0], scores)
+    write_summary(files[1], summarize(scores))
+    write_whole(files[2], markdown(scores, tables))
+    if picture:
+        files.append(folder / "errors.png")
+        plot_errors(files[-1], scores)
+        known = [each for group in deviations_of(scores, tables).values() for each in group]
+        if calibrate(known) is not None:
+            files.append(folder / "calibration.png")
+            plot_calibration(files[-1], known)
     return files
 
 
@@ -176,11 +139,5 @@ def _joint_table(scores: Sequence[Score]) -> list[str]:
         means = [
             metrics.mean_or_nan(np.array([score.joint_error_m[f"{side}_{name}"] for score in scores])) for name in names
         ]
-        lines.append(
-            f"| {word} | " + " | ".join(_word(mean, lambda value: f"{100 * value:.1f}") for mean in means) + " |"
-        )
+        lines.append(f"| {word} | " + " | ".join(written(mean, (100.0, ".1f", "")) for mean in means) + " |")
     return [*lines, ""]
-
-
-def _word(value: float, form: Callable[[float], str]) -> str:
-    return form(value) if math.isfinite(value) else "-"

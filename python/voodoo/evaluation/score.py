@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,6 +15,23 @@ from voodoo.evaluation.metrics import BoolArray, FloatArray
 
 LIMIT_EXACT_M, LIMIT_REFERENCE_M = 0.10, 0.15
 """Distances from exact truth, and from another tracker's skeleton, beyond which a joint is lost [m]."""
+
+Form: TypeAlias = tuple[float, str, str]
+"""How a number is written: factor, digits and unit."""
+CM, MM, PERCENT = (100.0, ".1f", " cm"), (1000.0, ".1f", " mm"), (100.0, ".1f", " %")
+SECONDS, DEGREES, RATIO = (1.0, ".2f", " s"), (1.0, ".1f", " deg"), (1.0, ".2f", "")
+
+
+def written(value: float, form: Form) -> str:
+    """A number as text; "-" if it is not known."""
+    factor, digits, unit = form
+    return f"{factor * value:{digits}}{unit}" if math.isfinite(value) else "-"
+
+
+def _measure(words: str, form: Form) -> float:
+    """An unknown number, and its row in a report."""
+    unknown: float = field(default=np.nan, metadata={"row": (words, form)})
+    return unknown
 
 
 @dataclass(frozen=True)
@@ -58,41 +77,41 @@ class Score:
     failure: str = ""
     frames: int = 0
     exact: bool | None = None
-    error_m: float = np.nan
-    error_lag0_m: float = np.nan
-    error_best_lag_m: float = np.nan
+    error_m: float = _measure("mean joint error", CM)
+    error_lag0_m: float = _measure("... at lag 0", CM)
+    error_best_lag_m: float = _measure("... at the best lag", CM)
     best_lag: int | None = None
-    error_without_offsets_m: float = np.nan
-    class_without_offsets: float = np.nan
-    lost_without_offsets: float = np.nan
-    first_pose_s: float = np.nan
-    first_pose_error_m: float = np.nan
-    within_5cm: float = np.nan
-    within_10cm: float = np.nan
+    error_without_offsets_m: float = _measure("... each joint's constant offset removed", CM)
+    class_without_offsets: float = _measure("... class average of that error", RATIO)
+    lost_without_offsets: float = _measure("... sequences that end with a joint lost by it", PERCENT)
+    first_pose_s: float = _measure("first pose after", SECONDS)
+    first_pose_error_m: float = _measure("mean error in the first pose", CM)
+    within_5cm: float = _measure("joints within 5 cm", PERCENT)
+    within_10cm: float = _measure("joints within 10 cm", PERCENT)
     joint_error_m: dict[str, float] = field(default_factory=dict)
     tracking_class: int | None = None
     lost_joints: tuple[str, ...] = ()
     selection: Selection | None = None
-    depth_within_5cm: float = np.nan
-    depth_median_m: float = np.nan
-    depth_p95_m: float = np.nan
-    person_within_5cm: float = np.nan
-    silhouette_iou: float = np.nan
-    jitter_m: float = np.nan
-    reference_jitter_m: float = np.nan
-    standing_jitter_m: float = np.nan
-    reference_standing_jitter_m: float = np.nan
-    degraded_share: float = np.nan
-    lost_share: float = np.nan
-    searching_share: float = np.nan
-    lost_recall: float = np.nan
-    false_alarm_rate: float = np.nan
+    depth_within_5cm: float = _measure("depth within 5 cm of the model", PERCENT)
+    depth_median_m: float = _measure("depth to model, median", MM)
+    depth_p95_m: float = _measure("depth to model, 95th percentile", MM)
+    person_within_5cm: float = _measure("within 5 cm, of depth about the known joints", PERCENT)
+    silhouette_iou: float = _measure("silhouette IoU", (1.0, ".3f", ""))
+    jitter_m: float = _measure("second difference of the joints", MM)
+    reference_jitter_m: float = _measure("... of the reference", MM)
+    standing_jitter_m: float = _measure("second difference where the reference stands still", MM)
+    reference_standing_jitter_m: float = _measure("... of the reference itself there", MM)
+    degraded_share: float = _measure("frames called degraded", PERCENT)
+    lost_share: float = _measure("frames called lost", PERCENT)
+    searching_share: float = _measure("frames without a pose", PERCENT)
+    lost_recall: float = _measure("limbs off by 10 cm and not called measured", (100.0, ".0f", " %"))
+    false_alarm_rate: float = _measure("nearer limbs not called measured", PERCENT)
     far_ends: int = 0
     near_ends: int = 0
-    step_s: float = np.nan
-    angle_error_deg: float = np.nan
-    angle_spread_deg: float = np.nan
-    left_out_share: float = np.nan
+    step_s: float = _measure("time of a frame", (1000.0, ".2f", " ms"))
+    angle_error_deg: float = _measure("error of the joint angles", DEGREES)
+    angle_spread_deg: float = _measure("... its standard deviation", DEGREES)
+    left_out_share: float = _measure("joints of the reference left out, their bones off", PERCENT)
 
     @property
     def nobody(self) -> bool:

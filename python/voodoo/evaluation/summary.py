@@ -1,15 +1,18 @@
-"""Means over sequences of one kind."""
+"""Means over sequences of one kind, and the tables of an evaluation as CSV files."""
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
 from voodoo.evaluation import metrics
-from voodoo.evaluation.score import Score
+from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
+from voodoo.whole import appearing_whole
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -42,14 +45,14 @@ class Summary:
         return metrics.mean_or_nan(np.repeat(np.array(CLASSES, dtype=np.float64), self.classes))
 
 
-MEANS = tuple(item.name for item in fields(Score) if item.type == "float")
-
-
+ROWS: dict[str, tuple[str, Form]] = {item.name: item.metadata["row"] for item in fields(Score) if item.metadata}
+"""Means, by the name of the field of Score: words and form of their rows."""
 TOGETHER = {"lost_recall": "far_ends", "false_alarm_rate": "near_ends"}
 """Fractions that are also computed over all sequences together, because some have few such limbs, and their totals."""
-
-
-SUMMARY = (*MEANS, *(f"{name}_together" for name in TOGETHER))
+ALL_ROWS = ROWS | {
+    "lost_recall_together": ("limbs off by 10 cm, all sequences together", PERCENT),
+    "false_alarm_rate_together": ("nearer limbs, all sequences together", PERCENT),
+}
 
 
 def summarize(scores: Sequence[Score]) -> list[Summary]:
@@ -61,9 +64,7 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
         if group:
             lags = [score.best_lag for score in done if score.best_lag is not None]
             counts = [sum(score.tracking_class == value for score in done) for value in CLASSES]
-            means = {
-                name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in MEANS
-            }
+            means = {name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in ROWS}
             means |= {f"{name}_together": _together(done, name, count) for name, count in TOGETHER.items()}
             summaries.append(
                 Summary(
@@ -83,3 +84,69 @@ def _together(scores: Sequence[Score], name: str, count: str) -> float:
     counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
     total = sum(number for _, number in counts)
     return sum(fraction * number for fraction, number in counts) / total if total else math.nan
+
+
+def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write rows of values; unknown ones are empty cells."""
+    with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(map(cell, row) for row in rows)
+
+
+def cell(value: object) -> str:
+    """A value as text; "" if it is not known."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    return f"{value:.6f}" if isinstance(value, float) else str(value)
+
+
+def write_sequences(path: Path, scores: Sequence[Score]) -> None:
+    """A row for each recording."""
+    own = ("name", "failure", "frames", "exact", "tracking_class", "best_lag", *ROWS, *TOGETHER.values())
+    header = [*own, *(f"error_{name}_m" for name in metrics.JOINTS), "selection", "lost_joints", "path"]
+    rows = (
+        [getattr(score, name) for name in own]
+        + [score.joint_error_m.get(name) for name in metrics.JOINTS]
+        + [score.selection, " ".join(score.lost_joints), score.path]
+        for score in scores
+    )
+    write_table(path, header, rows)
+
+
+def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
+    """A row for each kind of comparison."""
+    own = ("kind", "sequences", "failures", "class_0", "class_1", "class_2", "class_average")
+    rows = (
+        [
+            one.kind,
+            one.sequences,
+            one.failures,
+            *one.classes,
+            one.class_average,
+            *(one.means[name] for name in ALL_ROWS),
+        ]
+        for one in summaries
+    )
+    write_table(path, [*own, *ALL_ROWS], rows)
+
+
+def write_frames(path: Path, table: FrameTable) -> None:
+    """A row for each frame of a recording."""
+    header = ["stamp_s", "status", "mean_error_m", *(f"{name}_error_m" for name in metrics.JOINTS)]
+    header += ["lost_joints", "depth_within_5cm", "silhouette_iou", "step_s"]
+    lost = [" ".join(np.array(metrics.JOINTS)[flags]) for flags in table.lost]
+    columns = (
+        table.stamps,
+        table.status,
+        table.errors,
+        lost,
+        table.depth_within_5cm,
+        table.silhouette_iou,
+        table.step_s,
+    )
+    rows = (
+        [repr(float(stamp)), status, metrics.mean_or_nan(errors), *errors, *last]
+        for stamp, status, errors, *last in zip(*columns, strict=True)
+    )
+    write_table(path, header, rows)

@@ -16,7 +16,7 @@ from voodoo.export.conventions import Y_UP_LEFT, names_of
 from voodoo.export.skeleton import Bone, FloatArray, held, placed_on_parents, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.limb_mesh import limb_mesh
+from voodoo.model.projection import limb_mesh
 from voodoo.model.rotations import quaternions
 from voodoo.whole import appearing_whole
 

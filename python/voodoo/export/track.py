@@ -43,9 +43,7 @@ def angle_sigmas_of(estimates: Sequence[Estimate], names: Sequence[str]) -> Floa
     return np.sqrt(found / free) if np.isfinite(found).any() else np.empty((len(estimates), 0))
 
 
-def covariances_of(
-    estimates: Sequence[Estimate], joint_names: Sequence[str], limb_names: Sequence[str]
-) -> tuple[FloatArray, FloatArray]:
+def covariances_of(estimates: Sequence[Estimate], joint_names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where unknown, and
     (F, 0, 3, 3) if unknown in all frames."""
     joints = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
@@ -210,7 +208,7 @@ class Track:
                     raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
                 joints[index], poses[index] = estimate.joint_positions, estimate.limb_poses
         angle_names, angles = angles_of_estimates(estimates, body)
-        covariance, root_covariance = covariances_of(estimates, joint_names, limb_names)
+        covariance, root_covariance = covariances_of(estimates, joint_names)
         support = [estimate.limb_status for estimate in estimates]
         return cls(
             covariance=covariance,

@@ -18,8 +18,7 @@ from voodoo.model.body import Body
 from voodoo.people import People, PeopleEstimate, Person
 from voodoo.pipeline.floor import detections
 from voodoo.pipeline.front_end import ONE, FrontEnd
-from voodoo.pipeline.starts.base import FoundStart
-from voodoo.pipeline.starts.chosen import Starts
+from voodoo.pipeline.starts import FoundStart, Starts
 from voodoo.sensors.settings import FrontEndSettings
 from voodoo.tracker import Tracker
 

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import CameraError
-from voodoo.model.joint import as_numbers, numbers_of, short
+from voodoo.errors import CameraError, of_kind
+from voodoo.model.joint import as_numbers, number_of, numbers_of, short
 
 CameraModel = Literal["plumb_bob", "rational_polynomial", "equidistant", "inverse_plumb_bob"]
 """Lens models of sensor_msgs/CameraInfo: Brown-Conrady (k1 k2 p1 p2 k3), the same with k4 k5 k6 in the denominator
 (and optionally thin prism and tilt, in OpenCV's order), and Kannala-Brandt (k1 k2 k3 k4 on the angle); and Brown-Conrady
 from distorted to undistorted coordinates, the calibration of RealSense's color cameras."""
 
-_COEFFICIENTS: dict[str, tuple[int, ...]] = {
-    "plumb_bob": (0, 4, 5),
-    "rational_polynomial": (0, 8, 12, 14),
-    "equidistant": (0, 4),
-    "inverse_plumb_bob": (0, 4, 5),
-}
 _ALIASES = {
     "": "plumb_bob", "none": "plumb_bob", "fisheye": "equidistant", "kannala_brandt4": "equidistant",
     # librealsense's; its modified model differs by products of the radial and the tangential part only
@@ -65,36 +58,23 @@ class Camera:
     model: CameraModel = "plumb_bob"
 
     def __post_init__(self) -> None:
-        """Check every field and store plain ints and floats, so that equal cameras compare equal."""
+        """Store plain ints and floats, so that equal cameras compare equal; the core checks their ranges."""
         for name in ("width", "height"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise CameraError(f"camera {name}: expected a whole number of pixels >= 1, found {short(value)}")
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 1 <= value <= MOST_PIXELS:
+                raise CameraError(
+                    f"camera {name}: expected a whole number of pixels, 1 to {MOST_PIXELS}, found {short(value)}"
+                )
             object.__setattr__(self, name, int(value))
-        if self.width * self.height > MOST_PIXELS:
-            raise CameraError(
-                f"camera size: expected at most {MOST_PIXELS} pixels, as an 8K picture has, "
-                f"found {short(self.width)}x{short(self.height)}"
-            )
         for name in ("fx", "fy", "cx", "cy"):
-            value = _number(f"camera {name}", getattr(self, name))
-            if name in ("fx", "fy") and value <= 0.0:
-                raise CameraError(f"camera {name}: expected a focal length > 0 px, found {value!r}")
-            object.__setattr__(self, name, value)
-        if not isinstance(self.model, str) or self.model not in get_args(CameraModel):
-            raise CameraError(f"camera model: expected one of {', '.join(get_args(CameraModel))}, found {self.model!r}")
-        coefficients = _numbers("camera distortion", self.distortion)
-        if len(coefficients) not in _COEFFICIENTS[self.model]:
-            counts = " or ".join(map(str, _COEFFICIENTS[self.model]))
-            raise CameraError(
-                f"camera distortion: expected {counts} coefficients for {self.model}, "
-                f"found {len(coefficients)}: {coefficients}"
-            )
-        # For both polynomial models zeros mean "no lens distortion"; for the equidistant one they mean a pure
+            object.__setattr__(self, name, number_of(f"camera {name}", getattr(self, name), error=CameraError))
+        of_kind("camera model", self.model, str, CameraError)
+        object.__setattr__(self, "distortion", _numbers("camera distortion", self.distortion))
+        _core_of(self)
+        # For the polynomial models zeros mean "no lens distortion"; for the equidistant one they mean a pure
         # equidistant lens, which is not a pinhole, so they have to stay.
-        if self.model != "equidistant" and not any(coefficients):
-            coefficients = ()
-        object.__setattr__(self, "distortion", coefficients)
+        if self.model != "equidistant" and not any(self.distortion):
+            object.__setattr__(self, "distortion", ())
 
     @classmethod
     def from_camera_info(
@@ -196,16 +176,6 @@ def _rays(camera: Camera) -> npt.NDArray[np.float32]:
     return rays
 
 
-def _number(name: str, value: object) -> float:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise CameraError(f"{name}: expected a number, found {short(value)}") from None
-    if not math.isfinite(number):
-        raise CameraError(f"{name}: expected a finite number, found {number!r}")
-    return number
-
-
 def _numbers(name: str, values: Any, *, count: int | None = None) -> tuple[float, ...]:  # noqa: ANN401 - checked here
     """The numbers of an iterable, or of an array of any shape row by row."""
     try:
@@ -214,4 +184,6 @@ def _numbers(name: str, values: Any, *, count: int | None = None) -> tuple[float
         raise CameraError(f"{name}: expected numbers, found {short(values)}") from None
     if count is not None and rows.size != count:
         raise CameraError(f"{name}: expected {count} numbers, found {rows.size}")
-    return tuple(_number(name, value) for value in rows.reshape(-1).tolist())
+    if not np.isfinite(rows).all():
+        raise CameraError(f"{name}: expected finite numbers, found {short(values)}")
+    return tuple(rows.reshape(-1).tolist())

@@ -163,18 +163,18 @@ def _child(node: object, part: str | int) -> object:
     return node[part] if isinstance(node, list) and isinstance(part, int) and part < len(node) else None
 
 
-def number_of(name: str, value: object, expected: str = "a number") -> float:
+def number_of(name: str, value: object, expected: str = "a number", *, error: type[VoodooError] = BodyError) -> float:
     """Check a number given by the caller.
 
     Raises:
-        BodyError: it is not a number; names the argument.
+        VoodooError: of the class `error`, if it is not a number; names the argument.
     """
     try:
         if isinstance(value, str):
             raise TypeError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise BodyError(f"{name}: expected {expected}, found {short(value)}") from None
+        raise error(f"{name}: expected {expected}, found {short(value)}") from None
 
 
 def as_numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:

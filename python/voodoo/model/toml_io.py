@@ -1,9 +1,8 @@
-"""Reads TOML with errors of the caller's class, and writes it with comments."""
+"""Reads TOML with errors of the caller's class."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +43,3 @@ def read_text(path: str | Path, *, error: type[VoodooError]) -> str:
         VoodooError: of the class `error`, naming the file.
     """
     return read_stored_text(a_path(path, error=error), "a readable TOML file", most=MOST_METADATA, error=error)
-
-
-def commented(values: Mapping[str, Any], *, title: str, notes: Mapping[str, Sequence[str]]) -> str:
-    """Entries as TOML, each below the lines of its comment."""
-    from tomlkit import item
-
-    blocks = [[f"# {title}"]]
-    for name, value in values.items():
-        blocks.append([*(f"# {line}" for line in notes.get(name, ())), f"{name} = {item(value).as_string()}"])
-    return "\n\n".join(map("\n".join, blocks)) + "\n"

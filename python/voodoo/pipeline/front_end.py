@@ -22,8 +22,7 @@ from voodoo.names import INPUTS, SEARCHING
 from voodoo.people import ONE, Followed, People, PeopleEstimate, everybody
 from voodoo.pipeline.frozen import FrozenSensors
 from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.starts.base import FoundStart, StartFrame
-from voodoo.pipeline.starts.chosen import Starts, automatic_starts
+from voodoo.pipeline.starts import FoundStart, StartFrame, Starts
 from voodoo.sensors.adapters import NOBODY, Context, Memory, adapters_of, all_adapters
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.keypoints.sites import KeypointReport
@@ -81,7 +80,7 @@ class FrontEnd(Generic[E]):
         self.memory = Memory()
         self.rays: list[SiteRay] = []
         self.found: FoundStart | None = None
-        self._starts = starts or automatic_starts()
+        self._starts = starts or Starts()
         self._frozen = FrozenSensors()
         self._alive: Sequence[Any] = ()
         self._persons: dict[int, _Person] = {}

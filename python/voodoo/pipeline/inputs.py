@@ -3,53 +3,79 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from voodoo.errors import VoodooError
-from voodoo.pipeline.detected import Detected
-from voodoo.recordings.joined import Joined, WithKeypoints
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.measurements import RecordedFrame
+from voodoo.recordings.joined import Around, Joined, WithKeypoints
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.loaders import LOADERS, guess_loader, open_recording, options_of
 from voodoo.recordings.marker_files import MarkerMap
-from voodoo.recordings.recording import Recording
+from voodoo.recordings.recording import Recording, RecordingInfo
 from voodoo.recordings.videos import picture_sources
 from voodoo.sensors.keypoints.networks import KeypointNetwork, network_of
 
 
-def keypoint_folders(words: Sequence[str]) -> dict[str, Path]:
-    """Parse "SENSOR=FOLDER" arguments to a mapping from sensor to folder.
+class Detected(Around):
+    """A recording with the keypoints that a network finds in its color images.
+
+    Args:
+        recording: with color images.
+        network: run on each of them that has no keypoints yet.
+        left_out: counts damaged color images, which are left out; None: they are errors.
 
     Raises:
-        VoodooError: an argument of another form, or a folder that does not exist.
+        RecordingError: no color images.
     """
-    folders = {}
-    for word in words:
-        sensor, _, folder = word.partition("=")
-        if not (sensor and folder):
-            raise VoodooError(f"keypoints: expected SENSOR=FOLDER, found {word!r}")
-        if not Path(folder).is_dir():
-            raise VoodooError(f"{folder}: expected a folder of OpenPose JSON files, found none")
-        folders[sensor] = Path(folder)
-    return folders
+
+    def __init__(self, recording: Recording, network: KeypointNetwork, *, left_out: LeftOut | None = None) -> None:
+        """Check that there are color images."""
+        super().__init__(recording)
+        self._network, self._refused = network, None if left_out is None else left_out.add_error
+        sensors = recording.info().sensors
+        names = {sensor.name for sensor in sensors}
+        colors = [sensor.name for sensor in sensors if sensor.kind == "color"]
+        if not colors:
+            found = ", ".join(f"{sensor.name} ({sensor.kind})" for sensor in sensors) or "none"
+            raise RecordingError(f"{recording.path}: expected color images for {network.name}, found {found}")
+        self._cameras = {name for name in colors if f"{name}/keypoints" not in names}
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """The frames, with a KeypointImage before each color image."""
+        for recorded in self._recording:
+            yield RecordedFrame(recorded.stamp, self._network.added_to(recorded, refused=self._refused))
+
+    def info(self) -> RecordingInfo:
+        """The summary of the recording, with the keypoints."""
+        return self._info(self._cameras, f"{self._network.layout} by {self._network.name}")
 
 
 def keypoint_words(words: Sequence[str], layout: str | None) -> tuple[dict[str, Path], KeypointNetwork | None]:
     """Folders by sensor, and the network to run on all other color images.
 
     Args:
-        words: "SENSOR=FOLDER" (see keypoint_folders), and at most one network (see network_of).
+        words: "SENSOR=FOLDER", and at most one network (see network_of).
         layout: of the keypoints; None: told by them, or by the network.
 
     Raises:
-        VoodooError: an argument of another form, several networks, or one that cannot be loaded.
+        VoodooError: an argument of another form, a folder that does not exist, several networks, or one that cannot be loaded.
     """
-    networks = [word for word in words if "=" not in word]
+    folders, networks = {}, []
+    for word in words:
+        sensor, of_sensor, folder = word.partition("=")
+        if not of_sensor:
+            networks.append(word)
+        elif not (sensor and folder):
+            raise VoodooError(f"keypoints: expected SENSOR=FOLDER, found {word!r}")
+        elif not Path(folder).is_dir():
+            raise VoodooError(f"{folder}: expected a folder of OpenPose JSON files, found none")
+        else:
+            folders[sensor] = Path(folder)
     if len(networks) > 1:
         raise VoodooError(f"keypoints: expected one network, found {', '.join(networks)}")
-    folders = keypoint_folders([word for word in words if "=" in word])
     return folders, network_of(networks[0], layout=layout) if networks else None
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from voodoo.measurements import (
-    RecordedFrame,
-)
+from voodoo.measurements import RecordedFrame
 from voodoo.recordings.recording import Recording
 
 

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any, Generic
 
+from voodoo._core import Estimate
 from voodoo.errors import VoodooError
 from voodoo.measurements import ColorImage, Measurement, RecordedFrame
 from voodoo.people import People
 from voodoo.pipeline.front_end import E, FrontEnd, Steps
 from voodoo.pipeline.pairing import paired
 from voodoo.pipeline.start import Init, check_findable, start_tracker
-from voodoo.pipeline.starts.chosen import Starts
+from voodoo.pipeline.starts import Starts
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.settings import FrontEndSettings
+from voodoo.tracker import Tracker
 
 __all__ = ["Init", "TrackedFrame", "decodable", "start_tracker", "track"]
+
+
+_ROUNDED_S = 1e-6
 
 
 def decodable(measurements: Sequence[Measurement]) -> tuple[tuple[Measurement, ...], list[VoodooError]]:
@@ -60,6 +66,7 @@ def track(
     settings: FrontEndSettings | None = None,
     starts: Starts | None = None,
     left_out: LeftOut | None = None,
+    after: float = -math.inf,
 ) -> Iterator[TrackedFrame[E]]:
     """Step the tracker through a recording, by the front end that every command uses.
 
@@ -71,6 +78,7 @@ def track(
         settings: which inputs are used and how; None means all available ones, see FrontEndSettings.of.
         starts: sources of detections; None: all that the recording offers.
         left_out: counts undecodable images and frames that the tracker rejects, which are then left out; None: they are errors.
+        after: earlier frames are passed over [s].
 
     Raises:
         VoodooError: the recording is damaged, or the tracker rejects a frame; names the frame.
@@ -80,6 +88,8 @@ def track(
         check_findable(recording, tracker, settings.use)
     front_end = FrontEnd(tracker, settings=settings, starts=starts)
     for index, recorded in enumerate(paired(recording)):
+        if recorded.stamp < after - _ROUNDED_S:
+            continue
         began = time.perf_counter()
         try:
             estimate = front_end.step(recorded)
@@ -96,3 +106,17 @@ def track(
                 left_out.add("that the tracker refuses", f"{recording.name}, frame {index}: {refusal}")
                 continue
         yield TrackedFrame(index, recorded, estimate, time.perf_counter() - began, front_end)
+
+
+def first_pose(recording: Recording, tracker: Tracker, **how: Any) -> Estimate | None:  # noqa: ANN401 - of track
+    """Step a tracker without a pose until a person is found; returns the estimate of that frame, or None.
+
+    Args:
+        recording: read while searching.
+        tracker: it has a pose afterwards.
+        **how: see `track`.
+
+    Raises:
+        VoodooError: see `track`.
+    """
+    return next((step.estimate for step in track(recording, tracker, **how) if step.front_end.posed), None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import Annotated, Any, TypeAlias, get_args
 
 from pydantic import ConfigDict, Field, FiniteFloat
 
@@ -18,25 +18,20 @@ from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.joint import short, valid
-from voodoo.model.legs import legs_body
-from voodoo.names import HumanModel
+from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
-from voodoo.pipeline.front_end import FrontEnd
-from voodoo.pipeline.pairing import paired
-from voodoo.pipeline.starts.chosen import Starts
+from voodoo.pipeline.starts import Starts
 from voodoo.pipeline.starts.given import EarlierStart, GivenStart
-from voodoo.pipeline.starts.legs import serves
-from voodoo.recordings.left_out import LeftOut
+from voodoo.pipeline.starts.legs import legs_body, serves
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.truth import FirstPose
 from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
-from voodoo.sensors.settings import FrontEndSettings, inputs_for
+from voodoo.sensors.settings import inputs_for
 from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
-_ROUNDED_S = 1e-6
 _DEFAULT_M = 1.75
 """Stature of `Body.human()`."""
 
@@ -70,13 +65,8 @@ class Init(FirstPose):
 
     def to_json(self) -> str:
         """JSON text that `load` reads, one joint per line."""
-        entries = {
-            "format_version": self.format_version,
-            "height_m": self.height_m,
-            "stamp_s": self.stamp_s,
-            "frame": self.frame,
-        }
-        lines = [f'  "{name}": {json.dumps(value)}' for name, value in entries.items() if value is not None]
+        entries = self.model_dump(exclude={"joints"}, exclude_none=True)
+        lines = [f'  "{name}": {json.dumps(value)}' for name, value in entries.items()]
         joints = [f'    "{name}": {json.dumps(place)}' for name, place in self.joints.items()]
         lines.append('  "joints": {\n' + ",\n".join(joints) + "\n  }")
         return "{\n" + ",\n".join(lines) + "\n}"
@@ -91,8 +81,7 @@ class Init(FirstPose):
             return self
         about = recording.info()
         pose = recording.root_from(str(self.frame), about.start_stamp if self.stamp_s is None else self.stamp_s)
-        moved = {"frame": recording.root_frame, "joints": self.moved(pose)}
-        return type(self).model_validate({**self.model_dump(), **moved})
+        return self.model_copy(update={"frame": recording.root_frame, "joints": self.moved(pose)})
 
     @classmethod
     def of(cls, recording: Recording) -> Init | None:
@@ -107,8 +96,6 @@ class Init(FirstPose):
             return cls.model_validate(dict(recording.start))
 
 
-Automatic: TypeAlias = Literal["auto"]
-"""Value that requests a search, even if a first pose comes with the recording."""
 AUTO: Automatic = "auto"
 Beginning: TypeAlias = Init | Track | Automatic
 """A first pose, an earlier result that has one, or neither."""
@@ -158,7 +145,8 @@ def start_tracker(
     init = init or Init.of(recording) or AUTO
     if height is None and body is None and isinstance(init, Init):
         height = init.height_m
-    legs = init == AUTO and _only_laser(recording, use)
+    # Without another input to start from: no person can be found in images of skin and color.
+    legs = init == AUTO and used_kinds(recording, use) - {"skin", "color"} == {"scan"}
     tracker = Tracker(
         _body(body, height=height, model=model, markers=markers, legs=legs), config=config, detector=detector
     )
@@ -228,43 +216,6 @@ def starts_of(init: Beginning | None, recording: Recording) -> Starts | None:
     return Starts((EarlierStart(init),), by_tracker=False) if isinstance(init, Track) else None
 
 
-def first_pose(
-    recording: Recording,
-    tracker: Tracker,
-    *,
-    settings: FrontEndSettings | None = None,
-    starts: Starts | None = None,
-    after: float = float("-inf"),
-    left_out: LeftOut | None = None,
-) -> Estimate | None:
-    """Step a tracker until a person is found; returns the estimate of that frame, or None.
-
-    Args:
-        recording: read while searching.
-        tracker: without a pose; it has one afterwards.
-        settings, starts: see `voodoo.pipeline.run.track`.
-        after: frames before this time [s] are left out.
-        left_out: counts frames that the tracker rejects, which are left out; None: they are errors.
-
-    Raises:
-        VoodooError: the recording is damaged, or the tracker rejects a frame.
-    """
-    front_end = FrontEnd(tracker, settings=settings or FrontEndSettings.of(recording), starts=starts)
-    for recorded in paired(recording):
-        if recorded.stamp < after - _ROUNDED_S:
-            continue
-        try:
-            estimate = front_end.step(recorded)
-        except VoodooError as error:
-            if left_out is None:
-                raise
-            left_out.add_error(error)
-            continue
-        if front_end.posed:
-            return estimate
-    return None
-
-
 def pose_as_init(estimate: Estimate, body: Body) -> Init:
     """The pose of a frame as a first pose, with its time and, for a person, the stature.
 
@@ -293,15 +244,10 @@ def _upright(body: Body) -> float:
     return float(max(heights) - min(heights))
 
 
-def _kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
+def used_kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
     """Kinds of inputs that a recording has and that are used."""
     has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
     return has & set(use if use is not None else inputs_for(recording))
-
-
-def _only_laser(recording: Recording, use: Sequence[str] | None) -> bool:
-    """Whether lasers are the only inputs to start from, because no person can be found in images."""
-    return _kinds(recording, use) - {"skin", "color"} == {"scan"}
 
 
 def check_findable(recording: Recording, tracker: Tracker | People, use: Sequence[str] | None) -> None:
@@ -315,7 +261,7 @@ def check_findable(recording: Recording, tracker: Tracker | People, use: Sequenc
         if tracker.numbers:
             return
         tracker = Tracker(tracker.prototype, detector=tracker.detector)
-    kinds, body = _kinds(recording, use), tracker.body
+    kinds, body = used_kinds(recording, use), tracker.body
     blind = {"points", "skin", "color"}
     if not tracker.can_search:
         blind.add("depth")

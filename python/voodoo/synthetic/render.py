@@ -11,7 +11,6 @@ import numpy.typing as npt
 import voodoo._core as _core
 from voodoo.model.body import Body, ordered_poses
 from voodoo.model.camera import Camera
-from voodoo.model.transforms import rigid
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,6 +57,6 @@ def render_depth(
         body.core,
         ordered_poses(body, world_from_limb),
         camera=camera,
-        world_from_sensor=None if world_from_sensor is None else rigid(world_from_sensor),
+        world_from_sensor=world_from_sensor,
     )
     return RenderedDepth(depth, limb, body.limb_names)

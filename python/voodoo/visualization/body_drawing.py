@@ -70,15 +70,12 @@ def draw_people(picture: Picture, estimate: PeopleEstimate, bodies: Mapping[int,
         view: projection into the image.
     """
     posed = [person for person in estimate if person.estimate.joints]
-    away = {person.id: float(view.project(_middle(person)[None])[1][0]) for person in posed}
+    middles = {person.id: np.mean(list(person.estimate.joints.values()), axis=0) for person in posed}
+    away = {number: float(view.project(middle[None])[1][0]) for number, middle in middles.items()}
     for person in sorted(posed, key=lambda one: -away[one.id]):
         draw_body(picture, bodies[person.id], person.estimate, view, color=person_color(person.id))
     for person in posed:
         _number(picture, person, view)
-
-
-def _middle(person: Person) -> FloatArray:
-    return np.asarray(np.mean(list(person.estimate.joints.values()), axis=0))
 
 
 def _number(picture: Picture, person: Person, view: View) -> None:

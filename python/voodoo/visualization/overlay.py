@@ -26,7 +26,6 @@ from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
 from voodoo.sensors.adapters.points import SCAN
 from voodoo.sensors.adapters.skin import SKIN
 from voodoo.visualization.body_drawing import draw_body, draw_people
-from voodoo.visualization.sheet import in_rows
 
 _STATUS = {"tracking": (150, 220, 120), "degraded": (80, 200, 250), "lost": (80, 80, 250), SEARCHING: (230, 190, 110)}
 _AHEAD_FRAMES, _MOST_PANELS = 5, 4
@@ -102,7 +101,9 @@ class Overlay:
                 canvas.rays(rays, estimate)
             canvas.finish()
         picture = in_rows([canvas.picture for canvas in canvases], columns=self._columns)
-        caption(picture, self._when(index, estimate.stamp), estimate)
+        self._origin = estimate.stamp if self._origin is None else self._origin
+        when = f"{index + 1}/{self._frames}   {estimate.stamp - self._origin:.2f} s"
+        caption(picture, when, estimate)
         return picture
 
     def _canvases(self, recorded: RecordedFrame) -> Iterator[Canvas]:
@@ -115,11 +116,6 @@ class Overlay:
             item = current.get(sensor, first)
             view = CameraView(item.camera, item.root_from_sensor, scale)
             yield Canvas(np.asarray(resized, dtype=np.uint8), view, item, scale)
-
-    def _when(self, index: int, stamp: float) -> str:
-        """Number of a frame, and its time since the first one."""
-        self._origin = stamp if self._origin is None else self._origin
-        return f"{index + 1}/{self._frames}   {stamp - self._origin:.2f} s"
 
     def _background(self, item: Pictured | None, first: Pictured) -> Picture:
         """The image of the camera; a dark background if there is no new one, or only keypoints."""
@@ -196,3 +192,22 @@ def _grid(view: TopView) -> Picture:
             a, b = (point(pixel) for pixel in view.project(ends)[0])
             cv2.line(picture, a, b, (62, 56, 52), 1, cv2.LINE_AA, SUBPIXEL)
     return picture
+
+
+def in_rows(pictures: Sequence[Picture], *, columns: int) -> Picture:
+    """Images in rows of `columns`, scaled to the height of the first one in a row, all rows to the width of the first one;
+    black where there are too few."""
+    pictures = [*pictures, *[np.zeros_like(pictures[0])] * (-len(pictures) % columns)]
+    starts = range(0, len(pictures), columns)
+    rows = [np.hstack(_fitted(pictures[start : start + columns], 0)) for start in starts]
+    return np.asarray(np.vstack(_fitted(rows, 1)), dtype=np.uint8)
+
+
+def _fitted(pictures: Sequence[Picture], axis: int) -> list[npt.NDArray[Any]]:
+    """Images scaled to the size of the first one along an axis: 0 height, 1 width."""
+    size = pictures[0].shape[axis]
+    fitted = []
+    for picture in pictures:
+        height, width = (round(side * size / picture.shape[axis]) for side in picture.shape[:2])
+        fitted.append(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+    return fitted

@@ -11,20 +11,19 @@ from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
-from types import ModuleType, TracebackType
+from types import TracebackType
 from typing import Any
 
 import numpy as np
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.children import children
-from voodoo.drawing.body_geometry import bands, limb_colors
 from voodoo.drawing.ink import person_color
-from voodoo.drawing.rerun_log import Log, entity
+from voodoo.drawing.rerun_log import Log, bands, entity, limb_colors
 from voodoo.errors import VoodooError, installed
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
-from voodoo.model.limb_mesh import limb_mesh
+from voodoo.model.projection import limb_mesh
 from voodoo.model.rotations import quaternions
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
@@ -69,8 +68,12 @@ class Viewer:
         )
         if save is not None and Path(save).suffix != ".rrd":
             raise VoodooError(f"{save}: expected a name that ends in .rrd, found {Path(save).suffix!r}")
-        how = {} if save is None else _large_chunks(self._rr)
-        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, **how)
+        chunks = None
+        if save is not None:
+            chunks = self._rr.ChunkBatcherConfig.DEFAULT()
+            # Every chunk has an overhead of two kilobytes, and of a file the latency does not matter.
+            chunks.flush_tick, chunks.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
+        self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, batcher_config=chunks)
         self._stream.send_recording_name(name)
         self._server: Server | None = None
         self._ends = ExitStack()
@@ -165,7 +168,9 @@ class Viewer:
             seconds: time the step took.
         """
         bodies = bodies if isinstance(bodies, Mapping) else {ONE: bodies}
-        self._set_time(estimate.stamp)
+        # Stamps of a robot are Unix times, those of other recordings start at zero.
+        clock = "timestamp" if estimate.stamp > _EPOCH_S else "duration"
+        self._stream.set_time("time", **{clock: estimate.stamp})
         if isinstance(estimate, PeopleEstimate):
             self._log_people(estimate, bodies)
             # Images and points are not assigned to persons.
@@ -204,11 +209,6 @@ class Viewer:
             self._stream.log(f"plots/status/{person.id}", rr.TextLog(str(person.status)))
         self._stream.log("plots/people", rr.Scalars(float(len(there))))
 
-    def _set_time(self, stamp: float) -> None:
-        # Stamps of a robot are Unix times, those of other recordings start at zero.
-        clock = "timestamp" if stamp > _EPOCH_S else "duration"
-        self._stream.set_time("time", **{clock: stamp})
-
     def _clear(self, path: str) -> None:
         """Clear the body; the meshes must be sent again for the next person."""
         self._stream.log(path, self._rr.Clear(recursive=True))
@@ -232,7 +232,12 @@ class Viewer:
             logged = self._shapes.get(place)
             if not _alike(logged, limb.shape):
                 self._shapes[place] = limb.shape
-                self._stream.log(place, self._mesh(limb.shape, colors[limb.name], known=logged is not None))
+                vertices, triangles, normals = limb_mesh(limb.shape)
+                mesh = rr.Mesh3D.from_fields(vertex_positions=vertices)
+                if logged is None:
+                    about = {"vertex_normals": normals, "albedo_factor": (*colors[limb.name], 150)}
+                    mesh = rr.Mesh3D(vertex_positions=vertices, triangle_indices=triangles, **about)
+                self._stream.log(place, mesh)
             pose = estimate.world_from_limb[limb.name]
             self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
         self._stream.log(
@@ -242,19 +247,10 @@ class Viewer:
         self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
-    def _mesh(self, shape: TaperedEllipticCylinder, color: tuple[int, int, int], *, known: bool) -> object:
-        """Log the surface of a limb; for a `known` mesh only the vertices."""
-        vertices, triangles, normals = limb_mesh(shape)
-        if known and hasattr(self._rr.Mesh3D, "from_fields"):
-            return self._rr.Mesh3D.from_fields(vertex_positions=vertices)
-        return self._rr.Mesh3D(
-            vertex_positions=vertices, triangle_indices=triangles, vertex_normals=normals, albedo_factor=(*color, 150)
-        )
-
     def _log_spread(self, path: str, estimate: Estimate) -> None:
         """Ellipsoids of one standard deviation of the joints."""
         covariances = estimate.joint_covariances
-        if not hasattr(self._rr, "Ellipsoids3D") or not len(covariances):
+        if not len(covariances):
             return
         known = np.isfinite(covariances).all(axis=(1, 2))
         variances, axes = np.linalg.eigh(covariances[known])
@@ -297,12 +293,3 @@ def _alike(one: TaperedEllipticCylinder | None, other: TaperedEllipticCylinder) 
     """Whether the difference is invisible: sizes are refined in every frame, and a mesh needs kilobytes."""
     sizes = ("length", "a0", "b0", "a1", "b1")
     return one is not None and all(abs(getattr(one, name) - getattr(other, name)) < _VISIBLE_M for name in sizes)
-
-
-def _large_chunks(rr: ModuleType) -> dict[str, Any]:
-    """Batching of a file: every chunk has an overhead of two kilobytes, and latency does not matter."""
-    if not hasattr(rr, "ChunkBatcherConfig"):
-        return {}
-    config = rr.ChunkBatcherConfig.DEFAULT()
-    config.flush_tick, config.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
-    return {"batcher_config": config}

@@ -113,17 +113,14 @@ def _with_bones(
     joints: Mapping[str, FloatArray], limits: Mapping[tuple[str, str], tuple[float, float]], unit: float = 1.0
 ) -> dict[str, FloatArray]:
     """See `without_impossible`; lengths are compared in multiples of `unit` [m]."""
-    kept = dict(joints)
-    for (near, far), (least, most) in limits.items():
-        if near not in kept or far not in kept:
-            continue
-        if least <= float(np.linalg.norm(kept[near] - kept[far])) / unit <= most:
-            continue
-        if near in TRUNK and far in TRUNK:
-            return {}
-        for name in _BEYOND.get(far, (far,)):
-            kept.pop(name, None)
-    return kept
+    gone: set[str] = set()
+    for (near, far), (least, most) in (dict.fromkeys(BONES_M, (0.0, inf)) | dict(limits)).items():
+        known = near in joints and far in joints
+        if near in gone or (known and not least <= float(np.linalg.norm(joints[near] - joints[far])) / unit <= most):
+            if near in TRUNK and far in TRUNK:
+                return {}
+            gone.add(far)
+    return {name: place for name, place in joints.items() if name not in gone}
 
 
 def in_proportion(joints: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
@@ -164,14 +161,3 @@ _OF_STATURE: dict[tuple[str, str], float] = {
     ("l_shoulder", "skull_tip"): 0.211,
 }
 """Distances of sites of the default human, as fractions of the stature; parents first."""
-_BEYOND = {
-    f"{side}_{joint}": tuple(f"{side}_{name}" for name in beyond)
-    for side in "lr"
-    for joint, beyond in {
-        "elbow": ("elbow", "wrist", "hand"),
-        "wrist": ("wrist", "hand"),
-        "knee": ("knee", "ankle", "toe"),
-        "ankle": ("ankle", "toe"),
-    }.items()
-}
-"""A joint and its descendants."""

@@ -54,7 +54,7 @@ class CamerasStart(StartFinder):
             if isinstance(item, KeypointImage):
                 self._latest[item.sensor] = item
         images = [item for item in self._latest.values() if abs(frame.stamp - item.stamp) <= _TOGETHER_S]
-        views = _views(images, frame)
+        views = [[person for rows in item.people if (person := _person(item, rows, frame))] for item in images]
         found = []
         while (best := _best(views, frame)) is not None:
             joints = _joints(best.places)
@@ -77,11 +77,6 @@ class _Group:
     def score(self) -> float:
         """Number of rays that agree."""
         return sum(float(place.trust.sum()) for place in self.places.values())
-
-
-def _views(images: Sequence[KeypointImage], frame: StartFrame) -> list[list[_CameraPerson]]:
-    """Persons in each camera."""
-    return [[person for rows in item.people if (person := _person(item, rows, frame))] for item in images]
 
 
 def _best(views: Sequence[Sequence[_CameraPerson]], frame: StartFrame) -> _Group | None:

@@ -1,15 +1,19 @@
-"""A first pose from a planar laser: two moving objects of the size of a leg."""
+"""A first pose from a planar laser: two moving objects of the size of a leg; and the body of two legs that is tracked with it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import combinations, permutations
+from typing import Any
 
 import numpy as np
 
+import voodoo._core as _core
+from voodoo._core import TaperedEllipticCylinder
+from voodoo.errors import BodyError, naming
 from voodoo.measurements import FloatArray, LaserScan
-from voodoo.model.body import Body
-from voodoo.model.legs import HALF_WIDTH, HIP, LEG
+from voodoo.model.body import Body, Joint, Place
 from voodoo.model.projection import transform
 from voodoo.pipeline.starts.base import FoundStart, StartFinder, StartFrame
 from voodoo.sensors.free_space import FreeSpace
@@ -45,7 +49,7 @@ class LegsStart(StartFinder):
     An object in formerly free space has moved there and is not furniture. A person who has not moved since the first scan
     cannot be distinguished from furniture.
 
-    Works only for bodies that consist of legs (`voodoo.model.legs`): a laser does not determine the posture of a whole
+    Works only for bodies that consist of legs (see `legs_body`): a laser does not determine the posture of a whole
     person. The root frame must be fixed to the floor, as odom is; in a frame that moves with the robot nobody is found.
     """
 
@@ -132,3 +136,31 @@ def _found(legs: FloatArray, moved: FloatArray, scan: LaserScan, frame: StartFra
         joints[f"{side}_hip"] = hip
         joints[f"{side}_ankle"] = hip + (shin - hip) / np.linalg.norm(shin - hip) * LEG * _STATURE_M
     return FoundStart(joints, dict.fromkeys(joints, _SIGMA_M), LegsStart.name)
+
+
+HIP, LEG, HALF_WIDTH = 0.530, 0.491, 0.052
+"""Height of the hips, length of a leg and half the distance of the hips, as fractions of the stature of the default human."""
+_GIRTH = (0.075, 0.05)
+"""Radii at hip and ankle [m], in trousers."""
+
+
+def legs_body(height: float = 1.75) -> Body:
+    """Two legs on a pelvis, without knees, as observed by a planar laser.
+
+    Args:
+        height: stature of the person [m].
+
+    Raises:
+        BodyError: the stature gives no valid body.
+    """
+    thick, thin = _GIRTH
+    length = LEG * height
+    with naming(f"legs of a stature of {height} m", BodyError):
+        shape = TaperedEllipticCylinder(length, thick, thick, thin, thin)
+    limbs: list[Any] = [("pelvis", None, TaperedEllipticCylinder(0.10, 0.03, 0.03, 0.03, 0.03), None, (False, False))]
+    sites = []
+    for side, y in (("l", HALF_WIDTH * height), ("r", -HALF_WIDTH * height)):
+        hip = Joint(name=f"{side}_hip", on_parent=Place(position=(0.0, y, 0.0), rotation=(math.pi, 0.0, 0.0)))
+        limbs.append((f"{side}_leg", "pelvis", shape, hip.parts(), (False, False)))
+        sites += [(f"{side}_{name}", f"{side}_leg", (0.0, 0.0, z)) for name, z in (("hip", 0.0), ("ankle", length))]
+    return Body(_core.Body("standing legs", limbs, sites))
