@@ -32,8 +32,8 @@ from voodoo.live.stream import Live
 from voodoo.model.body import Body
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.start import starts_of
-from voodoo.recordings.loaders import open_recording
 from voodoo.recordings import sample_path
+from voodoo.recordings.loaders import open_recording
 from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
