@@ -1,7 +1,6 @@
 //! History of each arm and leg over frames.
 
 use super::objective::MARGIN;
-use crate::math::Vec3;
 
 /// Time in which the unexplained patches of a refused test lose half of their weight, seconds.
 const HALF_LIFE: f64 = 0.3;
@@ -14,8 +13,6 @@ pub(super) struct History {
     /// Cost of the patches that the proposals of earlier frames left unexplained, halved every `HALF_LIFE`. They belong to
     /// something else.
     refused: f64,
-    /// Position of its end in the last frame that confirmed it, world frame.
-    pub(super) last_good_end: Option<Vec3>,
 }
 
 impl History {
@@ -36,11 +33,6 @@ impl History {
     pub(super) fn reconsider(&mut self) {
         self.refused = 0.0;
     }
-
-    /// Whether nearly all points near it are explained in this frame.
-    pub(super) fn is_clear(&self) -> bool {
-        self.unexplained == 0.0
-    }
 }
 
 #[cfg(test)]
@@ -50,8 +42,8 @@ mod tests {
     #[test]
     fn what_was_refused_is_tested_again_when_twice_as_much_is_unexplained_or_after_its_half_life() {
         let mut history = History::default();
-        assert!(!history.observe(MARGIN - 1.0, 0.03) && history.is_clear());
-        assert!(history.observe(MARGIN, 0.03) && !history.is_clear());
+        assert!(!history.observe(MARGIN - 1.0, 0.03));
+        assert!(history.observe(MARGIN, 0.03));
         history.refuse();
         assert!(!history.observe(MARGIN, 0.03), "nothing has changed");
         assert!(history.observe(2.0 * MARGIN, 0.03), "more is unexplained");

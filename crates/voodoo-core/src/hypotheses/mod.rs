@@ -3,7 +3,6 @@
 
 mod branch;
 mod history;
-mod leg_swap;
 mod objective;
 mod proposals;
 mod refined;
@@ -25,8 +24,7 @@ use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
 use history::History;
-use leg_swap::LegSwap;
-use proposals::{ColorDirections, DetectedBody, DetectedEnd, LastGoodEnd, Pool, Propose, UnexplainedCluster};
+use proposals::{ColorDirections, DetectedBody, DetectedEnd, Pool, Propose, UnexplainedCluster};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
@@ -42,7 +40,6 @@ pub(crate) struct Hypotheses {
     rough: RoughSearch,
     clusters: UnexplainedCluster,
     color_directions: ColorDirections,
-    leg_swap: LegSwap,
     pool: Pool,
     refined: Refined,
     branch: Branch,
@@ -62,7 +59,6 @@ impl Hypotheses {
         // Reserved now, so that later steps do not allocate.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
-        self.leg_swap.prepare(limbs);
         self.branch.prepare(limbs);
         self.refined.prepare(limbs);
         self.before.clear();
@@ -103,11 +99,7 @@ impl Hypotheses {
         let elapsed = now - self.stamp.replace(now).unwrap_or(now);
         self.unexplained.collect(context, fit.matched(poses));
         self.refined.clutter = self.unexplained.clutter;
-        let mut steps = 0;
-        let pictures = context.pictures_alone();
-        if pictures && context.moves_unknown() {
-            steps += self.refined.try_far(context, fit, poses, predicted);
-        }
+        let (mut steps, pictures) = (0, context.pictures_alone());
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
@@ -125,10 +117,6 @@ impl Hypotheses {
             } else if !pictures {
                 self.history[index].refuse();
             }
-        }
-        if pictures {
-            let contradicted = |index: usize| !self.history[index].is_clear();
-            steps += self.leg_swap.attempt(context, contradicted, &mut self.refined, fit, poses, predicted);
         }
         if pictures {
             steps += self.branch.compare(context, &mut self.refined, fit, poses, predicted);
@@ -149,19 +137,6 @@ impl Hypotheses {
         for chain in &model.extremities {
             if is_elsewhere(chain, &self.before, &motion.poses) {
                 motion.forget_joints(&model.body, chain.limbs());
-            }
-        }
-    }
-
-    /// Stores the end position of every arm and leg that this frame does not contradict and whose limbs are all `measured`. If
-    /// the body is `lost`, first clears all stored positions.
-    pub(crate) fn remember(&mut self, model: &Model, motion: &Motion, lost: bool, measured: impl Fn(usize) -> bool) {
-        if lost {
-            self.history.iter_mut().for_each(|own| own.last_good_end = None);
-        }
-        for (own, chain) in self.history.iter_mut().zip(&model.extremities) {
-            if own.is_clear() && chain.limbs().all(&measured) {
-                own.last_good_end = Some(chain.end(&motion.poses) + motion.origin);
             }
         }
     }
@@ -200,15 +175,15 @@ impl Hypotheses {
 
     /// Fills the pool with alternative configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
-        let Self { history, rough, clusters, color_directions, pool, .. } = self;
+        let Self { rough, clusters, color_directions, pool, .. } = self;
         rough.score.begin(at);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current);
         // All kinds of proposals. To add one, add a file in `proposals` and an element here.
-        let kinds: [&mut dyn Propose; 5] =
-            [clusters, &mut LastGoodEnd, color_directions, &mut DetectedEnd(detection), &mut DetectedBody(detected)];
+        let kinds: [&mut dyn Propose; 4] =
+            [clusters, color_directions, &mut DetectedEnd(detection), &mut DetectedBody(detected)];
         for kind in kinds {
-            kind.propose(at, history, rough, pool);
+            kind.propose(at, rough, pool);
         }
     }
 
@@ -241,7 +216,6 @@ impl Hypotheses {
 mod tests {
     use super::refined::REFINE;
     use super::*;
-    use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
 
     /// Runs hypotheses that start with hanging arms on rendered images of the poses in `frames`. Returns the poses and the number
@@ -309,32 +283,5 @@ mod tests {
             }
             assert_eq!(format!("{:?}", fit.correspondences()), before);
         });
-    }
-
-    #[test]
-    fn ends_of_confirmed_extremities_are_kept_until_the_body_is_lost() {
-        let (model, poses) = standing();
-        let mut hypotheses = Hypotheses::default();
-        hypotheses.restart(&model);
-        let origin = Vec3::new(3.0, -1.0, 2.0);
-        let mut motion = Motion::default();
-        (motion.poses, motion.origin) = (poses, origin);
-        let (arm, legs) = (first_arm(&model), model.extremities.iter().filter(|chain| chain.leg).count());
-        let known =
-            |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
-        assert_eq!(legs, 2);
-        // One arm is not measured, and the frame contradicts the other.
-        hypotheses.history[arm + 1].observe(MARGIN, 0.1);
-        hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
-        assert_eq!(known(&hypotheses), 2, "only the legs are confirmed");
-        hypotheses.history[arm + 1].observe(0.0, 0.1);
-        hypotheses.remember(&model, &motion, false, |_| true);
-        for (own, chain) in hypotheses.history.iter().zip(&model.extremities) {
-            assert_eq!(own.last_good_end, Some(chain.end(&motion.poses) + origin));
-        }
-        hypotheses.remember(&model, &motion, false, |_| false);
-        assert_eq!(known(&hypotheses), 4, "unmeasured limbs keep their ends");
-        hypotheses.remember(&model, &motion, true, |_| false);
-        assert_eq!(known(&hypotheses), 0);
     }
 }

@@ -90,7 +90,7 @@ impl Refined {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
-        let last = if context.pictures_alone() { regions::steps(true) } else { context.config.max_steps };
+        let last = if context.pictures_alone() { regions::STEPS } else { context.config.max_steps };
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
@@ -124,31 +124,6 @@ impl Refined {
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
         cost
-    }
-
-    /// Fits a body that may have moved far by a color-edge search over a larger distance, and accepts the result if it is better.
-    /// Returns the number of ICP steps.
-    pub(super) fn try_far(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        poses: &mut Vec<Pose>,
-        predicted: &[Pose],
-    ) -> usize {
-        let before = self.cost(context, fit, poses);
-        let mut tried = std::mem::take(&mut self.poses);
-        tried.clear();
-        tried.extend_from_slice(predicted);
-        fit.swap_matches(&mut self.matched);
-        let steps = fit.run_far(context, predicted, &mut tried);
-        let cost = self.cost(context, fit, &tried);
-        self.poses = tried;
-        if cost < before - MARGIN {
-            poses.clone_from(&self.poses);
-        } else {
-            fit.swap_matches(&mut self.matched);
-        }
-        steps
     }
 
     /// Cost of matched poses, nats.

@@ -241,7 +241,6 @@ impl BodyTracker {
         if self.relocalizer.is_new(frame.stamp) && self.restart_at_detection() {
             self.follow(frame, ownership);
         } else {
-            self.remember();
             self.report(frame.stamp, 0, Some(1.0));
         }
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
@@ -322,7 +321,6 @@ impl BodyTracker {
         if relocalizes && self.relocalize(frame, known) {
             return self.follow(frame, ownership);
         }
-        self.remember();
         self.report(frame.stamp, steps, Some(time_scale));
         if self.relocalizer.is_false_track() {
             self.stop(frame.stamp);
@@ -438,12 +436,6 @@ impl BodyTracker {
             tracked: status == Status::Tracking,
             silent: self.observer.silent(frame),
         }
-    }
-
-    /// Stores the end positions of arms and legs for the hypotheses of later frames.
-    fn remember(&mut self) {
-        let Self { model, motion, hypotheses, assessor, .. } = self;
-        hypotheses.remember(model, motion, assessor.status() == Status::Lost, |limb| assessor.is_reliable(limb));
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.
