@@ -5,7 +5,7 @@ use crate::association::correspondence::Correspondences;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3};
-use crate::regions::{self, Backdrop, Posed};
+use crate::regions::{Backdrop, Posed};
 
 /// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
@@ -90,7 +90,7 @@ impl Refined {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
-        let last = if context.pictures_alone() { regions::STEPS } else { context.config.max_steps };
+        let last = context.config.max_steps;
         for step in 0..REFINE {
             let at = last.saturating_sub(REFINE - step);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
