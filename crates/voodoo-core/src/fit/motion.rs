@@ -48,6 +48,12 @@ impl Motion {
         self.interval = None;
     }
 
+    /// Moves the body to these poses, from where its motion is unknown.
+    pub(crate) fn move_to(&mut self, poses: &[Pose]) {
+        self.poses.clone_from_slice(poses);
+        self.forget();
+    }
+
     /// Forgets the motion of these limbs, parents first, relative to their parents.
     pub(crate) fn forget_joints(&mut self, body: &Body, limbs: impl Iterator<Item = usize>) {
         for limb in limbs {
@@ -110,7 +116,8 @@ impl Motion {
 
     /// Completes the frame.
     pub(crate) fn commit(&mut self, stamp: f64) {
-        self.interval = self.stamp.map(|last| stamp - last);
+        // A frame may be fitted again after the body has moved.
+        self.interval = self.stamp.map(|last| stamp - last).filter(|interval| *interval > 0.0);
         self.stamp = Some(stamp);
     }
 

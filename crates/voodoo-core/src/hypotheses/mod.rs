@@ -2,7 +2,6 @@
 //! one cost.
 
 mod branch;
-mod history;
 mod objective;
 mod proposals;
 mod refined;
@@ -23,7 +22,6 @@ use crate::math::Pose;
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
-use history::History;
 use proposals::{ColorDirections, DetectedBody, DetectedEnd, Pool, Propose, UnexplainedCluster};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
@@ -32,10 +30,9 @@ use unexplained::Unexplained;
 /// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of it, where 5 % are usual.
 const UNLIKE_FRAME: f64 = 0.85;
 
-/// Tests every arm and leg in every frame, and keeps a history of each.
+/// Tests every arm and leg in every frame.
 #[derive(Debug, Default)]
 pub(crate) struct Hypotheses {
-    history: Vec<History>,
     unexplained: Unexplained,
     rough: RoughSearch,
     clusters: UnexplainedCluster,
@@ -45,17 +42,13 @@ pub(crate) struct Hypotheses {
     branch: Branch,
     /// The poses before this frame's hypotheses.
     before: Vec<Pose>,
-    /// Stamp of the last frame, seconds; `None` after a restart.
-    stamp: Option<f64>,
 }
 
 impl Hypotheses {
-    /// Clears the history and reserves memory for another body.
+    /// Forgets the last frame and reserves memory for another body.
     pub(crate) fn restart(&mut self, model: &Model) {
         let limbs = model.body.limbs().len();
-        self.history.clear();
-        self.history.resize_with(model.extremities.len(), History::default);
-        self.stamp = None;
+        self.unexplained.clutter = 1.0;
         // Reserved now, so that later steps do not allocate.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
@@ -72,7 +65,7 @@ impl Hypotheses {
 
     /// Whether the last frame showed clearly more than the body explains.
     pub(crate) fn unlike(&self) -> bool {
-        self.stamp.is_some() && self.unexplained.clutter < UNLIKE_FRAME
+        self.unexplained.clutter < UNLIKE_FRAME
     }
 
     /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;
@@ -95,18 +88,13 @@ impl Hypotheses {
     ) -> usize {
         self.before.clone_from(poses);
         self.make_room(context, fit);
-        let now = context.observation.frame().stamp;
-        let elapsed = now - self.stamp.replace(now).unwrap_or(now);
         self.unexplained.collect(context, fit.matched(poses));
         self.refined.clutter = self.unexplained.clutter;
         let (mut steps, pictures) = (0, context.pictures_alone());
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
-            if detection.is_some() {
-                self.history[index].reconsider();
-            }
-            if !self.is_due(at, elapsed) {
+            if !self.is_due(at) {
                 continue;
             }
             self.propose(at, detection, detected);
@@ -114,8 +102,6 @@ impl Hypotheses {
             steps += taken;
             if better {
                 self.unexplained.collect(context, fit.matched(poses));
-            } else if !pictures {
-                self.history[index].refuse();
             }
         }
         if pictures {
@@ -156,21 +142,19 @@ impl Hypotheses {
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
-    /// Whether to test alternatives of an arm or leg in this frame, `elapsed` seconds after the last one.
-    fn is_due(&mut self, at: Extremity, elapsed: f64) -> bool {
+    /// Whether the frame contradicts an arm or leg: its alternatives are tested.
+    fn is_due(&mut self, at: Extremity) -> bool {
         let chain = at.chain();
         if at.regions.is_some() {
             let supports = &at.matched.correspondences.region_support;
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
-            let unexplained = if gained < LITTLE * area { f64::INFINITY } else { 0.0 };
-            return self.history[at.index].observe(unexplained, elapsed);
+            return gained < LITTLE * area;
         }
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), chain.stretched_length(), near);
-        let unexplained = PATCH * self.unexplained.clutter * near.total();
-        self.history[at.index].observe(unexplained, elapsed)
+        PATCH * self.unexplained.clutter * near.total() >= MARGIN
     }
 
     /// Fills the pool with alternative configurations of one arm or leg.
