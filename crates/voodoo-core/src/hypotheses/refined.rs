@@ -90,9 +90,8 @@ impl Refined {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
-        let last = context.config.max_steps;
         for step in 0..REFINE {
-            let at = last.saturating_sub(REFINE - step);
+            let at = (context.config.max_steps + 1 + step).saturating_sub(REFINE);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
             // After the first half of the steps, every second step keeps the assignment of points to limbs where possible.
             if step.is_multiple_of(2) || 2 * step < REFINE {

@@ -43,8 +43,9 @@ impl Trials {
         place: &[Pose],
         turning: f64,
     ) -> bool {
-        let present_cost = self.cost(context, fit, present);
-        let cost = self.cost(context, fit, place);
+        fit.match_all(context, present, context.config.max_steps);
+        let present_cost = Objective::new(context, fit.matched(present), 1.0, None).body();
+        let cost = self.refine(context, fit, place);
         let poses = std::mem::take(&mut self.poses);
         let stray = self.stray_fraction(context, &poses);
         self.poses = poses;
@@ -67,8 +68,8 @@ impl Trials {
         stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
     }
 
-    /// Cost of `place` after a few ICP steps; `poses` and `fit` then hold the refined pose and its matches.
-    fn cost(&mut self, context: Context, fit: &mut Fit, place: &[Pose]) -> f64 {
+    /// Refines `place` by a few ICP steps and returns its cost; `poses` and `fit` then hold the refined pose and its matches.
+    fn refine(&mut self, context: Context, fit: &mut Fit, place: &[Pose]) -> f64 {
         let Self { poses, predicted, .. } = self;
         for start in [&mut *poses, &mut *predicted] {
             start.clear();

@@ -59,8 +59,9 @@ pub struct BodyTracker {
     assessor: Assessor,
     estimate: Estimate,
     before: Before,
-    /// Poses expected in this frame, world frame.
+    /// Poses expected in this frame, world frame; and the same if the body was moved elsewhere: it returns if it is lost there.
     expected: Vec<Pose>,
+    moved_from: Vec<Pose>,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
     moved_to: Option<(usize, Vec<usize>)>,
 }
@@ -80,6 +81,7 @@ impl BodyTracker {
             estimate: Estimate::default(),
             before: Before::default(),
             expected: Vec::new(),
+            moved_from: Vec::new(),
             moved_to: None,
             config,
         })
@@ -143,6 +145,7 @@ impl BodyTracker {
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
         self.relocalizer.clear_error();
         self.moved_to = None;
+        self.moved_from.clear();
         if self.is_started() {
             self.before.keep(&self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
@@ -310,6 +313,10 @@ impl BodyTracker {
         fit.learn_regions(setting.with_model(model));
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
+        if assessor.status() == Status::Lost && !self.moved_from.is_empty() {
+            self.moved_from.iter_mut().for_each(|pose| *pose = shifted(pose, motion.origin));
+            motion.move_to(&self.moved_from);
+        }
         self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
         if self.relocalizer.is_false_track() {
@@ -347,14 +354,13 @@ impl BodyTracker {
         if relocalizer.is_new(frame.stamp) {
             return self.restart_at_detection();
         }
-        motion.move_to(relocalizer.found());
-        assessor.moved();
+        self.move_to_found();
         true
     }
 
     /// Moves a lost body that cannot be detected to a segment that it explains better.
     fn move_to_segment(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
+        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
         if relocalizer.frames_searched().is_none() {
             return;
         }
@@ -362,9 +368,15 @@ impl BodyTracker {
         let observation = observer.observation(frame, motion.origin, ownership);
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(setting.with_model(model), fit, &motion.poses) {
-            motion.move_to(relocalizer.found());
-            assessor.moved();
+            self.move_to_found();
         }
+    }
+
+    /// Moves the body to the poses that a detection or the search found.
+    fn move_to_found(&mut self) {
+        self.moved_from.clone_from(&self.expected);
+        self.motion.move_to(self.relocalizer.found());
+        self.assessor.moved();
     }
 
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
