@@ -54,6 +54,13 @@ impl Motion {
         self.forget();
     }
 
+    /// Moves the body to these poses, world frame.
+    pub(crate) fn move_to_world(&mut self, world_from_limb: &[Pose]) {
+        self.poses.clear();
+        self.poses.extend(world_from_limb.iter().map(|pose| shifted(pose, self.origin)));
+        self.forget();
+    }
+
     /// Forgets the motion of these limbs, parents first, relative to their parents.
     pub(crate) fn forget_joints(&mut self, body: &Body, limbs: impl Iterator<Item = usize>) {
         for limb in limbs {

@@ -43,8 +43,7 @@ impl Trials {
         place: &[Pose],
         turning: f64,
     ) -> bool {
-        fit.match_all(context, present, context.config.max_steps);
-        let present_cost = Objective::new(context, fit.matched(present), 1.0, None).body();
+        let present_cost = self.refine(context, fit, present);
         let cost = self.refine(context, fit, place);
         let poses = std::mem::take(&mut self.poses);
         let stray = self.stray_fraction(context, &poses);

@@ -59,9 +59,9 @@ pub struct BodyTracker {
     assessor: Assessor,
     estimate: Estimate,
     before: Before,
-    /// Poses expected in this frame, world frame; and the same if the body was moved elsewhere: it returns if it is lost there.
+    /// Poses expected in this frame, world frame; and whether the body was moved elsewhere: it returns if it is lost there.
     expected: Vec<Pose>,
-    moved_from: Vec<Pose>,
+    moved: bool,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
     moved_to: Option<(usize, Vec<usize>)>,
 }
@@ -81,7 +81,7 @@ impl BodyTracker {
             estimate: Estimate::default(),
             before: Before::default(),
             expected: Vec::new(),
-            moved_from: Vec::new(),
+            moved: false,
             moved_to: None,
             config,
         })
@@ -145,7 +145,7 @@ impl BodyTracker {
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
         self.relocalizer.clear_error();
         self.moved_to = None;
-        self.moved_from.clear();
+        self.moved = false;
         if self.is_started() {
             self.before.keep(&self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
@@ -245,6 +245,8 @@ impl BodyTracker {
             relocalizer.interrupt(frame.stamp);
         }
         motion.expect(&model.body, frame.stamp, config.prediction, expected);
+        motion.predicted.clear();
+        motion.predicted.extend(expected.iter().map(|pose| shifted(pose, motion.origin)));
         let reasons = Reasons {
             limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
             pose_uncertain: assessor.is_uncertain(),
@@ -261,7 +263,7 @@ impl BodyTracker {
         if !config.relocalization {
             return;
         }
-        match relocalizer.compare(&model.body, expected, Vec3::ZERO) {
+        match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
             Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame, ownership) => self.relocalizer.forget(),
             Some(DetectionVerdict::Consistent) => self.update_sizes(),
             Some(_) => {}
@@ -313,9 +315,8 @@ impl BodyTracker {
         fit.learn_regions(setting.with_model(model));
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
-        if assessor.status() == Status::Lost && !self.moved_from.is_empty() {
-            self.moved_from.iter_mut().for_each(|pose| *pose = shifted(pose, motion.origin));
-            motion.move_to(&self.moved_from);
+        if self.moved && assessor.status() == Status::Lost {
+            motion.move_to_world(&self.expected);
         }
         self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
@@ -346,7 +347,7 @@ impl BodyTracker {
         let observation = observer.observation(frame, motion.origin, ownership);
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         let lost = assessor.status() == Status::Lost;
-        if !relocalizer.try_detected(setting.with_model(model), fit, &motion.poses, lost) {
+        if !relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost) {
             return false;
         }
         let Own { image, pixels } = relocalizer.own_pixels();
@@ -367,14 +368,14 @@ impl BodyTracker {
         observer.begin(frame, ownership);
         let observation = observer.observation(frame, motion.origin, ownership);
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
-        if relocalizer.search(setting.with_model(model), fit, &motion.poses) {
+        if relocalizer.search(setting.with_model(model), fit, &motion.predicted) {
             self.move_to_found();
         }
     }
 
     /// Moves the body to the poses that a detection or the search found.
     fn move_to_found(&mut self) {
-        self.moved_from.clone_from(&self.expected);
+        self.moved = true;
         self.motion.move_to(self.relocalizer.found());
         self.assessor.moved();
     }
