@@ -90,9 +90,9 @@ impl Refined {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
-        let last = if context.pictures_alone() { context.config.max_steps + 1 } else { context.config.max_steps };
         for step in 0..REFINE {
-            let at = last.saturating_sub(REFINE - step);
+            // The last step is as at the end of a frame.
+            let at = (context.config.max_steps + 1 + step).saturating_sub(REFINE);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
             // After the first half of the steps, every second step keeps the assignment of points to limbs where possible.
             if step.is_multiple_of(2) || 2 * step < REFINE {
