@@ -43,7 +43,11 @@ impl Trials {
         place: &[Pose],
         turning: f64,
     ) -> bool {
-        let present_cost = self.refine(context, fit, present);
+        // The present pose is what the frame makes of it, near to where it is expected.
+        self.poses.clear();
+        self.poses.extend_from_slice(present);
+        fit.run(Context { time_scale: 1.0, ..context }, present, &mut self.poses);
+        let present_cost = Objective::new(context, fit.matched(&self.poses), 1.0, None).body();
         let cost = self.refine(context, fit, place);
         let poses = std::mem::take(&mut self.poses);
         let stray = self.stray_fraction(context, &poses);
