@@ -119,10 +119,11 @@ pub(crate) fn with_setting<R>(
         let mut observer = Observer::default();
         let scene = if config.background { wall(frame) } else { Backgrounds::default() };
         let bounds = body_box(&model.body, poses, config.body_box_margin);
-        observer.observe(frame, &bounds, Vec3::ZERO, everything(&scene), config);
+        observer.begin(frame, everything(&scene));
+        observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), config);
         check(Setting {
             config,
-            observation: observer.observation(frame, Vec3::ZERO),
+            observation: observer.observation(frame, Vec3::ZERO, everything(&scene)),
             previous: poses,
             time_scale: 1.0,
         })

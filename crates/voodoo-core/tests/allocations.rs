@@ -16,7 +16,7 @@ use voodoo_core::{Body, Config, Tracker};
 use voodoo_core::{Frame, PositionRelation, RayRelation};
 use voodoo_core::{Rendering, Viewpoint};
 
-const WARM_UP: usize = 26;
+const WARM_UP: usize = 48;
 const COUNTED: usize = 60;
 
 /// Allocations inside `step` in the frames after the warm-up.

@@ -9,7 +9,6 @@ type SideJoint = fn(Side) -> JointRole;
 /// Joints that give the trunk's position and orientation.
 const TRUNK: [SideJoint; 2] = [JointRole::Shoulder, JointRole::Hip];
 const LEGS: [SideJoint; 2] = [JointRole::Knee, JointRole::Ankle];
-const ARMS: [SideJoint; 2] = [JointRole::Elbow, JointRole::Wrist];
 const ANKLES: [SideJoint; 1] = [JointRole::Ankle];
 const STATURE: &str = "stature";
 
@@ -25,7 +24,6 @@ pub(crate) struct JointMap {
     root: Option<usize>,
     trunk: Vec<usize>,
     legs: Vec<usize>,
-    arms: Vec<usize>,
     ankles: Vec<usize>,
     /// For every limb: the joint to its parent, the other joints on it, and its length.
     hangs_by: Vec<Option<usize>>,
@@ -64,7 +62,6 @@ impl JointMap {
             root: joint(JointRole::Root),
             trunk,
             legs: of_sides(&LEGS),
-            arms: of_sides(&ARMS),
             ankles: of_sides(&ANKLES),
             hangs_by: limbs.clone().map(|limb| roles.joint_site(limb).and_then(joint_of_site)).collect(),
             on_limb: limbs.clone().map(on_limb).collect(),
@@ -88,11 +85,6 @@ impl JointMap {
     /// Knees and ankles.
     pub(crate) fn legs(&self) -> &[usize] {
         &self.legs
-    }
-
-    /// Elbows and wrists.
-    pub(crate) fn arms(&self) -> &[usize] {
-        &self.arms
     }
 
     /// The length of every limb of the body, if the detector reports it. All parts of the trunk share one length.

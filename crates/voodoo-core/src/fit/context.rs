@@ -7,9 +7,6 @@ use crate::config::Config;
 use crate::math::Pose;
 use crate::observation::observer::Observation;
 
-/// Greatest time since the last frame, in multiples of 1/30 s, for which the motion prediction is used.
-const LATE: f64 = 2.5;
-
 /// One frame of one body. Cheap to copy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context<'a> {
@@ -38,11 +35,6 @@ impl Context<'_> {
             let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
             arms.flat_map(TwoBone::limbs).any(|own| own == limb)
         }
-    }
-
-    /// Whether the time since the last frame is too long to predict the motion.
-    pub(crate) fn moves_unknown(&self) -> bool {
-        self.time_scale > LATE
     }
 
     /// Whether color images are the only observation of the body.

@@ -2,7 +2,7 @@
 
 use super::{Context, Fit};
 use crate::math::Pose;
-use crate::regions::{ColorRegions, Posed, steps};
+use crate::regions::{ColorRegions, Posed};
 
 impl Fit {
     /// Returns the colors of limbs and surroundings.
@@ -40,13 +40,12 @@ impl Fit {
     }
 
     pub(super) fn find_regions(&mut self, context: Context, poses: &[Pose], step: usize) {
-        let left = steps(self.far).saturating_sub(step + 1);
         let Self { regions, correspondences, .. } = self;
         correspondences.regions.clear();
         correspondences.region_support.clear();
         let frame = context.observation.frame();
         if context.config.regions && !frame.colors.is_empty() {
-            regions.find(frame, posed(context, poses), left, |limb| context.uses_edges(limb), correspondences);
+            regions.find(frame, posed(context, poses), step, |limb| context.uses_edges(limb), correspondences);
         }
     }
 

@@ -37,8 +37,6 @@ pub(crate) struct Fit {
     correspondences: Correspondences,
     contours: Contours,
     regions: regions::ColorRegions,
-    /// Whether color edges are searched for over a larger distance.
-    far: bool,
     /// Joints that a detector found in this frame.
     detected: Vec<MeasuredJoint>,
     band_weights: Vec<f64>,
@@ -55,7 +53,6 @@ impl Fit {
             correspondences: Correspondences::default(),
             contours: Contours::default(),
             regions: regions::ColorRegions::default(),
-            far: false,
             detected: Vec::new(),
             band_weights: Vec::new(),
             threads: Threads::new(config)?,
@@ -105,12 +102,9 @@ impl Fit {
     pub(crate) fn run(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
         self.warm_start(context, poses);
         let schedule = self.schedule(context.config);
-        let edges = regions::steps(self.far);
-        // A search over a larger distance tests a hypothesis and takes the number of steps of its search schedule.
-        let most = if self.far { edges } else { context.config.max_steps };
         let mut steps = 0;
         let mut before = f64::INFINITY;
-        while steps < most {
+        while steps < context.config.max_steps {
             if schedule.reassociates(steps) {
                 self.match_all(context, poses, steps);
             } else {
@@ -121,21 +115,13 @@ impl Fit {
             steps += 1;
             // Whole-body solvers always take all steps: a step more or less would be a jump of the result.
             let settled = !schedule.whole_body && (before - distance).abs() < context.config.min_change;
-            if settled || steps >= edges && context.pictures_alone() {
+            if settled || steps >= regions::STEPS && context.pictures_alone() {
                 break;
             }
             before = distance;
         }
         // The last steps hardly moved anything, so points stay assigned to their limbs where they are assigned.
         self.match_end(context, poses, steps == 0 || schedule.reassociation == Reassociation::EveryStep);
-        steps
-    }
-
-    /// Like `run`, but for unknown motion: the first steps search for color edges over a larger distance.
-    pub(crate) fn run_far(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose]) -> usize {
-        self.far = true;
-        let steps = self.run(context, predicted, poses);
-        self.far = false;
         steps
     }
 

@@ -48,6 +48,19 @@ impl Motion {
         self.interval = None;
     }
 
+    /// Moves the body to these poses, from where its motion is unknown.
+    pub(crate) fn move_to(&mut self, poses: &[Pose]) {
+        self.poses.clone_from_slice(poses);
+        self.forget();
+    }
+
+    /// Moves the body to these poses, world frame.
+    pub(crate) fn move_to_world(&mut self, world_from_limb: &[Pose]) {
+        self.poses.clear();
+        self.poses.extend(world_from_limb.iter().map(|pose| shifted(pose, self.origin)));
+        self.forget();
+    }
+
     /// Forgets the motion of these limbs, parents first, relative to their parents.
     pub(crate) fn forget_joints(&mut self, body: &Body, limbs: impl Iterator<Item = usize>) {
         for limb in limbs {
@@ -110,7 +123,8 @@ impl Motion {
 
     /// Completes the frame.
     pub(crate) fn commit(&mut self, stamp: f64) {
-        self.interval = self.stamp.map(|last| stamp - last);
+        // A frame may be fitted again after the body has moved.
+        self.interval = self.stamp.map(|last| stamp - last).filter(|interval| *interval > 0.0);
         self.stamp = Some(stamp);
     }
 

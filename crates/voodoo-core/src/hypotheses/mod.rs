@@ -2,8 +2,6 @@
 //! one cost.
 
 mod branch;
-mod history;
-mod leg_swap;
 mod objective;
 mod proposals;
 mod refined;
@@ -24,9 +22,7 @@ use crate::math::Pose;
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
-use history::History;
-use leg_swap::LegSwap;
-use proposals::{ColorDirections, DetectedBody, DetectedEnd, LastGoodEnd, Pool, Propose, UnexplainedCluster};
+use proposals::{ColorDirections, DetectedBody, DetectedEnd, Pool, Propose, UnexplainedCluster};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
@@ -34,35 +30,28 @@ use unexplained::Unexplained;
 /// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of it, where 5 % are usual.
 const UNLIKE_FRAME: f64 = 0.85;
 
-/// Tests every arm and leg in every frame, and keeps a history of each.
+/// Tests every arm and leg in every frame.
 #[derive(Debug, Default)]
 pub(crate) struct Hypotheses {
-    history: Vec<History>,
     unexplained: Unexplained,
     rough: RoughSearch,
     clusters: UnexplainedCluster,
     color_directions: ColorDirections,
-    leg_swap: LegSwap,
     pool: Pool,
     refined: Refined,
     branch: Branch,
     /// The poses before this frame's hypotheses.
     before: Vec<Pose>,
-    /// Stamp of the last frame, seconds; `None` after a restart.
-    stamp: Option<f64>,
 }
 
 impl Hypotheses {
-    /// Clears the history and reserves memory for another body.
+    /// Forgets the last frame and reserves memory for another body.
     pub(crate) fn restart(&mut self, model: &Model) {
         let limbs = model.body.limbs().len();
-        self.history.clear();
-        self.history.resize_with(model.extremities.len(), History::default);
-        self.stamp = None;
+        self.unexplained.clutter = 1.0;
         // Reserved now, so that later steps do not allocate.
         self.rough.prepare(limbs);
         self.pool.prepare(limbs);
-        self.leg_swap.prepare(limbs);
         self.branch.prepare(limbs);
         self.refined.prepare(limbs);
         self.before.clear();
@@ -76,7 +65,7 @@ impl Hypotheses {
 
     /// Whether the last frame showed clearly more than the body explains.
     pub(crate) fn unlike(&self) -> bool {
-        self.stamp.is_some() && self.unexplained.clutter < UNLIKE_FRAME
+        self.unexplained.clutter < UNLIKE_FRAME
     }
 
     /// Distance between the distal end of a limb of the body, posed in the world frame, and that of the second branch, meters;
@@ -99,22 +88,13 @@ impl Hypotheses {
     ) -> usize {
         self.before.clone_from(poses);
         self.make_room(context, fit);
-        let now = context.observation.frame().stamp;
-        let elapsed = now - self.stamp.replace(now).unwrap_or(now);
         self.unexplained.collect(context, fit.matched(poses));
         self.refined.clutter = self.unexplained.clutter;
-        let mut steps = 0;
-        let pictures = context.pictures_alone();
-        if pictures && context.moves_unknown() {
-            steps += self.refined.try_far(context, fit, poses, predicted);
-        }
+        let (mut steps, pictures) = (0, context.pictures_alone());
         for index in 0..context.model.extremities.len() {
             let regions = pictures.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
-            if detection.is_some() {
-                self.history[index].reconsider();
-            }
-            if !self.is_due(at, elapsed) {
+            if !self.is_due(at) {
                 continue;
             }
             self.propose(at, detection, detected);
@@ -122,13 +102,7 @@ impl Hypotheses {
             steps += taken;
             if better {
                 self.unexplained.collect(context, fit.matched(poses));
-            } else if !pictures {
-                self.history[index].refuse();
             }
-        }
-        if pictures {
-            let contradicted = |index: usize| !self.history[index].is_clear();
-            steps += self.leg_swap.attempt(context, contradicted, &mut self.refined, fit, poses, predicted);
         }
         if pictures {
             steps += self.branch.compare(context, &mut self.refined, fit, poses, predicted);
@@ -153,19 +127,6 @@ impl Hypotheses {
         }
     }
 
-    /// Stores the end position of every arm and leg that this frame does not contradict and whose limbs are all `measured`. If
-    /// the body is `lost`, first clears all stored positions.
-    pub(crate) fn remember(&mut self, model: &Model, motion: &Motion, lost: bool, measured: impl Fn(usize) -> bool) {
-        if lost {
-            self.history.iter_mut().for_each(|own| own.last_good_end = None);
-        }
-        for (own, chain) in self.history.iter_mut().zip(&model.extremities) {
-            if own.is_clear() && chain.limbs().all(&measured) {
-                own.last_good_end = Some(chain.end(&motion.poses) + motion.origin);
-            }
-        }
-    }
-
     /// Reserves memory for all candidates of the frame, so that later steps do not allocate.
     fn make_room(&mut self, context: Context, fit: &Fit) {
         let most = context.observation.candidates.len();
@@ -181,34 +142,32 @@ impl Hypotheses {
         self.refined.matched.reserve_as(fit.correspondences());
     }
 
-    /// Whether to test alternatives of an arm or leg in this frame, `elapsed` seconds after the last one.
-    fn is_due(&mut self, at: Extremity, elapsed: f64) -> bool {
+    /// Whether the frame contradicts an arm or leg: its alternatives are tested.
+    fn is_due(&mut self, at: Extremity) -> bool {
         let chain = at.chain();
         if at.regions.is_some() {
             let supports = &at.matched.correspondences.region_support;
             let sum =
                 |part: fn(&RegionSupport) -> f64| chain.limbs().filter_map(|limb| supports.get(limb)).map(part).sum();
             let [gained, area]: [f64; 2] = [sum(|support| support.gained), sum(|support| support.area)];
-            let unexplained = if gained < LITTLE * area { f64::INFINITY } else { 0.0 };
-            return self.history[at.index].observe(unexplained, elapsed);
+            return gained < LITTLE * area;
         }
         let near = &mut self.rough.score.unexplained;
         self.unexplained.near(at.root(), chain.stretched_length(), near);
-        let unexplained = PATCH * self.unexplained.clutter * near.total();
-        self.history[at.index].observe(unexplained, elapsed)
+        PATCH * self.unexplained.clutter * near.total() >= MARGIN
     }
 
     /// Fills the pool with alternative configurations of one arm or leg.
     fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
-        let Self { history, rough, clusters, color_directions, pool, .. } = self;
+        let Self { rough, clusters, color_directions, pool, .. } = self;
         rough.score.begin(at);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current);
         // All kinds of proposals. To add one, add a file in `proposals` and an element here.
-        let kinds: [&mut dyn Propose; 5] =
-            [clusters, &mut LastGoodEnd, color_directions, &mut DetectedEnd(detection), &mut DetectedBody(detected)];
+        let kinds: [&mut dyn Propose; 4] =
+            [clusters, color_directions, &mut DetectedEnd(detection), &mut DetectedBody(detected)];
         for kind in kinds {
-            kind.propose(at, history, rough, pool);
+            kind.propose(at, rough, pool);
         }
     }
 
@@ -241,7 +200,6 @@ impl Hypotheses {
 mod tests {
     use super::refined::REFINE;
     use super::*;
-    use crate::math::Vec3;
     use crate::testing::{before_wall, farthest, first_arm, raised, standing, with_context, without_background};
 
     /// Runs hypotheses that start with hanging arms on rendered images of the poses in `frames`. Returns the poses and the number
@@ -309,32 +267,5 @@ mod tests {
             }
             assert_eq!(format!("{:?}", fit.correspondences()), before);
         });
-    }
-
-    #[test]
-    fn ends_of_confirmed_extremities_are_kept_until_the_body_is_lost() {
-        let (model, poses) = standing();
-        let mut hypotheses = Hypotheses::default();
-        hypotheses.restart(&model);
-        let origin = Vec3::new(3.0, -1.0, 2.0);
-        let mut motion = Motion::default();
-        (motion.poses, motion.origin) = (poses, origin);
-        let (arm, legs) = (first_arm(&model), model.extremities.iter().filter(|chain| chain.leg).count());
-        let known =
-            |hypotheses: &Hypotheses| hypotheses.history.iter().filter(|own| own.last_good_end.is_some()).count();
-        assert_eq!(legs, 2);
-        // One arm is not measured, and the frame contradicts the other.
-        hypotheses.history[arm + 1].observe(MARGIN, 0.1);
-        hypotheses.remember(&model, &motion, false, |limb| limb != model.extremities[arm].lower);
-        assert_eq!(known(&hypotheses), 2, "only the legs are confirmed");
-        hypotheses.history[arm + 1].observe(0.0, 0.1);
-        hypotheses.remember(&model, &motion, false, |_| true);
-        for (own, chain) in hypotheses.history.iter().zip(&model.extremities) {
-            assert_eq!(own.last_good_end, Some(chain.end(&motion.poses) + origin));
-        }
-        hypotheses.remember(&model, &motion, false, |_| false);
-        assert_eq!(known(&hypotheses), 4, "unmeasured limbs keep their ends");
-        hypotheses.remember(&model, &motion, true, |_| false);
-        assert_eq!(known(&hypotheses), 0);
     }
 }

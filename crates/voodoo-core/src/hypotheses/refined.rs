@@ -5,7 +5,7 @@ use crate::association::correspondence::Correspondences;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
 use crate::math::{Pose, Vec3};
-use crate::regions::{self, Backdrop, Posed};
+use crate::regions::{Backdrop, Posed};
 
 /// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
@@ -90,9 +90,9 @@ impl Refined {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
-        let last = if context.pictures_alone() { regions::steps(true) } else { context.config.max_steps };
         for step in 0..REFINE {
-            let at = last.saturating_sub(REFINE - step);
+            // The last step is as at the end of a frame.
+            let at = (context.config.max_steps + 1 + step).saturating_sub(REFINE);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };
             // After the first half of the steps, every second step keeps the assignment of points to limbs where possible.
             if step.is_multiple_of(2) || 2 * step < REFINE {
@@ -124,31 +124,6 @@ impl Refined {
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
         cost
-    }
-
-    /// Fits a body that may have moved far by a color-edge search over a larger distance, and accepts the result if it is better.
-    /// Returns the number of ICP steps.
-    pub(super) fn try_far(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        poses: &mut Vec<Pose>,
-        predicted: &[Pose],
-    ) -> usize {
-        let before = self.cost(context, fit, poses);
-        let mut tried = std::mem::take(&mut self.poses);
-        tried.clear();
-        tried.extend_from_slice(predicted);
-        fit.swap_matches(&mut self.matched);
-        let steps = fit.run_far(context, predicted, &mut tried);
-        let cost = self.cost(context, fit, &tried);
-        self.poses = tried;
-        if cost < before - MARGIN {
-            poses.clone_from(&self.poses);
-        } else {
-            fit.swap_matches(&mut self.matched);
-        }
-        steps
     }
 
     /// Cost of matched poses, nats.

@@ -2,6 +2,7 @@
 
 use crate::math::Pose;
 use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::ownership::OwnershipMask;
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
 /// the noise of depth cameras grows with depth.
@@ -82,26 +83,29 @@ impl Backgrounds {
         self.others.get(cloud).is_some_and(|others| others.get(point).copied().unwrap_or(false))
     }
 
-    /// Stores which points of the clouds other persons explain: those for whose owner `is_others` returns true.
-    pub(super) fn mark_others_points(&mut self, owners: &[Vec<u16>], is_others: impl Fn(u16) -> bool) {
-        self.others.resize_with(owners.len(), Vec::new);
-        for (others, owners) in self.others.iter_mut().zip(owners) {
+    /// Becomes the scene as one person sees it: with what other persons explain hidden. A frame without images keeps what is known
+    /// of the cameras.
+    pub(super) fn mask(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        let is_others = |owner: &u16| ownership.is_others(*owner);
+        self.others.resize_with(ownership.cloud_owners.len(), Vec::new);
+        for (others, owners) in self.others.iter_mut().zip(ownership.cloud_owners) {
             others.clear();
-            others.extend(owners.iter().map(|owner| is_others(*owner)));
+            others.extend(owners.iter().map(is_others));
         }
-    }
-
-    /// Copies the learned depths of another scene for each image of the frame, then lets `change` modify them.
-    pub(super) fn adopt(&mut self, frame: &Frame, scene: &Self, mut change: impl FnMut(usize, &mut [f32])) {
+        if frame.images.is_empty() {
+            return;
+        }
         self.images.resize_with(frame.images.len(), Background::default);
         for (number, (image, own)) in frame.images.iter().zip(&mut self.images).enumerate() {
             (own.world_from_sensor, own.width) = (Some(image.world_from_sensor), image.camera.width());
             own.depth.clear();
-            match scene.of_image(image) {
+            match ownership.scene.of_image(image) {
                 Some(known) => own.depth.extend_from_slice(&known.depth),
                 None => own.depth.resize(image.pixels.len(), 0.0),
             }
-            change(number, &mut own.depth);
+            for (depth, owner) in own.depth.iter_mut().zip(ownership.owners(number)) {
+                *depth = if is_others(owner) { OTHERS } else { *depth };
+            }
         }
     }
 
@@ -114,16 +118,6 @@ impl Backgrounds {
                 moved(number, carried);
             }
         }
-    }
-
-    /// Whether no depth image has been received yet.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.images.is_empty()
-    }
-
-    /// Forgets everything.
-    pub(crate) fn clear(&mut self) {
-        self.images.clear();
     }
 }
 

@@ -6,7 +6,6 @@
 
 pub(crate) mod background;
 mod background_moved;
-mod background_update;
 pub(crate) mod candidates;
 pub(crate) mod clusters;
 pub(crate) mod depth_view;

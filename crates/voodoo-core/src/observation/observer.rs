@@ -1,6 +1,6 @@
 //! Turns a frame into an observation of the tracked body: background, candidates for the body, and which images were segmented.
 
-use super::background::{Backgrounds, OTHERS};
+use super::background::Backgrounds;
 use super::candidates::Candidates;
 use super::depth_view::{DepthViews, find_segmented};
 use super::frame::{Frame, Ground};
@@ -48,80 +48,61 @@ pub(crate) struct Own<'a> {
     pub pixels: &'a [usize],
 }
 
-/// Holds the learned scene, and the candidates of the current frame.
+/// Holds the candidates of the current frame.
 #[derive(Debug, Default)]
 pub(crate) struct Observer {
-    backgrounds: Backgrounds,
+    /// The scene with what other persons hide, where there are any.
+    masked: Backgrounds,
     segmented: Vec<bool>,
     candidates: Candidates,
+    /// Whether a frame had depth images.
+    has_images: bool,
 }
 
 impl Observer {
-    /// Forgets scene and candidates.
+    /// Forgets everything.
     pub(crate) fn clear(&mut self) {
-        self.candidates = Candidates::default();
-        self.backgrounds.clear();
+        *self = Self::default();
+    }
+
+    /// Finds which images of a frame are segmented, and what other persons hide.
+    pub(crate) fn begin(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        find_segmented(frame, &mut self.segmented);
+        self.has_images |= !frame.images.is_empty();
+        if !ownership.alone {
+            self.masked.mask(frame, ownership);
+        }
     }
 
     /// Step 1 (K06 IV-B.1): keeps the points in the enlarged box of the whole body, without the scene and the pixels that other
     /// persons explain.
-    pub(crate) fn observe(
+    pub(crate) fn gather(
         &mut self,
         frame: &Frame,
-        bounds: &Aabb,
         origin: Vec3,
+        bounds: &Aabb,
         ownership: OwnershipMask,
         config: &Config,
     ) {
-        self.adopt(frame, ownership);
-        self.gather(frame, origin, bounds, config);
-    }
-
-    /// Finds which images of a frame are segmented; the scene is not adopted.
-    pub(crate) fn find_segmented(&mut self, frame: &Frame) {
-        find_segmented(frame, &mut self.segmented);
-    }
-
-    /// Adopts the scene, and what other persons explain.
-    fn adopt(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        find_segmented(frame, &mut self.segmented);
-        self.backgrounds.mark_others_points(ownership.cloud_owners, |owner| ownership.is_others(owner));
-        // A frame without images keeps what is known of the cameras.
-        if frame.images.is_empty() {
-            return;
-        }
-        self.backgrounds.adopt(frame, ownership.scene, |image, depth| {
-            let owners = if ownership.alone { &[] } else { ownership.owners(image) };
-            for (depth, owner) in depth.iter_mut().zip(owners) {
-                *depth = if ownership.is_others(*owner) { OTHERS } else { *depth };
-            }
-        });
-    }
-
-    /// Treats background pixels as possibly showing the body. Returns the depths learned there, for `restore`.
-    pub(crate) fn release(&mut self, frame: &Frame, own: Own) -> Vec<f32> {
-        self.backgrounds.release(frame, own)
-    }
-
-    /// Undoes `release`.
-    pub(crate) fn restore(&mut self, frame: &Frame, own: Own, learned: &[f32]) {
-        self.backgrounds.restore(frame, own, learned);
-    }
-
-    /// Selects the candidates again in another box.
-    pub(crate) fn gather(&mut self, frame: &Frame, origin: Vec3, bounds: &Aabb, config: &Config) {
-        self.candidates.gather(frame, origin, bounds, &self.backgrounds, config);
+        let scene = if ownership.alone { ownership.scene } else { &self.masked };
+        self.candidates.gather(frame, origin, bounds, scene, config);
     }
 
     /// The observation of `frame`.
-    pub(crate) fn observation<'a>(&'a self, frame: &'a Frame<'a>, origin: Vec3) -> Observation<'a> {
-        let views = DepthViews { frame, backgrounds: &self.backgrounds, segmented: &self.segmented, origin };
+    pub(crate) fn observation<'a>(
+        &'a self,
+        frame: &'a Frame<'a>,
+        origin: Vec3,
+        ownership: OwnershipMask<'a>,
+    ) -> Observation<'a> {
+        let backgrounds = if ownership.alone { ownership.scene } else { &self.masked };
+        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 
     /// Whether the frame has no depth image although earlier frames had: this is no evidence that the body left.
     pub(crate) fn silent(&self, frame: &Frame) -> bool {
-        frame.images.is_empty() && !self.backgrounds.is_empty()
+        frame.images.is_empty() && self.has_images
     }
 
     /// The candidates of the last frame.
@@ -145,12 +126,13 @@ mod tests {
         assert!(!observer.silent(&nothing), "nobody knows of a camera");
         let observe = |observer: &mut Observer| {
             with_frame(&pixels, 0.0, |frame| {
-                observer.observe(frame, &bounds, Vec3::ZERO, everything(&wall(frame)), &Config::default());
+                let scene = wall(frame);
+                observer.begin(frame, everything(&scene));
+                observer.gather(frame, Vec3::ZERO, &bounds, everything(&scene), &Config::default());
             });
         };
         observe(&mut observer);
-        let none = Backgrounds::default();
-        observer.observe(&nothing, &bounds, Vec3::ZERO, everything(&none), &Config::default());
+        observer.begin(&nothing, everything(&Backgrounds::default()));
         assert!(observer.silent(&nothing) && !with_frame(&pixels, 1.0, |frame| observer.silent(frame)));
         observer.clear();
         assert!(!observer.silent(&nothing) && observer.candidates().is_empty());

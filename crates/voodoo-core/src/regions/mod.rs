@@ -32,11 +32,8 @@ use models::ColorModel;
 pub(crate) use pixel_gain::{Backdrop, PixelGain};
 use scan::{EdgeSearch, Scanner};
 
-/// The edge search of each step of a frame: wide and coarse at first, then narrower and finer. The first two are only used when
-/// the motion of the body is unknown.
-const SEARCHES: [EdgeSearch; 6] = [
-    EdgeSearch { reach: 10, every: 4.0 },
-    EdgeSearch { reach: 8, every: 4.0 },
+/// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
+const SEARCHES: [EdgeSearch; STEPS] = [
     EdgeSearch { reach: 8, every: 2.0 },
     EdgeSearch { reach: 5, every: 2.0 },
     EdgeSearch { reach: 6, every: 1.0 },
@@ -44,7 +41,6 @@ const SEARCHES: [EdgeSearch; 6] = [
 ];
 /// The edge search for estimating a limb's girth.
 const SINGLE_EDGES: EdgeSearch = EdgeSearch { reach: 10, every: 1.0 };
-const WIDE_SEARCHES: usize = 2;
 /// Label images are drawn in cells of two to this power pixels.
 const CELL_BITS: u32 = 1;
 /// Approximate spacing of lines along a limb, meters; and the least and greatest number of lines on each side.
@@ -74,10 +70,8 @@ struct Learned {
     known: bool,
 }
 
-/// Number of steps that is enough where only color edges are measured; more when the motion is unknown.
-pub(crate) fn steps(unknown_motion: bool) -> usize {
-    SEARCHES.len() - if unknown_motion { 0 } else { WIDE_SEARCHES }
-}
+/// Number of steps that is enough where only color edges are measured.
+pub(crate) const STEPS: usize = 4;
 
 /// Colors of the body and its surroundings for each camera, and the lines of the last search.
 #[derive(Debug, Default)]
@@ -202,16 +196,16 @@ impl ColorRegions {
         }
     }
 
-    /// Finds the edges of the limbs that are `is_requested` in all images, in a step of a frame that `left` more steps follow.
+    /// Finds the edges of the limbs that are `is_requested` in all images, in this step of a frame.
     pub(crate) fn find(
         &mut self,
         frame: &Frame,
         posed: Posed,
-        left: usize,
+        step: usize,
         is_requested: impl Fn(usize) -> bool,
         found: &mut Correspondences,
     ) {
-        let search = SEARCHES[SEARCHES.len() - 1 - left.min(SEARCHES.len() - 1)];
+        let search = SEARCHES[step.min(STEPS - 1)];
         self.evidence.clear();
         self.evidence.resize(posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, search, Some(&is_requested), &mut found.regions);

@@ -1,9 +1,8 @@
 //! Decides when the detector runs for a tracked person, and whether it finds the person elsewhere or facing the other way.
 
 use crate::body::Body;
-use crate::detect::Detected;
+use crate::detect::{Detected, Detection};
 use crate::math::{Pose, Vec3};
-use crate::terms::APART;
 
 /// Time for which a track is new, seconds. It is also the interval between detections for a suspect limb.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;
@@ -80,9 +79,7 @@ pub(super) struct DetectionCheck {
     compares: bool,
     /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
     counts: bool,
-    /// Whether the last detection agreed with a start that was given by the user.
-    agreed: bool,
-    /// Whether any detection did.
+    /// Whether a detection agreed with the track.
     confirmed: bool,
     /// Log odds that the person is elsewhere, and that the tracked object is not a person.
     elsewhere: f64,
@@ -129,9 +126,7 @@ impl DetectionCheck {
         let waited = |last_detection: Option<f64>, every: f64| {
             last_detection.is_none_or(|last_detection| stamp - last_detection >= every)
         };
-        // A given start that a detection confirmed is checked half as often.
-        let after = if self.agreed && !anywhere { 2.0 * EVERY } else { EVERY };
-        let comparison_due = new_track && waited(self.last_comparison, after);
+        let comparison_due = new_track && waited(self.last_comparison, EVERY);
         let every = if pose_uncertain || anywhere { EVERY } else { NEW_TRACK_AGE };
         let suspect = limb_suspect || pose_uncertain || anywhere;
         self.counts = comparison_due || suspect && waited(self.last_detection, every);
@@ -145,33 +140,22 @@ impl DetectionCheck {
         self.counts || limb_suspect && unlike
     }
 
-    /// Compares a detection with the pose, world frame: by the trunk, and for a new track (`new_track`) also by legs and arms.
+    /// Compares a detection with the trunk at these poses, whose frame has its origin at `origin` in the world.
     pub(super) fn compare(
         &mut self,
         detected: Detected,
         body: &Body,
-        world_from_limb: &[Pose],
-        new_track: bool,
+        poses: &[Pose],
+        origin: Vec3,
     ) -> DetectionVerdict {
-        let elsewhere = |joints: &[usize], least: f64| {
-            let [apart, spread] = joint_distance(detected, body, world_from_limb, Vec3::ZERO, joints);
-            apart > least && apart > SIGMAS * spread
-        };
-        let Detected { detection, map } = detected;
-        let limbs_are = new_track && (elsewhere(map.legs(), ELSEWHERE) || elsewhere(map.arms(), APART));
-        if trunk_is_elsewhere(detected, body, world_from_limb, Vec3::ZERO) || limbs_are {
-            self.elsewhere += detection.person.min(detection.facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
-            self.agreed = false;
-            return if self.elsewhere >= ENOUGH_ODDS {
-                DetectionVerdict::Elsewhere
-            } else {
-                DetectionVerdict::Inconsistent
-            };
+        if !trunk_is_elsewhere(detected, body, poses, origin) {
+            self.elsewhere = 0.0;
+            self.confirmed = true;
+            return DetectionVerdict::Consistent;
         }
-        self.elsewhere = 0.0;
-        self.agreed = !self.auto_initialized;
-        self.confirmed = true;
-        DetectionVerdict::Consistent
+        let Detection { person, facing, .. } = detected.detection;
+        self.elsewhere += person.min(facing.map_or(f64::INFINITY, f64::abs)).min(ENOUGH_ODDS);
+        if self.elsewhere >= ENOUGH_ODDS { DetectionVerdict::Elsewhere } else { DetectionVerdict::Inconsistent }
     }
 
     /// Updates with the log odds that the object at the tracked position is a person. Returns whether it is none.
@@ -222,23 +206,6 @@ mod tests {
     }
 
     #[test]
-    fn a_confirmed_user_start_is_checked_half_as_often_as_an_auto_initialized_one() {
-        let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
-        let poses = body.rest_pose(Pose::IDENTITY);
-        let comparisons = |auto_initialized| {
-            let mut check = DetectionCheck::default();
-            check.set_auto_initialized(auto_initialized);
-            let (detection, map) = (Detection::default(), JointMap::default());
-            let nothing = Detected { detection: &detection, map: &map };
-            let agree = |check: &mut DetectionCheck| check.compare(nothing, &body, &poses, true);
-            let due =
-                |check: &mut DetectionCheck, frame: i32| check.is_due(f64::from(frame) / 30.0, Reasons::default());
-            (0..30).filter(|frame| due(&mut check, *frame) && agree(&mut check) == DetectionVerdict::Consistent).count()
-        };
-        assert_eq!([false, true].map(comparisons), [5, 10]);
-    }
-
-    #[test]
     fn a_detection_that_is_reversed_or_elsewhere_is_tried_and_a_consistent_one_is_not() {
         let body = Body::human(1.75, HumanModel::Full).unwrap_or_else(|error| unreachable!("{error}"));
         let names: Vec<String> = body.sites().iter().map(|site| site.name.clone()).collect();
@@ -257,7 +224,7 @@ mod tests {
         let tried = |root, sigma| {
             let detection = detection_at(root, sigma);
             let detection = Detected { detection: &detection, map: &map };
-            DetectionCheck::default().compare(detection, &body, &tracked, false) == DetectionVerdict::Elsewhere
+            DetectionCheck::default().compare(detection, &body, &tracked, Vec3::ZERO) == DetectionVerdict::Elsewhere
         };
         assert_eq!([about, aside, near].map(|root| tried(root, 0.05)), [true, true, false]);
         assert!(!tried(aside, 0.2), "within the uncertainty of the detection");

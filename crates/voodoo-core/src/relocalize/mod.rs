@@ -175,17 +175,10 @@ impl Relocalizer {
         self.people.own_pixels()
     }
 
-    /// Compares the detection of this frame with a body at these poses, world frame. For a new track (`new_track`), arms and legs
-    /// are compared, too.
-    pub(crate) fn compare(
-        &mut self,
-        body: &Body,
-        world_from_limb: &[Pose],
-        new_track: bool,
-    ) -> Option<DetectionVerdict> {
+    /// Compares the detection of this frame with a body at these poses, working frame, whose origin is at `origin` in the world.
+    pub(crate) fn compare(&mut self, body: &Body, poses: &[Pose], origin: Vec3) -> Option<DetectionVerdict> {
         let detected = self.people.detection().filter(|_| self.check.compares())?;
-        let new_track = new_track || self.loss.recently_recovered();
-        Some(self.check.compare(detected, body, world_from_limb, new_track))
+        Some(self.check.compare(detected, body, poses, origin))
     }
 
     /// Whether the track is not a person, by the detections up to this frame.
@@ -193,18 +186,12 @@ impl Relocalizer {
         self.check.is_false_track(self.people.person_odds())
     }
 
-    /// Returns the detected poses of this frame, refined, if they explain the frame no worse than the present ones; working
-    /// frame. The matches of `fit` are restored before it returns.
-    pub(crate) fn try_detected(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        present: &[Pose],
-        lost: bool,
-    ) -> Option<&[Pose]> {
-        let detected = self.people.detection()?;
+    /// Returns whether the detected poses of this frame, refined, explain the frame no worse than the present ones; working frame.
+    /// The matches of `fit` are restored before it returns.
+    pub(crate) fn try_detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> bool {
+        let Some(detected) = self.people.detection() else { return false };
         let origin = context.observation.origin();
-        let mut place = fit_pose(&context.model.body, detected)?;
+        let Some(mut place) = fit_pose(&context.model.body, detected) else { return false };
         place.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
         let (low, high) = (detected.detection.low - origin, detected.detection.high - origin);
         let margin = context.config.body_box_margin;
@@ -226,7 +213,12 @@ impl Relocalizer {
         let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
         let better = self.trials.try_detection(at, fit, present, &place);
         fit.swap_matches(&mut self.matched);
-        better.then(|| self.trials.poses())
+        better
+    }
+
+    /// The poses that a detection or the search found last, working frame.
+    pub(crate) fn found(&self) -> &[Pose] {
+        self.trials.poses()
     }
 
     /// Returns for how many frames the lost body has been searched: the count starts at the frame from which on a loss is not
@@ -243,12 +235,12 @@ impl Relocalizer {
         }
     }
 
-    /// Searches for a lost body that the detector cannot find. Returns its poses if it explains the frame better there than at
+    /// Searches for a lost body that the detector cannot find. Returns whether it explains the frame better there than at
     /// `present`. The matches of `fit` are restored before it returns.
-    pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> Option<&[Pose]> {
+    pub(crate) fn search(&mut self, context: Context, fit: &mut Fit, present: &[Pose]) -> bool {
         let (frame, origin) = (context.observation.frame(), context.observation.origin());
         if self.frames_searched().is_none() || self.people.detects() && !frame.images.is_empty() {
-            return None;
+            return false;
         }
         let backgrounds = context.observation.views.backgrounds;
         self.search.segments.find(frame, origin, backgrounds, context.config);
@@ -268,7 +260,7 @@ impl Relocalizer {
             found = self.search.try_segment(segment, at, fit, &mut self.trials, present);
         }
         fit.swap_matches(&mut self.matched);
-        found.then(|| self.trials.poses())
+        found
     }
 }
 
@@ -293,10 +285,11 @@ mod tests {
             let before = format!("{:?}", fit.correspondences());
             for (stamp, lost) in [(-0.4, false), (-0.3, true)] {
                 relocalizer.observe(outcome(stamp, lost), &present);
-                assert!(relocalizer.search(context, &mut fit, &present).is_none());
+                assert!(!relocalizer.search(context, &mut fit, &present));
             }
             relocalizer.observe(outcome(-0.2, true), &present);
-            let mut found = relocalizer.search(context, &mut fit, &present).map(<[Pose]>::to_vec);
+            let found = relocalizer.search(context, &mut fit, &present);
+            let mut found = found.then(|| relocalizer.found().to_vec());
             assert_eq!(format!("{:?}", fit.correspondences()), before);
             // Two more frames with the same image.
             for _ in 0..2 {

@@ -43,17 +43,17 @@ impl Trials {
         place: &[Pose],
         turning: f64,
     ) -> bool {
-        fit.match_all(context, present, context.config.max_steps);
-        let present_score = Objective::new(context, fit.matched(present), 1.0, None).body();
+        // The present pose is what the frame makes of it, near to where it is expected.
         self.poses.clear();
-        self.poses.extend_from_slice(place);
-        self.refine(context, fit);
+        self.poses.extend_from_slice(present);
+        fit.run(Context { time_scale: 1.0, ..context }, present, &mut self.poses);
+        let present_cost = Objective::new(context, fit.matched(&self.poses), 1.0, None).body();
+        let cost = self.refine(context, fit, place);
         let poses = std::mem::take(&mut self.poses);
         let stray = self.stray_fraction(context, &poses);
         self.poses = poses;
         let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
-        let allowed = present_score + if turned { turning } else { 0.0 };
-        Objective::new(context, fit.matched(&self.poses), 1.0, None).body() < allowed && stray < STRAY
+        cost < present_cost + if turned { turning } else { 0.0 } && stray < STRAY
     }
 
     /// Returns the fraction of a sample of the candidates that lies far from the body.
@@ -71,13 +71,17 @@ impl Trials {
         stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
     }
 
-    /// Refines `poses` by a few ICP steps; `fit` then holds their matches.
-    fn refine(&mut self, context: Context, fit: &mut Fit) {
+    /// Refines `place` by a few ICP steps and returns its cost; `poses` and `fit` then hold the refined pose and its matches.
+    fn refine(&mut self, context: Context, fit: &mut Fit, place: &[Pose]) -> f64 {
         let Self { poses, predicted, .. } = self;
-        predicted.clone_from(poses);
+        for start in [&mut *poses, &mut *predicted] {
+            start.clear();
+            start.extend_from_slice(place);
+        }
         for step in 0..REFINE {
             fit.step(context, predicted, poses, step);
         }
         fit.match_all(context, poses, context.config.max_steps);
+        Objective::new(context, fit.matched(poses), 1.0, None).body()
     }
 }

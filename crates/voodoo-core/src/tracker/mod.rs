@@ -59,6 +59,9 @@ pub struct BodyTracker {
     assessor: Assessor,
     estimate: Estimate,
     before: Before,
+    /// Poses expected in this frame, world frame; and whether the body was moved elsewhere: it returns if it is lost there.
+    expected: Vec<Pose>,
+    moved: bool,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
     moved_to: Option<(usize, Vec<usize>)>,
 }
@@ -77,6 +80,8 @@ impl BodyTracker {
             assessor: Assessor::default(),
             estimate: Estimate::default(),
             before: Before::default(),
+            expected: Vec::new(),
+            moved: false,
             moved_to: None,
             config,
         })
@@ -140,41 +145,19 @@ impl BodyTracker {
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
         self.relocalizer.clear_error();
         self.moved_to = None;
+        self.moved = false;
         if self.is_started() {
             self.before.keep(&self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
             let frame = &Frame { ground: frame.ground.or(self.relocalizer.floor()), ..*frame };
-            self.verify_start(frame, ownership);
-            self.follow(frame, ownership);
+            self.relocate(frame, ownership);
+            self.track(frame, ownership);
         }
-    }
-
-    /// Verifies a given start in the first frame after a reset. If the detector reports the person elsewhere or facing the other
-    /// way, and the frame confirms it, the start was wrong and the track restarts at the detection.
-    fn verify_start(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        if motion.stamp.is_some() || !config.relocalization || !fit.schedule(config).whole_body {
-            return;
-        }
-        relocalizer.detect(&model.body, frame, ownership, motion.poses[0].translation, Reasons::default());
-        if relocalizer.compare(&model.body, &motion.poses, false) == Some(DetectionVerdict::Elsewhere) {
-            observer.find_segmented(frame);
-            let observation = observer.observation(frame, motion.origin);
-            let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
-            let better = relocalizer.try_detected(setting.with_model(model), fit, &motion.poses, false).is_some();
-            if better {
-                self.restart_at_detection();
-                return;
-            }
-        }
-        // The start was right, so its sizes and scene are kept and the detection is dropped.
-        relocalizer.forget();
     }
 
     /// Restarts the track at the current detection, in the sizes that were set or, where they clearly differ, in the detected
     /// ones. Returns whether it could.
     fn restart_at_detection(&mut self) -> bool {
-        self.note_move();
         let set = self.sizes.initial_body().unwrap_or(&self.model.body);
         let Some((body, poses)) = self.relocalizer.fit_detected(&self.model, Some(set)) else { return false };
         let (known, auto_initialized) = (self.sizes.known(), self.relocalizer.is_auto_initialized());
@@ -215,7 +198,7 @@ impl BodyTracker {
             self.sizes.restart(&self.model, Start::Detected, &self.config);
             self.update_sizes();
         }
-        self.follow(frame, ownership);
+        self.track(frame, ownership);
         !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
@@ -231,20 +214,15 @@ impl BodyTracker {
         started && !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
-    /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame no worse. A new track
-    /// restarts there. Returns whether the person is there.
+    /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame no worse. Returns whether
+    /// the person is there.
     pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
         self.relocalizer.set_detection(detection);
-        if !self.move_to_detection(frame) {
-            return false;
+        let moved = self.move_to_detection(frame, ownership);
+        if moved {
+            self.track(frame, ownership);
         }
-        if self.relocalizer.is_new(frame.stamp) && self.restart_at_detection() {
-            self.follow(frame, ownership);
-        } else {
-            self.remember();
-            self.report(frame.stamp, 0, Some(1.0));
-        }
-        !matches!(self.estimate.status, Status::Lost | Status::Searching)
+        moved && !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
     /// Removes the pose: no person is there. From the next frame on the tracker searches for one.
@@ -254,42 +232,61 @@ impl BodyTracker {
         self.estimate = Estimate { stamp, ..Estimate::default() };
     }
 
-    /// Updates the pose with the part of a frame that is given by `ownership`.
-    fn follow(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
-        let schedule = fit.schedule(config);
-        let known = motion.stamp.is_some();
+    /// Runs the detector where it is due, and moves the body where it is elsewhere: to its detection, or, where a lost body cannot
+    /// be detected, to a segment.
+    fn relocate(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        let Self { config, model, motion, fit, hypotheses, relocalizer, sizes, assessor, expected, .. } = self;
+        if !fit.schedule(config).whole_body {
+            return;
+        }
         let interrupted = motion.stamp.is_some_and(|last| frame.stamp - last > INTERRUPTION);
         if interrupted {
             assessor.moved();
             relocalizer.interrupt(frame.stamp);
         }
+        motion.expect(&model.body, frame.stamp, config.prediction, expected);
+        motion.predicted.clear();
+        motion.predicted.extend(expected.iter().map(|pose| shifted(pose, motion.origin)));
+        let reasons = Reasons {
+            limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
+            pose_uncertain: assessor.is_uncertain(),
+            anywhere: interrupted,
+            // Beside other persons, what the body does not explain may be theirs.
+            unlike: ownership.alone && hypotheses.unlike(),
+        };
+        // A lost body is searched for with everybody's detections, see `crate::People`.
+        if assessor.status() == Status::Lost {
+            relocalizer.forget();
+        } else {
+            relocalizer.detect(&model.body, frame, ownership, expected[0].translation, reasons);
+        }
+        if !config.relocalization {
+            return;
+        }
+        match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
+            Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame, ownership) => self.relocalizer.forget(),
+            Some(DetectionVerdict::Consistent) => self.update_sizes(),
+            Some(_) => {}
+            None => self.move_to_segment(frame, ownership),
+        }
+    }
+
+    /// Updates the pose with the part of a frame that is given by `ownership`.
+    fn track(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
+        let schedule = fit.schedule(config);
+        let known = motion.stamp.is_some();
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
         let Motion { poses, previous, predicted, origin, .. } = motion;
-        observer.observe(frame, &body_box(&model.body, poses, config.body_box_margin), *origin, ownership, config);
-        let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale };
-        // Beside other persons, what the body does not explain may be theirs.
-        let unlike = ownership.alone && hypotheses.unlike();
-        if schedule.whole_body && known {
-            let lost = assessor.status() == Status::Lost;
-            // A lost body is searched for with everybody's detections, see `crate::People`.
-            if lost {
-                relocalizer.forget();
-            } else {
-                let reasons = Reasons {
-                    limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
-                    pose_uncertain: assessor.is_uncertain(),
-                    anywhere: interrupted,
-                    unlike,
-                };
-                relocalizer.detect(&model.body, frame, ownership, poses[0].translation + *origin, reasons);
-            }
-        }
+        observer.begin(frame, ownership);
+        observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), ownership, config);
+        let observation = observer.observation(frame, *origin, ownership);
+        let setting = Setting { config, observation, previous, time_scale };
         // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the
         // track is wrong.
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
-        let measures = schedule.whole_body && unlike && !relocalizer.is_new(frame.stamp);
+        let measures = ownership.alone && hypotheses.unlike() && !relocalizer.is_new(frame.stamp);
         let detected = relocalizer.detected().filter(|detected| measures && here(detected));
         fit.set_detected(detected, &model.body, poses, *origin);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
@@ -318,11 +315,10 @@ impl BodyTracker {
         fit.learn_regions(setting.with_model(model));
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
-        let relocalizes = self.config.relocalization && schedule.whole_body;
-        if relocalizes && self.relocalize(frame, known) {
-            return self.follow(frame, ownership);
+        if self.moved && assessor.status() == Status::Lost {
+            motion.move_to_world(&self.expected);
         }
-        self.remember();
+        self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
         if self.relocalizer.is_false_track() {
             self.stop(frame.stamp);
@@ -343,90 +339,50 @@ impl BodyTracker {
         self.fit.regions().check(frame)
     }
 
-    /// Moves the body to where a detector has reported it often enough. A new track restarts there instead, in this frame: the
-    /// result says whether it does.
-    fn relocalize(&mut self, frame: &Frame, known: bool) -> bool {
-        if known && self.relocalizer.detected().is_some() {
-            let world_from_limb: Vec<Pose> = self.motion.world_from_limb().collect();
-            let new_track = self.relocalizer.is_new(frame.stamp);
-            match self.relocalizer.compare(&self.model.body, &world_from_limb, new_track) {
-                Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame) => {
-                    // Sizes and scene were learned at the wrong position, so a new track restarts.
-                    return new_track && self.restart_at_detection();
-                }
-                Some(DetectionVerdict::Consistent) => self.update_sizes(),
-                _ => {}
-            }
-        }
-        self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
-        self.search_everywhere(frame);
-        false
-    }
-
-    /// Searches for a lost body without a detector, and moves it to where it is found.
-    fn search_everywhere(&mut self, frame: &Frame) {
-        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
-        let observation = observer.observation(frame, motion.origin);
-        let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
-        if let Some(place) = relocalizer.search(setting.with_model(model), fit, &motion.poses) {
-            motion.predicted.clone_from_slice(place);
-            self.move_to_predicted(frame);
-        }
-    }
-
-    /// Moves the body to the current detection if that explains the frame no worse. Returns whether it moved.
-    fn move_to_detection(&mut self, frame: &Frame) -> bool {
+    /// Moves the body to the current detection if that explains the frame no worse. Returns whether it moved. A new track
+    /// restarts there, because sizes and scene were learned at the wrong position.
+    fn move_to_detection(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
-        let learned = observer.release(frame, relocalizer.own_pixels());
-        let observation = observer.observation(frame, motion.origin);
+        observer.begin(frame, ownership);
+        let observation = observer.observation(frame, motion.origin, ownership);
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         let lost = assessor.status() == Status::Lost;
-        let place = relocalizer.try_detected(setting.with_model(model), fit, &motion.poses, lost);
-        let better = place.map(|place| motion.predicted.clone_from_slice(place)).is_some();
-        let moved = better && self.move_to_predicted(frame);
-        if moved {
-            self.note_move();
-        } else {
-            self.observer.restore(frame, self.relocalizer.own_pixels(), &learned);
+        if !relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost) {
+            return false;
         }
-        moved
+        let Own { image, pixels } = relocalizer.own_pixels();
+        self.moved_to = Some((image, pixels.to_vec()));
+        if relocalizer.is_new(frame.stamp) {
+            return self.restart_at_detection();
+        }
+        self.move_to_found();
+        true
     }
 
-    /// Notes that the body has moved to the detection of this frame.
-    fn note_move(&mut self) {
-        let Own { image, pixels } = self.relocalizer.own_pixels();
-        self.moved_to = Some((image, pixels.to_vec()));
+    /// Moves a lost body that cannot be detected to a segment that it explains better.
+    fn move_to_segment(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        let Self { config, model, motion, observer, fit, relocalizer, .. } = self;
+        if relocalizer.frames_searched().is_none() {
+            return;
+        }
+        observer.begin(frame, ownership);
+        let observation = observer.observation(frame, motion.origin, ownership);
+        let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
+        if relocalizer.search(setting.with_model(model), fit, &motion.predicted) {
+            self.move_to_found();
+        }
+    }
+
+    /// Moves the body to the poses that a detection or the search found.
+    fn move_to_found(&mut self) {
+        self.moved = true;
+        self.motion.move_to(self.relocalizer.found());
+        self.assessor.moved();
     }
 
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
     pub(crate) fn moved_to(&self) -> Option<(usize, &[usize])> {
         self.moved_to.as_ref().map(|(image, pixels)| (*image, pixels.as_slice()))
-    }
-
-    /// Swaps the pose with the predicted one, and keeps it if the body is not lost there. Returns whether it was kept.
-    fn move_to_predicted(&mut self, frame: &Frame) -> bool {
-        let Motion { poses, predicted, .. } = &mut self.motion;
-        std::mem::swap(poses, predicted);
-        self.reassess(frame);
-        if self.assessor.status() != Status::Lost {
-            // The motion of the body at its new position is unknown.
-            self.motion.forget();
-            return true;
-        }
-        let Motion { poses, predicted, .. } = &mut self.motion;
-        std::mem::swap(poses, predicted);
-        self.reassess(frame);
-        false
-    }
-
-    /// Matches and assesses this frame again, for changed poses.
-    fn reassess(&mut self, frame: &Frame) {
-        let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
-        observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), config);
-        let setting = Setting { config, observation: observer.observation(frame, *origin), previous, time_scale: 1.0 };
-        fit.match_all(setting.with_model(model), poses, config.max_steps);
-        assessor.moved();
-        assessor.assess(setting.with_model(model), fit.matched(poses), None);
     }
 
     /// Summarizes the frame's assessment for the relocalizer.
@@ -438,12 +394,6 @@ impl BodyTracker {
             tracked: status == Status::Tracking,
             silent: self.observer.silent(frame),
         }
-    }
-
-    /// Stores the end positions of arms and legs for the hypotheses of later frames.
-    fn remember(&mut self) {
-        let Self { model, motion, hypotheses, assessor, .. } = self;
-        hypotheses.remember(model, motion, assessor.status() == Status::Lost, |limb| assessor.is_reliable(limb));
     }
 
     /// Fills the estimate: for a frame `time_scale` after the last one, or, with `None`, for a pose that was set.

@@ -4,7 +4,6 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{Pool, Propose, SWIVELS};
-use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Pose, Vec3};
 
@@ -17,7 +16,7 @@ pub(in crate::hypotheses) struct ColorDirections {
 }
 
 impl Propose for ColorDirections {
-    fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
+    fn propose(&mut self, at: Extremity, rough: &mut RoughSearch, pool: &mut Pool) {
         if at.regions.is_none() {
             return;
         }

@@ -1,7 +1,6 @@
 //! Proposes the whole body as detected: when the trunk is displaced, no change of a single arm or leg is correct.
 
 use super::{Pool, Propose};
-use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Pose, shifted};
 
@@ -10,7 +9,7 @@ use crate::math::{Pose, shifted};
 pub(in crate::hypotheses) struct DetectedBody<'a>(pub(in crate::hypotheses) &'a [Pose]);
 
 impl Propose for DetectedBody<'_> {
-    fn propose(&mut self, at: Extremity, _history: &[History], _rough: &mut RoughSearch, pool: &mut Pool) {
+    fn propose(&mut self, at: Extremity, _rough: &mut RoughSearch, pool: &mut Pool) {
         // A wrong arm is no evidence against the rest of the body.
         if !at.chain().leg || self.0.len() != at.matched.poses.len() {
             return;
@@ -45,7 +44,7 @@ mod tests {
                 let context = Context { observation, ..context };
                 let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
                 let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
-                DetectedBody(detected).propose(at, &[], &mut rough, &mut pool);
+                DetectedBody(detected).propose(at, &mut rough, &mut pool);
                 let found: Vec<_> = pool.found().map(|proposal| proposal.poses.clone()).collect();
                 found
             };

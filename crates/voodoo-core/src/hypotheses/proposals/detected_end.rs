@@ -2,7 +2,6 @@
 
 use super::{Pool, Propose, SWIVELS};
 use crate::detect::Detected;
-use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::Vec3;
 
@@ -27,7 +26,7 @@ impl DetectedEnd<'_> {
 }
 
 impl Propose for DetectedEnd<'_> {
-    fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
+    fn propose(&mut self, at: Extremity, rough: &mut RoughSearch, pool: &mut Pool) {
         let Some(end) = self.end(at) else { return };
         let place = end - at.context.observation.origin();
         // The bend is searched for, because a detected elbow or knee is no more accurate than the wrist or ankle.

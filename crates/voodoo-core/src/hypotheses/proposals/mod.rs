@@ -3,17 +3,14 @@
 mod color_directions;
 mod detected_body;
 mod detected_end;
-mod last_good_end;
 mod unexplained_cluster;
 
 pub(super) use color_directions::ColorDirections;
 pub(super) use detected_body::DetectedBody;
 pub(super) use detected_end::DetectedEnd;
-pub(super) use last_good_end::LastGoodEnd;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 
 use super::MARGIN;
-use super::history::History;
 use super::rough::{Extremity, RoughSearch};
 use crate::math::Pose;
 
@@ -24,8 +21,8 @@ pub(crate) const SWIVELS: usize = 6;
 
 /// A kind of proposal for an arm or leg.
 pub(super) trait Propose {
-    /// Writes the best configuration of this kind to `pool` if it is worth refining. `history` is that of all arms and legs.
-    fn propose(&mut self, at: Extremity, history: &[History], rough: &mut RoughSearch, pool: &mut Pool);
+    /// Writes the best configuration of this kind to `pool` if it is worth refining.
+    fn propose(&mut self, at: Extremity, rough: &mut RoughSearch, pool: &mut Pool);
 }
 
 /// A configuration of the whole body that may be refined.
@@ -38,13 +35,9 @@ pub(super) struct Proposal {
 /// Proposals for one arm or leg: one slot for each kind, in the order in which they are refined.
 #[derive(Debug, Default)]
 pub(super) struct Pool {
-    /// The end is at its last good position.
-    pub(super) last_good: Proposal,
     /// The configuration of lowest rough cost, and that cost; initially the highest that is worth refining.
     pub(super) points: Proposal,
     pub(super) least: f64,
-    /// Rough cost of the current configuration.
-    pub(super) current: f64,
     /// It is stretched through unexplained points.
     pub(super) stretched: Proposal,
     /// The end is at its detected position.
@@ -67,17 +60,17 @@ impl Pool {
         for proposal in self.slots() {
             proposal.found = false;
         }
-        (self.least, self.current) = (current - MARGIN, current);
+        self.least = current - MARGIN;
     }
 
     /// The proposals found, in the order in which they are refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { last_good, points, stretched, detected, body, .. } = self;
-        [last_good, points, stretched, detected, body].into_iter().filter(|slot| slot.found)
+        let Self { points, stretched, detected, body, .. } = self;
+        [points, stretched, detected, body].into_iter().filter(|slot| slot.found)
     }
 
-    fn slots(&mut self) -> [&mut Proposal; 5] {
-        let Self { last_good, points, stretched, detected, body, .. } = self;
-        [last_good, points, stretched, detected, body]
+    fn slots(&mut self) -> [&mut Proposal; 4] {
+        let Self { points, stretched, detected, body, .. } = self;
+        [points, stretched, detected, body]
     }
 }

@@ -1,7 +1,6 @@
 //! Proposes an arm or leg that ends at a cluster of unexplained points, and one that is stretched through it.
 
 use super::{Pool, Propose, SWIVELS};
-use crate::hypotheses::history::History;
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Vec3, WeightedPoints};
 use crate::terms::APART;
@@ -22,7 +21,7 @@ impl UnexplainedCluster {
 }
 
 impl Propose for UnexplainedCluster {
-    fn propose(&mut self, at: Extremity, _history: &[History], rough: &mut RoughSearch, pool: &mut Pool) {
+    fn propose(&mut self, at: Extremity, rough: &mut RoughSearch, pool: &mut Pool) {
         let ends = end_proposals(&rough.score.unexplained, at.root(), &mut self.apart);
         let mut stretched = pool.least;
         for end in ends.into_iter().flatten() {
