@@ -100,7 +100,7 @@ def test_stamps_and_a_cut_image(real, tmp_path):
         ),
         (
             {"calibration": lambda content: content.replace(b"0.49290284514427185", b"-1")},
-            "calibration: camera fy: expected",
+            "calibration: camera fx, fy: expected",
         ),
         (
             {"calibration": lambda content: content.replace(b'"Rotation":[0.99', b'"Rotation":[7.99')},

@@ -259,7 +259,7 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
                 assert (front_end.frozen, front_end.reports, front_end.rays) == before
             estimate = front_end.step(observed if index % 2 else plain)
             skin = [(cue.candidates, cue.assigned) for cue in front_end.skin.values()]
-            gate = copy(front_end._persons[1].gate.core)
+            gate = copy(front_end._persons[1].gate)
             gates = {site: gate.limit(site, "network", estimate.stamp + 0.05) for site in ("l_wrist", "r_wrist")}
             steps.append(
                 repr(
@@ -276,9 +276,7 @@ def test_a_refused_frame_leaves_no_trace_in_the_front_end():
     for index, (was, now) in enumerate(zip(ends[0][0], ends[1][0], strict=True)):
         assert was == now, index
     assert ends[0][1] == ends[1][1]
-    assert "'l_hand'" in ends[0][0][-1] and gates["l_wrist"] > front_end._persons[1].gate.radius, (
-        "the network was heard"
-    )
+    assert "'l_hand'" in ends[0][0][-1] and gates["l_wrist"] > front_end.settings.gate_radius, "the network was heard"
 
 
 def work(estimate):

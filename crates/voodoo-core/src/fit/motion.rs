@@ -48,19 +48,6 @@ impl Motion {
         self.interval = None;
     }
 
-    /// Moves the body to these poses, from where its motion is unknown.
-    pub(crate) fn move_to(&mut self, poses: &[Pose]) {
-        self.poses.clone_from_slice(poses);
-        self.forget();
-    }
-
-    /// Moves the body to these poses, world frame.
-    pub(crate) fn move_to_world(&mut self, world_from_limb: &[Pose]) {
-        self.poses.clear();
-        self.poses.extend(world_from_limb.iter().map(|pose| shifted(pose, self.origin)));
-        self.forget();
-    }
-
     /// Forgets the motion of these limbs, parents first, relative to their parents.
     pub(crate) fn forget_joints(&mut self, body: &Body, limbs: impl Iterator<Item = usize>) {
         for limb in limbs {

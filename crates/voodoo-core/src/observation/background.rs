@@ -2,6 +2,7 @@
 
 use crate::math::Pose;
 use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 
 /// A pixel belongs to the background unless it lies more than this in front of it: meters, plus a fraction of the depth, because
@@ -105,6 +106,20 @@ impl Backgrounds {
             }
             for (depth, owner) in own.depth.iter_mut().zip(ownership.owners(number)) {
                 *depth = if is_others(owner) { OTHERS } else { *depth };
+            }
+        }
+    }
+
+    /// Sets the learned depth to unknown at pixels that show a person. Depths learned behind the person stay.
+    pub(crate) fn release(&mut self, frame: &Frame, own: Own) {
+        let Some(image) = frame.images.get(own.image) else { return };
+        let Some(depth) = self.depth_mut(image) else { return };
+        for pixel in own.pixels {
+            let z = image.pixels.get(*pixel) * image.meters_per_unit as f32;
+            if let Some(depth) = depth.get_mut(*pixel)
+                && (!(z > 0.0) || Background::contains(*depth, z))
+            {
+                *depth = 0.0;
             }
         }
     }

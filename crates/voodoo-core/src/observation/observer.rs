@@ -51,8 +51,10 @@ pub(crate) struct Own<'a> {
 /// Holds the candidates of the current frame.
 #[derive(Debug, Default)]
 pub(crate) struct Observer {
-    /// The scene with what other persons hide, where there are any.
+    /// The scene as this body sees it, where it is not the one that all share: other persons hide some of it, or the body was
+    /// learned as a part of it.
     masked: Backgrounds,
+    is_masked: bool,
     segmented: Vec<bool>,
     candidates: Candidates,
     /// Whether a frame had depth images.
@@ -69,9 +71,23 @@ impl Observer {
     pub(crate) fn begin(&mut self, frame: &Frame, ownership: OwnershipMask) {
         find_segmented(frame, &mut self.segmented);
         self.has_images |= !frame.images.is_empty();
-        if !ownership.alone {
+        self.is_masked = !ownership.alone;
+        if self.is_masked {
             self.masked.mask(frame, ownership);
         }
+    }
+
+    /// Treats pixels of the scene as possibly showing the body, in this frame.
+    pub(crate) fn release(&mut self, frame: &Frame, ownership: OwnershipMask, own: Own) {
+        if !self.is_masked {
+            self.masked.mask(frame, ownership);
+        }
+        self.is_masked = true;
+        self.masked.release(frame, own);
+    }
+
+    fn scene<'a>(&'a self, ownership: OwnershipMask<'a>) -> &'a Backgrounds {
+        if self.is_masked { &self.masked } else { ownership.scene }
     }
 
     /// Step 1 (K06 IV-B.1): keeps the points in the enlarged box of the whole body, without the scene and the pixels that other
@@ -84,7 +100,7 @@ impl Observer {
         ownership: OwnershipMask,
         config: &Config,
     ) {
-        let scene = if ownership.alone { ownership.scene } else { &self.masked };
+        let scene = if self.is_masked { &self.masked } else { ownership.scene };
         self.candidates.gather(frame, origin, bounds, scene, config);
     }
 
@@ -95,8 +111,7 @@ impl Observer {
         origin: Vec3,
         ownership: OwnershipMask<'a>,
     ) -> Observation<'a> {
-        let backgrounds = if ownership.alone { ownership.scene } else { &self.masked };
-        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
+        let views = DepthViews { frame, backgrounds: self.scene(ownership), segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::frame::{DepthImage, Frame};
+use crate::observation::observer::Own;
 use crate::observation::ownership::NO_OWNER;
 
 /// One row in this many is learned per frame, for speed; the scene is static.
@@ -129,15 +130,7 @@ impl SceneModel {
     /// Releases pixels of an image that show a person: where they agree with the learned depth, that depth is deleted. Learned
     /// depth behind the person is kept; without it, the background would look like a flat body once the person is gone.
     pub(super) fn release(&mut self, frame: &Frame, image: usize, pixels: &[usize]) {
-        let Some(image) = frame.images.get(image) else { return };
-        let Some(known) = self.known.depth_mut(image) else { return };
-        for pixel in pixels {
-            if let Some(known) = known.get_mut(*pixel)
-                && meters(image, *pixel).is_none_or(|z| Background::contains(*known, z))
-            {
-                *known = 0.0;
-            }
-        }
+        self.known.release(frame, Own { image, pixels });
     }
 }
 

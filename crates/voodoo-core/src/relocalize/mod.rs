@@ -15,6 +15,7 @@ use crate::detect::{
     Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, fit_body, fit_pose, is_sized_like,
 };
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
+use crate::hypotheses::REVERSAL_MARGIN;
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::{Frame, Ground};
@@ -210,8 +211,16 @@ impl Relocalizer {
             context.config,
         );
         let observation = context.observation.with(&self.candidates);
+        // Before its first frame the body is where it was set, and what is beside it may be scene.
+        let first = context.previous.is_empty();
+        let mut fitted = present.to_vec();
+        if !first {
+            fit.run(Context { observation, ..context }, present, &mut fitted);
+        }
         let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
-        let better = self.trials.try_detection(at, fit, present, &place);
+        // Depth is nearly symmetric front to back, so a detection may override a slightly better cost.
+        let better =
+            self.trials.try_at(at, fit, &fitted, &place, REVERSAL_MARGIN) && (first || self.trials.explains_most(at));
         fit.swap_matches(&mut self.matched);
         better
     }

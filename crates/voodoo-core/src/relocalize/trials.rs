@@ -1,7 +1,7 @@
 //! Tries a body at a new position: after refinement there, it must explain the points no worse than the present pose.
 
 use crate::fit::{Context, Fit};
-use crate::hypotheses::{Objective, REFINE, REVERSAL_MARGIN, ROUGH_SAMPLE, explain};
+use crate::hypotheses::{Objective, REFINE, ROUGH_SAMPLE, explain};
 use crate::math::{Pose, Vec3, WeightedPoints};
 use crate::visibility::EXPLAINED;
 
@@ -26,13 +26,6 @@ impl Trials {
         &self.poses
     }
 
-    /// Tries the body at a detected pose, with the points there as the candidates of `context`. Returns whether it explains them
-    /// no worse than the present pose does.
-    pub(super) fn try_detection(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
-        // Depth is nearly symmetric front to back, so a detection may override a slightly better score.
-        self.try_at(context, fit, present, place, REVERSAL_MARGIN)
-    }
-
     /// Tries the body at the poses `place`. Returns whether it explains the points there no worse than the present pose does, or
     /// by less than `turning` worse where it faces the other way.
     pub(super) fn try_at(
@@ -43,17 +36,19 @@ impl Trials {
         place: &[Pose],
         turning: f64,
     ) -> bool {
-        // The present pose is what the frame makes of it, near to where it is expected.
-        self.poses.clear();
-        self.poses.extend_from_slice(present);
-        fit.run(Context { time_scale: 1.0, ..context }, present, &mut self.poses);
-        let present_cost = Objective::new(context, fit.matched(&self.poses), 1.0, None).body();
+        fit.match_all(context, present, context.config.max_steps);
+        let present_cost = Objective::new(context, fit.matched(present), 1.0, None).body();
         let cost = self.refine(context, fit, place);
+        let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
+        cost < present_cost + if turned { turning } else { 0.0 }
+    }
+
+    /// Whether the poses of the last trial explain most of the candidates.
+    pub(super) fn explains_most(&mut self, context: Context) -> bool {
         let poses = std::mem::take(&mut self.poses);
         let stray = self.stray_fraction(context, &poses);
         self.poses = poses;
-        let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
-        cost < present_cost + if turned { turning } else { 0.0 } && stray < STRAY
+        stray < STRAY
     }
 
     /// Returns the fraction of a sample of the candidates that lies far from the body.

@@ -59,9 +59,8 @@ pub struct BodyTracker {
     assessor: Assessor,
     estimate: Estimate,
     before: Before,
-    /// Poses expected in this frame, world frame; and whether the body was moved elsewhere: it returns if it is lost there.
+    /// Poses expected in this frame, world frame.
     expected: Vec<Pose>,
-    moved: bool,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
     moved_to: Option<(usize, Vec<usize>)>,
 }
@@ -81,7 +80,6 @@ impl BodyTracker {
             estimate: Estimate::default(),
             before: Before::default(),
             expected: Vec::new(),
-            moved: false,
             moved_to: None,
             config,
         })
@@ -145,7 +143,6 @@ impl BodyTracker {
     pub(crate) fn step(&mut self, frame: &Frame, ownership: OwnershipMask) {
         self.relocalizer.clear_error();
         self.moved_to = None;
-        self.moved = false;
         if self.is_started() {
             self.before.keep(&self.estimate);
             // Where the ground plane is not given, the one that the detector found under the body is used.
@@ -218,11 +215,15 @@ impl BodyTracker {
     /// the person is there.
     pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
         self.relocalizer.set_detection(detection);
-        let moved = self.move_to_detection(frame, ownership);
-        if moved {
-            self.track(frame, ownership);
+        if !self.is_at_detection(frame, ownership) || !self.move_to_found(frame, ownership) {
+            return false;
         }
-        moved && !matches!(self.estimate.status, Status::Lost | Status::Searching)
+        if self.relocalizer.is_new(frame.stamp) && self.restart_at_detection() {
+            self.track(frame, ownership);
+        } else {
+            self.report(frame.stamp, 0, Some(1.0));
+        }
+        !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
     /// Removes the pose: no person is there. From the next frame on the tracker searches for one.
@@ -260,26 +261,40 @@ impl BodyTracker {
         } else {
             relocalizer.detect(&model.body, frame, ownership, expected[0].translation, reasons);
         }
-        if !config.relocalization {
-            return;
+        if config.relocalization {
+            match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
+                Some(DetectionVerdict::Elsewhere) if self.is_at_detection(frame, ownership) => {
+                    let moved = self.motion.stamp.is_none() || self.move_to_found(frame, ownership);
+                    // A new track restarts there, because sizes and scene were learned at the wrong position.
+                    if moved && self.relocalizer.is_new(frame.stamp) {
+                        self.restart_at_detection();
+                    }
+                    self.relocalizer.forget();
+                }
+                Some(DetectionVerdict::Consistent) => self.update_sizes(),
+                Some(_) => {}
+                None => self.move_to_segment(frame, ownership),
+            }
         }
-        match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
-            Some(DetectionVerdict::Elsewhere) if self.move_to_detection(frame, ownership) => self.relocalizer.forget(),
-            Some(DetectionVerdict::Consistent) => self.update_sizes(),
-            Some(_) => {}
-            None => self.move_to_segment(frame, ownership),
+        if self.motion.stamp.is_none() {
+            // It verified the start and says no more about the pose.
+            self.relocalizer.forget();
         }
     }
 
     /// Updates the pose with the part of a frame that is given by `ownership`.
     fn track(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
+        let Self { config, model, motion, observer, fit, hypotheses, relocalizer, sizes, assessor, moved_to, .. } =
+            self;
         let schedule = fit.schedule(config);
         let known = motion.stamp.is_some();
         // Predicted pose, and candidates around it (step 1 of K06 IV-B).
         let time_scale = motion.advance(&model.body, frame.stamp, config.prediction, schedule.whole_body);
         let Motion { poses, previous, predicted, origin, .. } = motion;
         observer.begin(frame, ownership);
+        if let Some((image, pixels)) = moved_to {
+            observer.release(frame, ownership, Own { image: *image, pixels });
+        }
         observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), ownership, config);
         let observation = observer.observation(frame, *origin, ownership);
         let setting = Setting { config, observation, previous, time_scale };
@@ -301,7 +316,7 @@ impl BodyTracker {
         sizes.initialize(setting, model, poses, fit);
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
-        if config.hypotheses && schedule.whole_body && known {
+        if config.hypotheses && schedule.whole_body && known && assessor.status() != Status::Lost {
             let detected = relocalizer.detected_pose(&model.body).unwrap_or_default();
             steps +=
                 hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected(), &detected);
@@ -315,9 +330,6 @@ impl BodyTracker {
         fit.learn_regions(setting.with_model(model));
         hypotheses.forget_motion(model, motion);
         motion.commit(frame.stamp);
-        if self.moved && assessor.status() == Status::Lost {
-            motion.move_to_world(&self.expected);
-        }
         self.relocalizer.observe(self.frame_outcome(frame), &self.motion.poses);
         self.report(frame.stamp, steps, Some(time_scale));
         if self.relocalizer.is_false_track() {
@@ -339,24 +351,21 @@ impl BodyTracker {
         self.fit.regions().check(frame)
     }
 
-    /// Moves the body to the current detection if that explains the frame no worse. Returns whether it moved. A new track
-    /// restarts there, because sizes and scene were learned at the wrong position.
-    fn move_to_detection(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
+    /// Whether the body explains the frame no worse at the current detection than where it is expected.
+    fn is_at_detection(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         observer.begin(frame, ownership);
+        observer.release(frame, ownership, relocalizer.own_pixels());
         let observation = observer.observation(frame, motion.origin, ownership);
-        let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
+        let previous = if motion.stamp.is_some() { &motion.poses[..] } else { &[] };
+        let setting = Setting { config, observation, previous, time_scale: 1.0 };
         let lost = assessor.status() == Status::Lost;
-        if !relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost) {
-            return false;
+        let is_there = relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost);
+        if is_there {
+            let Own { image, pixels } = relocalizer.own_pixels();
+            self.moved_to = Some((image, pixels.to_vec()));
         }
-        let Own { image, pixels } = relocalizer.own_pixels();
-        self.moved_to = Some((image, pixels.to_vec()));
-        if relocalizer.is_new(frame.stamp) {
-            return self.restart_at_detection();
-        }
-        self.move_to_found();
-        true
+        is_there
     }
 
     /// Moves a lost body that cannot be detected to a segment that it explains better.
@@ -369,15 +378,38 @@ impl BodyTracker {
         let observation = observer.observation(frame, motion.origin, ownership);
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(setting.with_model(model), fit, &motion.predicted) {
-            self.move_to_found();
+            self.move_to_found(frame, ownership);
         }
     }
 
-    /// Moves the body to the poses that a detection or the search found.
-    fn move_to_found(&mut self) {
-        self.moved = true;
-        self.motion.move_to(self.relocalizer.found());
-        self.assessor.moved();
+    /// Moves the body to the poses that a detection or the search found, if it is not lost there. Returns whether it moved.
+    fn move_to_found(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
+        let Motion { poses, predicted, .. } = &mut self.motion;
+        predicted.clone_from(poses);
+        poses.clone_from_slice(self.relocalizer.found());
+        self.reassess(frame, ownership);
+        if self.assessor.status() != Status::Lost {
+            self.motion.forget();
+            return true;
+        }
+        self.moved_to = None;
+        let Motion { poses, predicted, .. } = &mut self.motion;
+        std::mem::swap(poses, predicted);
+        self.observer.begin(frame, ownership);
+        self.reassess(frame, ownership);
+        false
+    }
+
+    /// Matches and assesses this frame, for poses that were changed.
+    fn reassess(&mut self, frame: &Frame, ownership: OwnershipMask) {
+        let Self { config, model, motion: Motion { poses, previous, origin, .. }, observer, fit, assessor, .. } = self;
+        let bounds = body_box(&model.body, poses, config.body_box_margin);
+        observer.gather(frame, *origin, &bounds, ownership, config);
+        let observation = observer.observation(frame, *origin, ownership);
+        let setting = Setting { config, observation, previous, time_scale: 1.0 };
+        fit.match_all(setting.with_model(model), poses, config.max_steps);
+        assessor.moved();
+        assessor.assess(setting.with_model(model), fit.matched(poses), None);
     }
 
     /// Index of the image and pixels of the detection to which the body was moved in this frame: they show no scene.
