@@ -22,7 +22,6 @@ mod bounds;
 mod closest;
 mod contour;
 mod kernel;
-mod lanes;
 pub(crate) mod ray;
 mod ruling;
 mod section;
