@@ -87,38 +87,21 @@ impl TaperedEllipticCylinder {
     /// computed again in double precision. A result depends on its query, shape and pose only, not on its position in the batch.
     /// `out` is resized; nothing is allocated once it is large enough.
     pub fn closest_points(&self, world_from_limb: &Pose, queries: &Points, out: &mut SurfaceBatch) {
-        self.closest_points_range(world_from_limb, queries, 0..queries.len(), out);
-    }
-
-    /// [`Self::closest_points`] of the queries in `range` only; result 0 belongs to query `range.start`.
-    ///
-    /// # Panics
-    /// If the range does not lie within the queries.
-    pub fn closest_points_range(
-        &self,
-        world_from_limb: &Pose,
-        queries: &Points,
-        range: Range<usize>,
-        out: &mut SurfaceBatch,
-    ) {
-        let xs = &queries.x[range.clone()];
-        let ys = &queries.y[range.clone()];
-        let zs = &queries.z[range];
-        out.resize(xs.len());
+        let count = queries.len();
+        out.resize(count);
         if self.aspect_change() > SETTLED || !self.is_blunt() {
-            for i in 0..xs.len() {
-                out.set_exactly(i, [xs[i], ys[i], zs[i]], self, world_from_limb);
+            for i in 0..count {
+                out.set_exactly(i, [queries.x[i], queries.y[i], queries.z[i]], self, world_from_limb);
             }
             return;
         }
         let constants = Constants::new(self, world_from_limb);
         // More than half a block takes less time as a whole block than as short ones.
-        let rest = xs.len() % BLOCK;
-        let whole = if 2 * rest > BLOCK { xs.len() } else { xs.len() - rest };
-        let queries = [xs, ys, zs];
+        let rest = count % BLOCK;
+        let whole = if 2 * rest > BLOCK { count } else { count - rest };
         let mut batch = Batch { shape: self, world_from_limb, constants, out, unsettled: Few::new() };
         batch.closest_blocks(kernel::<BLOCK, FEW>(), queries, 0..whole);
-        batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..xs.len());
+        batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..count);
         batch.refine_unsettled();
     }
 }
@@ -157,16 +140,16 @@ struct Batch<'a> {
 impl Batch<'_> {
     /// Closest points of the queries in `range`, block by block. Unsettled queries are processed whenever there are enough of
     /// them; the last ones wait.
-    fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: [&[f32]; 3], range: Range<usize>) {
+    fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: &Points, range: Range<usize>) {
         let mut block = Block::ZERO;
         let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
             let count = N.min(range.end - start);
             let span = start..start + count;
             // The tail is padded with the block's previous contents, so that every point goes through the same instructions.
-            load(&mut block.x, &queries[0][span.clone()]);
-            load(&mut block.y, &queries[1][span.clone()]);
-            load(&mut block.z, &queries[2][span.clone()]);
+            load(&mut block.x, &queries.x[span.clone()]);
+            load(&mut block.y, &queries.y[span.clone()]);
+            load(&mut block.z, &queries.z[span.clone()]);
             run(&self.constants, &block, &mut found);
             let out = &mut *self.out;
             store(&mut out.points.x[span.clone()], &found.points.x);
