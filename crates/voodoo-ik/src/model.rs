@@ -88,7 +88,7 @@ impl ChainModel {
         let mut model = Self { links: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
         for limb in chosen {
             let Some(description) = body.limbs().get(limb) else {
-                return Err(value("limbs", "indices of limbs", limb.to_string()));
+                return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
             };
             model.add(limb, &description.name, description.parent.as_ref(), root)?;
         }
@@ -105,7 +105,7 @@ impl ChainModel {
         let start = self.names.len();
         let parent = joint.and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
         if parent.is_none() && !self.links.is_empty() {
-            return Err(value(
+            return Err(BodyError::value(
                 "limbs",
                 "limbs that hang together, parents included",
                 format!("{name} without its parent"),
@@ -251,8 +251,4 @@ fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> voodoo_core::math::
         columns.push(Column { omega, v: joint.translation.cross(omega) });
     }
     rotation
-}
-
-fn value(key: &str, expected: &'static str, found: String) -> BodyError {
-    BodyError::Value { key: key.into(), expected, found }
 }

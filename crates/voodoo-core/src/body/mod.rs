@@ -189,11 +189,11 @@ impl Body {
             return Err(BodyError::Empty);
         }
         if self.limbs.len() > MOST_LIMBS || self.sites.len() > MOST_SITES {
-            return Err(BodyError::Value {
-                key: "body".into(),
-                expected: "at most 1,000 limbs and 10,000 sites",
-                found: format!("{} and {}", self.limbs.len(), self.sites.len()),
-            });
+            return Err(BodyError::value(
+                "body",
+                "at most 1,000 limbs and 10,000 sites",
+                format!("{} and {}", self.limbs.len(), self.sites.len()),
+            ));
         }
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
@@ -209,18 +209,18 @@ impl Body {
                     check_joint(&format!("{key}.joint"), joint)?;
                 }
                 (None, _) => {
-                    return Err(BodyError::Value {
-                        key: format!("{key}.parent"),
-                        expected: "a parent (only the first limb is the root)",
-                        found: "none".into(),
-                    });
+                    return Err(BodyError::value(
+                        format!("{key}.parent"),
+                        "a parent (only the first limb is the root)",
+                        "none",
+                    ));
                 }
                 (Some((parent, _)), _) => {
-                    return Err(BodyError::Value {
-                        key: format!("{key}.parent"),
-                        expected: "a limb that stands before this one",
-                        found: format!("limb {parent}"),
-                    });
+                    return Err(BodyError::value(
+                        format!("{key}.parent"),
+                        "a limb that stands before this one",
+                        format!("limb {parent}"),
+                    ));
                 }
             }
         }
@@ -231,18 +231,14 @@ impl Body {
                 return Err(BodyError::Duplicate { key, name: site.name.clone() });
             }
             if site.limb >= self.limbs.len() {
-                return Err(BodyError::Value {
-                    key: format!("{key}.limb"),
-                    expected: "the index of a limb",
-                    found: site.limb.to_string(),
-                });
+                return Err(BodyError::value(format!("{key}.limb"), "the index of a limb", site.limb.to_string()));
             }
             if !is_place(site.position) {
-                return Err(BodyError::Value {
-                    key: format!("{key}.position"),
-                    expected: "finite meters, 1e9 at most",
-                    found: format!("{:?}", site.position.to_array()),
-                });
+                return Err(BodyError::value(
+                    format!("{key}.position"),
+                    "finite meters, 1e9 at most",
+                    format!("{:?}", site.position.to_array()),
+                ));
             }
         }
         Ok(())
@@ -251,7 +247,7 @@ impl Body {
 
 fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
     if name.is_empty() {
-        return Err(BodyError::Value { key: key.into(), expected: "a name", found: "an empty one".into() });
+        return Err(BodyError::value(key, "a name", "an empty one"));
     }
     check_letters(key, name)
 }
@@ -260,14 +256,13 @@ fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
 fn check_letters(key: &str, name: &str) -> Result<(), BodyError> {
     if name.chars().any(|letter| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}')) {
         let expected = "a name without tabs, line breaks and braces";
-        return Err(BodyError::Value { key: key.into(), expected, found: format!("{name:?}") });
+        return Err(BodyError::value(key, expected, format!("{name:?}")));
     }
     Ok(())
 }
 
 fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
-    let wrong =
-        |field: &str, expected, found: String| Err(BodyError::Value { key: format!("{key}.{field}"), expected, found });
+    let wrong = |field: &str, expected, found: String| Err(BodyError::value(format!("{key}.{field}"), expected, found));
     if joint.semi_axes.iter().any(|axis| !axis.is_finite() || *axis < 0.0) {
         return wrong("semi_axes", "two finite lengths, zero or more", format!("{:?}", joint.semi_axes));
     }
@@ -294,7 +289,6 @@ fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
 
 fn find<'a>(what: &'static str, name: &str, names: impl Iterator<Item = &'a str> + Clone) -> Result<usize, BodyError> {
     names.clone().position(|known| known == name).ok_or_else(|| BodyError::Unknown {
-        key: what.into(),
         what,
         name: name.into(),
         known: names.map(String::from).collect(),

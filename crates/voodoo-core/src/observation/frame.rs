@@ -383,7 +383,7 @@ impl<'a> Frame<'a> {
     /// return"; in a cloud it is an error (drop such rows before).
     pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
         if !self.stamp.is_finite() {
-            return Err(TrackError::Stamp(self.stamp));
+            return Err(TrackError::measurement("stamp", "a finite time in seconds", self.stamp.to_string()));
         }
         if let Some(previous) = previous_stamp.filter(|previous| *previous >= self.stamp) {
             return Err(TrackError::TimeBackwards { previous, found: self.stamp });

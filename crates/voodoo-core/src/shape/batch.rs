@@ -308,7 +308,10 @@ mod tests {
                 unsettled += found.unsettled.iter().filter(|&&flag| flag != 0).count();
             }
             let fraction = unsettled as f64 / (200 * BLOCK) as f64;
-            assert!(shape.aspect_change() <= ONE_BASIN && fraction < 0.01, "{fraction} of {shape:?}");
+            assert!(
+                shape.aspect_change() <= super::super::closest::ONE_BASIN && fraction < 0.01,
+                "{fraction} of {shape:?}"
+            );
         }
         Ok(())
     }

@@ -32,7 +32,7 @@ const SHARPEST: f64 = 1e-3;
 /// Minimum ratio of `g''/2` to `|P_θ|²` at which a minimum counts as distinct; the ratio falls to 0 at the medial axis.
 pub(super) const DISTINCT: f64 = 0.3;
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which a distinct minimum is the only one.
-const ONE_BASIN: f64 = 0.05;
+pub(super) const ONE_BASIN: f64 = 0.05;
 
 impl TaperedEllipticCylinder {
     /// The closest point of the closed surface to `q`, limb frame, meters.
