@@ -71,12 +71,7 @@ impl Correspondences {
         measured.clear();
         for limb in 0..poses.len() {
             let weight = ratio * self.measured_weight(limb);
-            let joints = body.limbs().iter().enumerate();
-            let count = joints
-                .filter(|(index, other)| {
-                    other.parent.as_ref().is_some_and(|(parent, _)| *index == limb || *parent == limb)
-                })
-                .count();
+            let count = body.children(limb).count() + usize::from(body.parent(limb).is_some());
             measured.push(if weight > 0.0 { weight } else { UNMEASURED } / count.max(1) as f64);
         }
         for (child, limb) in body.limbs().iter().enumerate() {

@@ -126,24 +126,26 @@ impl Body {
         find("site", name, self.sites.iter().map(|site| site.name.as_str()))
     }
 
+    /// The parent of a limb.
+    pub fn parent(&self, limb: usize) -> Option<usize> {
+        self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent)
+    }
+
     /// True when one of the two limbs is the parent of the other.
     pub(crate) fn adjacent(&self, first: usize, second: usize) -> bool {
-        let joins =
-            |child: usize, parent: usize| self.limbs[child].parent.as_ref().is_some_and(|(index, _)| *index == parent);
-        joins(first, second) || joins(second, first)
+        self.parent(first) == Some(second) || self.parent(second) == Some(first)
     }
 
     /// Whether two limbs are neither joined nor joined to the same parent. Limbs that are joined overlap near their joints in any
     /// pose.
     pub(crate) fn are_apart(&self, first: usize, second: usize) -> bool {
-        let parent = |limb: usize| self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
-        first != second && !self.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
+        let (own, other) = (self.parent(first), self.parent(second));
+        first != second && !self.adjacent(first, second) && (own != other || own.is_none())
     }
 
     /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
-        let hangs = move |other: &usize| matches!(self.limbs[*other].parent, Some((parent, _)) if parent == limb);
-        (0..self.limbs.len()).filter(hangs)
+        (0..self.limbs.len()).filter(move |other| self.parent(*other) == Some(limb))
     }
 
     /// World poses of all limbs with every joint closed and at rest.
