@@ -154,14 +154,6 @@ pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<V
     values.iter().enumerate().map(named).collect()
 }
 
-/// The rows of a pose's 4x4 matrix.
-pub(crate) fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
-    let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
-    let t = pose.translation;
-    let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
-    [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
-}
-
 /// A read-only array of a given shape.
 pub(crate) fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let array = PyArray1::from_vec(py, values).reshape(shape)?;

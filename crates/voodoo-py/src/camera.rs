@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::Lens;
-use voodoo_sensors::eye::Matrix;
+use voodoo_core::math::{Affine3, Vec3};
 
 use crate::arrays::rows;
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -81,15 +81,12 @@ pub(crate) fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
     })
 }
 
-/// The rows of a 4x4 array.
-pub(crate) fn rows_of(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix> {
-    let entries: Option<[f64; 16]> = (value.dims() == numpy::Ix2(4, 4)).then(|| {
-        let mut entries = value.as_array().iter().copied().collect::<Vec<_>>();
-        entries.resize(16, 0.0);
-        <[f64; 16]>::try_from(entries).unwrap_or_default()
-    });
-    match entries {
-        Some(entries) => Ok([0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| entries[4 * row + column]))),
-        None => Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any())),
+/// The transform of a 4x4 array.
+pub(crate) fn affine(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Affine3> {
+    if value.dims() != numpy::Ix2(4, 4) {
+        return Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any()));
     }
+    let entries = value.as_array();
+    let column = |column: usize| Vec3::new(entries[[0, column]], entries[[1, column]], entries[[2, column]]);
+    Ok(Affine3::from_cols(column(0), column(1), column(2), column(3)))
 }

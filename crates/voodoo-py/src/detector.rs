@@ -8,11 +8,11 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use voodoo_core::math::Vec3;
+use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
-use crate::arrays::{contiguous, matrix, vector};
+use crate::arrays::{contiguous, vector};
 use crate::errors::{exception, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.

@@ -12,7 +12,7 @@ use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
 use crate::arrays::{contiguous, rows};
-use crate::camera::{camera_of, rows_of};
+use crate::camera::{affine, camera_of};
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
@@ -110,7 +110,7 @@ impl PySkinCue {
         others: Vec<TrackedBody<'py>>,
     ) -> PyResult<Vec<Ray<'py>>> {
         let camera = camera_of(camera)?;
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
+        let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
         for (site, names) in self.names.iter().enumerate() {
             let places = places_of(predicted, names.iter().map(String::as_str))?;
@@ -134,7 +134,7 @@ impl PySkinCue {
                 (_, Some(meters)) => DepthPixels::F32(meters.as_slice()?),
                 _ => return Err(wrong()),
             };
-            let depth = Eye { world_from_sensor: rows_of("world_from_depth", pose)?, camera };
+            let depth = Eye { world_from_sensor: affine("world_from_depth", pose)?, camera };
             let found = DepthBeside::new(pixels, *per_unit, depth, eye);
             beside = Some(found.map_err(|error| error.into_py(py))?);
         }
@@ -168,7 +168,7 @@ impl PySkinCue {
         camera: &Bound<'py, PyAny>,
     ) -> PyResult<()> {
         let camera = camera_of(camera)?;
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
+        let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (image, joints) = (colors_of(&image)?, vectors("joints", &joints)?);
         let sites = vectors("sites", &sites)?;
         let sites: Vec<Option<Vec3>> =

@@ -6,7 +6,7 @@
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
 //! * a twist is `(omega, v)`, radians and meters, and perturbs on the left: `T' = exp(xi) T`.
 
-pub use glam::{DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
+pub use glam::{DAffine3 as Affine3, DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
 use std::ops::Mul;
 
 /// A rigid transform: a rotation, then a translation.
