@@ -15,6 +15,7 @@ use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 use crate::arrays::{contiguous, vector};
+use crate::borrowed::depth_images;
 use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::frame::PyFrame;
@@ -44,8 +45,8 @@ impl PyDetector {
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
         let any = Body::human(1.75, HumanModel::Full).map_err(|error| error.into_py(py))?;
-        let borrowed = frame.borrow_images(py, &any)?;
-        let images = borrowed.images()?;
+        let views = frame.depth_views(py);
+        let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
         input.check(&any, None).map_err(|error| error.into_py(py))?;

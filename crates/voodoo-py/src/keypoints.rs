@@ -141,7 +141,7 @@ pub(crate) fn carried<'py>(
     let pose = world_from_sensor.as_ref().map(|pose| affine("world_from_sensor", pose)).transpose()?;
     let array = PointArray::new("points", points)?;
     let view = array.view(py);
-    let moved = voodoo_sensors::carried::carried(view.slice()?, tracker.tracker()?, elapsed, pose.as_ref());
+    let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
     let moved = moved.map_err(|error| error.into_py(py))?;
     let array =
         |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);

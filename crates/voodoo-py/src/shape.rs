@@ -89,7 +89,7 @@ impl PyShape {
     fn closest_points(&self, py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<PyClosestPoints> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
-        let slice = view.slice()?;
+        let slice = view.points()?;
         let (batch, bad) = py.detach(|| {
             let mut queries = Points::default();
             let mut bad = None;

@@ -10,9 +10,9 @@ use voodoo_core::ColorImage;
 use voodoo_core::math::Vec3;
 use voodoo_core::{Body, Frame, Tracker};
 
-use crate::arrays::{PointArray, limb_poses, rows, vector};
+use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{ColorArray, ColorView};
+use crate::borrowed::{Borrowed, ColorViews, color_image};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -80,16 +80,16 @@ impl PyTracker {
         &mut self,
         py: Python<'_>,
         frame: &PyFrame,
-        views: &'a [ColorView<'_, '_>],
+        views: &'a ColorViews,
     ) -> PyResult<Vec<ColorImage<'a>>> {
         let mut colors = Vec::with_capacity(views.len());
         for view in views {
-            let name = &frame.sources[usize::from(view.data.source)];
-            if view.data.camera.distorts() {
+            let name = &frame.sources[usize::from(view.1.source)];
+            if view.1.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(exception(py, "MeasurementError", text));
             }
-            colors.push(view.image(self.camera(name))?);
+            colors.push(color_image(view, self.camera(name))?);
         }
         Ok(colors)
     }
@@ -156,7 +156,7 @@ impl PyTracker {
 
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
-        let borrowed = frame.borrow_for(py, self.tracker.body())?;
+        let borrowed = Borrowed::new(py, frame, self.tracker.body())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
@@ -199,8 +199,8 @@ impl PyTracker {
         let tracker = &mut self.tracker;
         let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(|error| error.into_py(py))?;
         let likely = PyDict::new(py);
-        for ((pixels, picture), view) in found.into_iter().zip(&colors).zip(&views) {
-            let name = &frame.sources[usize::from(view.data.source)];
+        for ((pixels, picture), (_, data)) in found.into_iter().zip(&colors).zip(&views) {
+            let name = &frame.sources[usize::from(data.source)];
             likely.set_item(
                 name,
                 PyArray1::from_vec(py, pixels).reshape([picture.camera.height(), picture.camera.width()])?,
@@ -245,7 +245,7 @@ impl PyTracker {
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
-        let slice = view.slice()?;
+        let slice = view.points()?;
         let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
         Ok(PyArray1::from_vec(py, distances))
     }
@@ -254,7 +254,7 @@ impl PyTracker {
     fn limb_distances<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
-        let slice = view.slice()?;
+        let slice = view.points()?;
         let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(|error| error.into_py(py))?;
         PyArray2::from_vec2(py, &distances).map_err(|error| PyValueError::new_err(error.to_string()))
     }
