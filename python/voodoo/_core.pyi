@@ -27,6 +27,7 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
+    "_nobody",
     "body_before",
     "carried",
     "config_fields",
@@ -293,9 +294,16 @@ def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[
     """Site name -> predicted position (3,) [m] at a time; see voodoo.Tracker.predict."""
 
 def _estimate(
-    head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...], spread: tuple[Any, ...] | None = None
+    found: dict[str, Any],
+    limbs: Sequence[str],
+    sites: Sequence[str],
+    joints: Sequence[str | None],
+    sources: Sequence[str],
 ) -> Estimate:
-    """Restores an estimate from its pickled state; `spread` (the covariances) may be missing in older pickles."""
+    """Restores an estimate from its pickled state."""
+
+def _nobody(stamp: float) -> Estimate:
+    """The estimate of a frame in which nobody is tracked."""
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""

@@ -6,10 +6,10 @@ use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
+use pythonize::{depythonize, pythonize};
 use voodoo_core::Body;
-use voodoo_core::Covariances;
-use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{Estimate, LimbStatus, SourceReport, Status};
+use voodoo_core::Estimate;
+use voodoo_core::math::{Mat3, Vec3};
 
 use crate::arrays::frozen;
 use crate::errors::exception;
@@ -71,79 +71,30 @@ fn rows<'py, 'a>(
     Ok(PyMappingProxy::new(all.py(), dict.as_mapping()))
 }
 
-/// Stamp, status, mean squared distance, steps.
-type Head = (f64, String, f64, usize);
-/// Of limbs, sites, joints and sources.
-type AllNames = (Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
-/// Status and poses (position, quaternion) of limbs, sites, points and residuals of limbs, gaps of joints, reports of sources.
-type PoseParts = (
-    Vec<String>,
-    Vec<([f64; 3], [f64; 4])>,
-    Vec<[f64; 3]>,
-    Vec<usize>,
-    Vec<f64>,
-    Vec<f64>,
-    Vec<(usize, usize, f64, f64)>,
-);
-
-/// Covariances of sites (nine numbers each), limbs (36) and joints (nine); standard deviations of lengths and girths.
-type SpreadParts = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
-
-/// All of an estimate.
-type Kept = (Head, AllNames, PoseParts, SpreadParts);
-
-fn spread_of(found: &Covariances) -> SpreadParts {
-    let flat = |all: &[Mat3]| all.iter().flat_map(Mat3::to_cols_array).collect();
-    let limbs = found.limbs.iter().flatten().flatten().copied().collect();
-    (flat(&found.sites), limbs, flat(&found.turns), found.lengths.clone(), found.girths.clone())
-}
-
-fn covariances((sites, limbs, turns, lengths, girths): SpreadParts) -> Covariances {
-    let matrices = |flat: &[f64]| flat.as_chunks::<9>().0.iter().map(Mat3::from_cols_array).collect();
-    let limb = |flat: &[f64; 36]| std::array::from_fn(|row| std::array::from_fn(|column| flat[6 * row + column]));
-    Covariances {
-        sites: matrices(&sites),
-        limbs: limbs.as_chunks::<36>().0.iter().map(limb).collect(),
-        turns: matrices(&turns),
-        lengths,
-        girths,
-    }
-}
+/// The arguments of [`_estimate`]: the estimate as plain Python, and the names of limbs, sites, joints and sources.
+type Plain<'py> = (Bound<'py, PyAny>, Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
 
 #[doc = stub!("_estimate")]
 #[pyfunction]
-#[pyo3(signature = (head, names, found, spread=None))]
 pub(crate) fn _estimate(
-    py: Python<'_>,
-    head: Head,
-    names: AllNames,
-    found: PoseParts,
-    spread: Option<SpreadParts>,
+    found: &Bound<'_, PyAny>,
+    limbs: Vec<String>,
+    sites: Vec<String>,
+    joints: Vec<Option<String>>,
+    sources: Vec<String>,
 ) -> PyResult<PyEstimate> {
-    let wrong = |word: &str| exception(py, "MeasurementError", format!("estimate: found the unknown status {word:?}"));
-    let (stamp, status, mean_squared_distance, steps) = head;
-    let (limbs, sites, joints, sources) = names;
-    let (limb_status, poses, places, limb_points, limb_residual, joint_gaps, reports) = found;
-    let limb_of = |word: &String| LimbStatus::ALL.iter().find(|status| status.name() == word).copied();
-    let report = |(count, inliers, weight, residual)| {
-        let mut report = SourceReport::default();
-        (report.count, report.inliers, report.weight, report.residual) = (count, inliers, weight, residual);
-        report
-    };
-    let mut estimate = Estimate::default();
-    (estimate.stamp, estimate.mean_squared_distance, estimate.steps) = (stamp, mean_squared_distance, steps);
-    estimate.status = Status::ALL.iter().find(|known| known.name() == status).copied().ok_or_else(|| wrong(&status))?;
-    estimate.limb_status =
-        limb_status.iter().map(|word| limb_of(word).ok_or_else(|| wrong(word))).collect::<PyResult<_>>()?;
-    estimate.world_from_limb = poses
-        .into_iter()
-        .map(|(position, rotation)| Pose::from_parts(Vec3::from_array(position), Quat::from_array(rotation)))
-        .collect();
-    estimate.sites = places.into_iter().map(Vec3::from_array).collect();
-    (estimate.limb_points, estimate.limb_residual, estimate.joint_gaps) = (limb_points, limb_residual, joint_gaps);
-    estimate.sources = reports.into_iter().map(report).collect();
-    estimate.covariances = spread.map(covariances).unwrap_or_default();
+    let estimate = depythonize(found).map_err(|error| {
+        exception(found.py(), "MeasurementError", format!("estimate: expected a pickled one, {error}"))
+    })?;
     Ok(PyEstimate { estimate, names: Arc::new(Names::new(limbs, sites, joints)), sources })
+}
+
+#[doc = stub!("_nobody")]
+#[pyfunction]
+pub(crate) fn _nobody(stamp: f64) -> PyEstimate {
+    let mut estimate = Estimate::default();
+    estimate.stamp = stamp;
+    PyEstimate { estimate, names: Arc::new(Names::new(Vec::new(), Vec::new(), Vec::new())), sources: Vec::new() }
 }
 
 #[pymethods]
@@ -316,22 +267,11 @@ impl PyEstimate {
     }
 
     /// For pickle and copy.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
-        let (found, names) = (&self.estimate, &*self.names);
-        let pose = |pose: &Pose| (pose.translation.to_array(), pose.rotation.to_array());
-        let source = |report: &SourceReport| (report.count, report.inliers, report.weight, report.residual);
-        let head = (found.stamp, self.status().to_owned(), found.mean_squared_distance, found.steps);
-        let all = (names.limbs.clone(), names.sites.clone(), names.joints.clone(), self.sources.clone());
-        let rest = (
-            found.limb_status.iter().map(|status| status.name().to_owned()).collect(),
-            found.world_from_limb.iter().map(pose).collect(),
-            found.sites.iter().map(Vec3::to_array).collect(),
-            found.limb_points.clone(),
-            found.limb_residual.clone(),
-            found.joint_gaps.clone(),
-            found.sources.iter().map(source).collect(),
-        );
-        Ok((py.import("voodoo._core")?.getattr("_estimate")?, (head, all, rest, spread_of(&found.covariances))))
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Plain<'py>)> {
+        let Names { limbs, sites, joints, .. } = &*self.names;
+        let found = pythonize(py, &self.estimate)?;
+        let plain = (found, limbs.clone(), sites.clone(), joints.clone(), self.sources.clone());
+        Ok((py.import("voodoo._core")?.getattr("_estimate")?, plain))
     }
 
     pub fn __repr__(&self) -> String {

@@ -11,6 +11,7 @@ use std::ops::Mul;
 
 /// A rigid transform: a rotation, then a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// A unit quaternion.
     pub rotation: Quat,
