@@ -65,20 +65,12 @@ impl PyChain {
             .collect()
     }
 
-    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Bone>> {
-        parts
-            .iter()
-            .map(|(a, b, radius)| {
-                Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
-            })
-            .collect()
-    }
-
     fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
-        match parts {
-            Some(parts) => self.segments(py, &parts),
-            None => Ok(voodoo_ik::bones(&self.body, &self.model, margin)),
-        }
+        let Some(parts) = parts else { return Ok(voodoo_ik::bones(&self.body, &self.model, margin)) };
+        let bone = |(a, b, radius): &SegmentParts| {
+            Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+        };
+        parts.iter().map(bone).collect()
     }
 
     /// The trunk, and limbs of the body beside the chain with their world poses.
@@ -113,6 +105,15 @@ impl PyChain {
         let mut at = Kinematics::default();
         self.model.place(&pose("world_from_base", Some(base))?, angles, &mut at);
         Ok(at)
+    }
+
+    /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
+    fn placed<'py>(&self, py: Python<'py>, at: &Kinematics) -> PyResult<(Array<'py>, Array<'py>)> {
+        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
+        let sites: Vec<f64> =
+            self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
+        let counts = (at.poses.len(), sites.len() / 3);
+        Ok((frozen(py, poses, &[counts.0, 4, 4])?, frozen(py, sites, &[counts.1, 3])?))
     }
 
     fn site_links(&self) -> impl Iterator<Item = (&str, usize, Vec3)> {
@@ -165,11 +166,7 @@ impl PyChain {
     fn forward<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>) -> PyResult<(Array<'py>, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
-        let sites: Vec<f64> =
-            self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
-        let counts = (at.poses.len(), sites.len() / 3);
-        Ok((frozen(py, poses, &[counts.0, 4, 4])?, frozen(py, sites, &[counts.1, 3])?))
+        self.placed(py, &at)
     }
 
     /// Derivative `(3, n)` of the position of a site.
@@ -254,19 +251,9 @@ impl PyChain {
         let at = solver.kinematics();
         let residuals = goals.iter().map(|goal| goal.residual(at).length());
         let residuals = PyTuple::new(py, residuals.collect::<Vec<_>>())?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
-        let sites: Vec<f64> =
-            self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
-        let (limbs, points, n) = (at.poses.len(), sites.len() / 3, angles.len());
-        Ok((
-            frozen(py, angles, &[n])?,
-            frozen(py, poses, &[limbs, 4, 4])?,
-            frozen(py, sites, &[points, 3])?,
-            residuals,
-            report.steps,
-            report.converged,
-            report.h,
-        ))
+        let (poses, sites) = self.placed(py, at)?;
+        let n = angles.len();
+        Ok((frozen(py, angles, &[n])?, poses, sites, residuals, report.steps, report.converged, report.h))
     }
 
     /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
