@@ -93,11 +93,12 @@ pub struct Network {
     top: [Convolution; 2],
     middle: Residual,
     head: Convolution,
-    hidden: Option<LinearLayer>,
+    hidden: LinearLayer,
     visible: LinearLayer,
     facing: LinearLayer,
     person: LinearLayer,
-    sizes: Option<[LinearLayer; 3]>,
+    /// Scale of each joint's error, lengths, and scales of their errors.
+    sizes: [LinearLayer; 3],
 }
 
 impl std::fmt::Debug for Network {
@@ -128,24 +129,18 @@ impl Network {
         ];
         let top =
             [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
-        let hidden = if weights.has("hidden.weight") { Some(LinearLayer::take(weights, "hidden")?) } else { None };
-        let sizes = ["scale", "length", "length_scale"];
-        let sizes = if weights.has("scale.weight") {
-            let [scale, length, length_scale] = sizes.map(|name| LinearLayer::take(weights, name));
-            Some([scale?, length?, length_scale?])
-        } else {
-            None
-        };
+        let [scale, length, length_scale] =
+            ["scale", "length", "length_scale"].map(|name| LinearLayer::take(weights, name));
         let network = Self {
             middle: Residual::take(weights, "mid", SIZE / 8)?,
             head: Convolution::take(weights, "head", 1, SIZE / 8)?,
             visible: LinearLayer::take(weights, "visible")?,
             facing: LinearLayer::take(weights, "facing")?,
             person: LinearLayer::take(weights, "person")?,
+            hidden: LinearLayer::take(weights, "hidden")?,
+            sizes: [scale?, length?, length_scale?],
             stages,
             top,
-            hidden,
-            sizes,
         };
         network.check()?;
         Ok(network)
@@ -177,14 +172,17 @@ impl Network {
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
             }
         }
-        let pooled = self.hidden.as_ref().map_or(ends[3], |hidden| hidden.0.outputs);
-        let joints = self.head.outputs() / A_JOINT;
-        let lengths = self.sizes.as_ref().map_or(0, |sizes| sizes[1].0.outputs);
-        let mut linear = vec![(&self.visible, pooled, joints), (&self.facing, pooled, 1), (&self.person, pooled, 1)];
-        linear.extend(self.hidden.iter().map(|hidden| (hidden, ends[3], pooled)));
-        if let Some([scale, length, length_scale]) = &self.sizes {
-            linear.extend([(scale, pooled, joints), (length, pooled, lengths), (length_scale, pooled, lengths)]);
-        }
+        let [scale, length, length_scale] = &self.sizes;
+        let (pooled, joints, lengths) = (self.hidden.0.outputs, self.head.outputs() / A_JOINT, length.0.outputs);
+        let linear = [
+            (&self.visible, pooled, joints),
+            (&self.facing, pooled, 1),
+            (&self.person, pooled, 1),
+            (&self.hidden, ends[3], pooled),
+            (scale, pooled, joints),
+            (length, pooled, lengths),
+            (length_scale, pooled, lengths),
+        ];
         for (layer, inputs, outputs) in linear {
             let LinearLayer(layer) = layer;
             if layer.inputs != inputs || layer.outputs != outputs {
@@ -228,15 +226,9 @@ impl Network {
 
     /// Computes the outputs that depend on the whole image.
     fn overall(&self, pooled: &[f32]) -> Answer {
-        let mut values = pooled.to_vec();
-        if let Some(hidden) = &self.hidden {
-            values = hidden.apply(&values);
-            rectify(&mut values);
-        }
-        let [log_scale, log_lengths, log_length_scale] = match &self.sizes {
-            Some(layers) => [0, 1, 2].map(|number: usize| layers[number].apply(&values)),
-            None => [vec![UNKNOWN.ln(); self.joints()], Vec::new(), Vec::new()],
-        };
+        let mut values = self.hidden.apply(pooled);
+        rectify(&mut values);
+        let [log_scale, log_lengths, log_length_scale] = self.sizes.each_ref().map(|layer| layer.apply(&values));
         Answer {
             joints: Vec::new(),
             log_scale,
@@ -248,9 +240,6 @@ impl Network {
         }
     }
 }
-
-/// Scale of a joint's error if the network does not report it, meters.
-const UNKNOWN: f32 = 0.04;
 
 fn mean(map: &Map) -> Vec<f32> {
     let mut sum = vec![0.0; map.channels];
