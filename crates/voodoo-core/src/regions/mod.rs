@@ -30,7 +30,7 @@ use labels::LimbLabels;
 use lines::{Line, OcclusionDepth, Viewer};
 use models::ColorModel;
 pub(crate) use pixel_gain::{Backdrop, PixelGain};
-use scan::{EdgeSearch, Scanner};
+use scan::EdgeSearch;
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer. The first two are only used when
 /// the motion of the body is unknown.
@@ -89,7 +89,6 @@ pub(crate) struct ColorRegions {
     stamp: Option<f64>,
     /// Offset of the cameras that learn in the next frame.
     turn: usize,
-    scanner: Scanner,
     evidence: Vec<Evidence>,
     backdrop: Backdrop,
 }
@@ -237,7 +236,7 @@ impl ColorRegions {
         pairs.clear();
         for picture in frame.colors {
             self.place_lines(frame, picture, posed);
-            let Self { cameras, groups, scanner, evidence, .. } = self;
+            let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
             };
@@ -250,7 +249,7 @@ impl ColorRegions {
             pairs.reserve(lines.capacity());
             for line in &*lines {
                 let searched = is_requested.is_none_or(|is_requested| is_requested(usize::from(line.limb)));
-                let found = if searched { scanner.edge(&view, line, search, together) } else { None };
+                let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
                     let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
