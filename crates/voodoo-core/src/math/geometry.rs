@@ -261,19 +261,12 @@ impl Points {
     }
 }
 
-/// Rotation vector of the shorter rotation.
-pub trait ShortestAxis {
-    /// The rotation vector, at most pi long.
-    fn to_scaled_axis_shortest(self) -> Vec3;
-}
-
-impl ShortestAxis for Quat {
-    fn to_scaled_axis_shortest(self) -> Vec3 {
-        let q = if self.w < 0.0 { -self } else { self };
-        let v = Vec3::new(q.x, q.y, q.z);
-        let sine = v.length();
-        if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
-    }
+/// Rotation vector of the shorter rotation, at most pi long; exact to rounding at 0 and at pi.
+pub fn rotation_vector(rotation: Quat) -> Vec3 {
+    let q = if rotation.w < 0.0 { -rotation } else { rotation };
+    let v = Vec3::new(q.x, q.y, q.z);
+    let sine = v.length();
+    if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
 }
 
 /// The transform into the working frame, whose origin is `origin` in the world.

@@ -20,7 +20,7 @@ use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
+use crate::math::{Pose, Quat, Vec3, rotation_vector, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
@@ -351,7 +351,7 @@ fn unit_of(camera: &Camera) -> f32 {
 
 /// Extrapolates a limb's pose by a fraction of the last motion.
 fn moved_on(before: &Pose, now: &Pose, fraction: f64) -> Pose {
-    let turn = (now.rotation * before.rotation.inverse()).to_scaled_axis_shortest();
+    let turn = rotation_vector(now.rotation * before.rotation.inverse());
     let shift = now.translation - before.translation;
     Pose::from_parts(now.translation + fraction * shift, Quat::from_scaled_axis(fraction * turn) * now.rotation)
 }
