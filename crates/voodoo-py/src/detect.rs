@@ -204,8 +204,12 @@ impl PyDetection {
 
 #[doc = stub!("PersonCandidate")]
 #[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen)]
-pub struct PyCandidate {
+pub(crate) struct PyCandidate {
+    #[doc = stub!("PersonCandidate.crop")]
+    #[pyo3(get)]
     crop: Py<PyArray3<f32>>,
+    #[doc = stub!("PersonCandidate.mask")]
+    #[pyo3(get)]
     mask: Py<PyArray2<bool>>,
     #[doc = stub!("PersonCandidate.middle")]
     #[pyo3(get)]
@@ -219,21 +223,6 @@ pub struct PyCandidate {
     #[doc = stub!("PersonCandidate.floor")]
     #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
-}
-
-#[pymethods]
-impl PyCandidate {
-    #[doc = stub!("PersonCandidate.crop")]
-    #[getter]
-    fn crop(&self, py: Python<'_>) -> Py<PyArray3<f32>> {
-        self.crop.clone_ref(py)
-    }
-
-    #[doc = stub!("PersonCandidate.mask")]
-    #[getter]
-    fn mask(&self, py: Python<'_>) -> Py<PyArray2<bool>> {
-        self.mask.clone_ref(py)
-    }
 }
 
 #[doc = stub!("person_candidates")]

@@ -4,7 +4,7 @@ use super::TaperedEllipticCylinder;
 use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
 #[cfg(target_arch = "x86_64")]
 use crate::math::has_avx512;
-use crate::math::{Points, Pose, Vec3};
+use crate::math::{Points, Pose, Vec3, load, store};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which results that the f32 kernel marks as settled are accepted: at 0.4
@@ -189,23 +189,6 @@ impl Batch<'_> {
             }
         }
         self.unsettled.count = 0;
-    }
-}
-
-/// Copies a block. Mostly it is a full one, whose size is then known to the compiler.
-#[inline(always)]
-fn load<const N: usize>(to: &mut [f32; N], from: &[f32]) {
-    match from.first_chunk() {
-        Some(from) => *to = *from,
-        None => to[..from.len()].copy_from_slice(from),
-    }
-}
-
-#[inline(always)]
-fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
-    match to.first_chunk_mut() {
-        Some(to) => *to = *from,
-        None => to.copy_from_slice(&from[..to.len()]),
     }
 }
 
