@@ -859,8 +859,9 @@ class Chain:
     def solve(
         self,
         base: npt.ArrayLike,
-        start: npt.NDArray[np.float64],
+        starts: npt.NDArray[np.float64],
         goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
+        positions: npt.NDArray[np.float64] | None,
         segments: Sequence[tuple[str, str, float]] | None,
         depth: tuple[float, float],
         views: Sequence[View],
@@ -870,29 +871,7 @@ class Chain:
     ) -> tuple[
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],
+        list[npt.NDArray[np.float64]],
         npt.NDArray[np.float64],
         tuple[float, ...],
-        int,
-        bool,
-        float,
-    ]: ...
-    def solve_many(
-        self,
-        base: npt.ArrayLike,
-        starts: npt.NDArray[np.float64],
-        goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
-        positions: npt.NDArray[np.float64],
-        segments: Sequence[tuple[str, str, float]] | None,
-        depth: tuple[float, float],
-        views: Sequence[View],
-        how: tuple[int, float, float, float, float, float],
-        rest: Sequence[tuple[int, float]],
-    ) -> tuple[
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
     ]: ...

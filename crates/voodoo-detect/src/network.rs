@@ -51,21 +51,17 @@ impl Stage {
     }
 }
 
-/// A linear layer: a matrix and a bias.
-#[derive(Debug)]
-struct LinearLayer(Panels);
+/// Takes a linear layer: a matrix and a bias.
+fn linear(weights: &mut Weights, name: &str) -> Result<Panels, WeightsError> {
+    let layer = weights.layer(name, 2)?;
+    Ok(Panels::from_weights(&layer.weights, &layer.bias))
+}
 
-impl LinearLayer {
-    fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
-        let layer = weights.layer(name, 2)?;
-        Ok(Self(Panels::from_weights(&layer.weights, &layer.bias)))
-    }
-
-    fn apply(&self, values: &[f32]) -> Vec<f32> {
-        let mut out = vec![0.0; self.0.outputs];
-        self.0.apply(values, &mut out);
-        out
-    }
+/// What a linear layer makes of a row of values.
+fn product(layer: &Panels, values: &[f32]) -> Vec<f32> {
+    let mut out = vec![0.0; layer.outputs];
+    layer.apply(values, &mut out);
+    out
 }
 
 /// The network's output for an input image.
@@ -93,12 +89,12 @@ pub struct Network {
     top: [Convolution; 2],
     middle: Residual,
     head: Convolution,
-    hidden: LinearLayer,
-    visible: LinearLayer,
-    facing: LinearLayer,
-    person: LinearLayer,
+    hidden: Panels,
+    visible: Panels,
+    facing: Panels,
+    person: Panels,
     /// Scale of each joint's error, lengths, and scales of their errors.
-    sizes: [LinearLayer; 3],
+    sizes: [Panels; 3],
 }
 
 impl std::fmt::Debug for Network {
@@ -129,15 +125,14 @@ impl Network {
         ];
         let top =
             [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
-        let [scale, length, length_scale] =
-            ["scale", "length", "length_scale"].map(|name| LinearLayer::take(weights, name));
+        let [scale, length, length_scale] = ["scale", "length", "length_scale"].map(|name| linear(weights, name));
         let network = Self {
             middle: Residual::take(weights, "mid", SIZE / 8)?,
             head: Convolution::take(weights, "head", 1, SIZE / 8)?,
-            visible: LinearLayer::take(weights, "visible")?,
-            facing: LinearLayer::take(weights, "facing")?,
-            person: LinearLayer::take(weights, "person")?,
-            hidden: LinearLayer::take(weights, "hidden")?,
+            visible: linear(weights, "visible")?,
+            facing: linear(weights, "facing")?,
+            person: linear(weights, "person")?,
+            hidden: linear(weights, "hidden")?,
             sizes: [scale?, length?, length_scale?],
             stages,
             top,
@@ -173,8 +168,8 @@ impl Network {
             }
         }
         let [scale, length, length_scale] = &self.sizes;
-        let (pooled, joints, lengths) = (self.hidden.0.outputs, self.head.outputs() / A_JOINT, length.0.outputs);
-        let linear = [
+        let (pooled, joints, lengths) = (self.hidden.outputs, self.head.outputs() / A_JOINT, length.outputs);
+        let layers = [
             (&self.visible, pooled, joints),
             (&self.facing, pooled, 1),
             (&self.person, pooled, 1),
@@ -183,8 +178,7 @@ impl Network {
             (length, pooled, lengths),
             (length_scale, pooled, lengths),
         ];
-        for (layer, inputs, outputs) in linear {
-            let LinearLayer(layer) = layer;
+        for (layer, inputs, outputs) in layers {
             if layer.inputs != inputs || layer.outputs != outputs {
                 let found = format!("{} and {}", layer.inputs, layer.outputs);
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
@@ -226,15 +220,15 @@ impl Network {
 
     /// Computes the outputs that depend on the whole image.
     fn overall(&self, pooled: &[f32]) -> Answer {
-        let mut values = self.hidden.apply(pooled);
+        let mut values = product(&self.hidden, pooled);
         rectify(&mut values);
-        let [log_scale, log_lengths, log_length_scale] = self.sizes.each_ref().map(|layer| layer.apply(&values));
+        let [log_scale, log_lengths, log_length_scale] = self.sizes.each_ref().map(|layer| product(layer, &values));
         Answer {
             joints: Vec::new(),
             log_scale,
-            visible: self.visible.apply(&values),
-            facing: self.facing.apply(&values)[0],
-            person: self.person.apply(&values)[0],
+            visible: product(&self.visible, &values),
+            facing: product(&self.facing, &values)[0],
+            person: product(&self.person, &values)[0],
             log_lengths,
             log_length_scale,
         }

@@ -79,16 +79,6 @@ impl Pose {
         self.rotation.inverse() * vector
     }
 
-    /// The pose at the fraction `t` of the way to another one: spherical interpolation for the rotation, linear for the
-    /// translation.
-    #[inline]
-    pub fn lerp(&self, other: &Self, t: f64) -> Self {
-        Self {
-            rotation: self.rotation.slerp(other.rotation, t),
-            translation: self.translation.lerp(other.translation, t),
-        }
-    }
-
     /// Whether all numbers are finite.
     #[inline]
     pub fn is_finite(&self) -> bool {
