@@ -116,8 +116,8 @@ proptest! {
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
         let camera = Camera::pinhole(160, 120, [140.0, 150.0, 79.5, 59.5]).unwrap();
-        let view = SilhouetteView { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
-        let deep = SilhouetteView { depth: &depth, ..view };
+        let view = SilhouetteView { pixels, depth: Vec::new(), border: 1.0, camera, camera_from_world };
+        let deep = SilhouetteView { depth, ..view.clone() };
         let mut segments = bones(&body, &model, 0.0);
         segments.iter_mut().for_each(|segment: &mut Bone| segment.radius = [radius, 0.5 * radius]);
         let mut trunk = trunk(&body, &model);
@@ -125,7 +125,7 @@ proptest! {
         // A limb beside the chain, through the body's middle.
         let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
         trunk.push(Trunk::new(&body.limbs()[0].shape, Carrier::World(beside)));
-        let criterion = Criterion { views: &[view, deep], segments: &segments, thin, trunk: &trunk };
+        let criterion = Criterion { views: &[&view, &deep], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);
             model.place(&Pose::IDENTITY, angles, &mut at);
@@ -155,10 +155,10 @@ proptest! {
         let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
         let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
         let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
-        let view = SilhouetteView { pixels: &image, depth: &[], border: 1.0, camera: &camera, camera_from_world };
+        let view = SilhouetteView { pixels: image, depth: Vec::new(), border: 1.0, camera, camera_from_world };
         // One short bone beside the shoulder, moved into the trunk by its base.
         let segment = Bone { ends: [(0, Vec3::ZERO), (0, 1e-3 * Vec3::Z)], radius: [1e-6; 2], apart: 0.0 };
-        let criterion = Criterion { views: &[view], segments: &[segment], thin: 0.0, trunk: &trunk };
+        let criterion = Criterion { views: &[&view], segments: &[segment], thin: 0.0, trunk: &trunk };
         let mut at = Kinematics::default();
         model.place(&Pose::IDENTITY, &vec![0.0; model.freedoms()], &mut at);
         at.poses[0] = Pose::from_parts(Vec3::new(x, y, 0.3), at.poses[0].rotation);

@@ -6,7 +6,8 @@ use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 use voodoo_ik::{
-    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SolverOptions, Trunk,
+    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SilhouetteView,
+    SolverOptions, Trunk,
 };
 
 use crate::arrays::{frozen, limb_poses, pose};
@@ -189,7 +190,7 @@ impl PyChain {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
         let segments = self.bones(py, segments, depth.0)?;
-        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
         let trunk = self.trunk(py, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
@@ -240,7 +241,7 @@ impl PyChain {
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
         let trunk = self.trunk(py, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let positions = positions.as_ref().map(|positions| positions.as_slice()).transpose()?;

@@ -52,7 +52,7 @@ impl Correspondences {
         }
         for (child, limb) in body.limbs().iter().enumerate() {
             let Some((parent, joint)) = &limb.parent else { continue };
-            let fraction = joint.weight / joint.band_count() as f64;
+            let fraction = joint.weight / joint.band_points().count() as f64;
             for point in joint.band_points() {
                 self.bands.push(Band {
                     parent: *parent,
@@ -85,7 +85,7 @@ mod tests {
         }
         all.add_bands(&body, &poses, 0.4, &mut Vec::new());
         let joints: usize =
-            body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_count()).sum();
+            body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_points().count()).sum();
         assert_eq!(all.bands.len(), joints);
         for limb in 0..poses.len() {
             // Every band counts at both ends.
