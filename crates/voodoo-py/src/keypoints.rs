@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use voodoo_core::math::{CostTable, Vec3};
+use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
@@ -124,8 +124,7 @@ impl PyKeypointLayout {
 #[pyfunction]
 pub(crate) fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, usize)> {
     let costs = costs.as_array();
-    let table = CostTable::from_fn(costs.nrows(), costs.ncols(), |row, column| costs[[row, column]]);
-    voodoo_core::math::linear_sum_assignment(&table)
+    voodoo_core::math::linear_sum_assignment(costs.nrows(), costs.ncols(), &|row, column| costs[[row, column]])
 }
 
 #[doc = stub!("carried")]

@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Points, Pose};
-use voodoo_core::{Region, SurfaceBatch, TaperedEllipticCylinder};
+use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
 use crate::arrays::{PointArray, vector};
@@ -146,16 +146,7 @@ impl PyShape {
     #[classattr]
     #[pyo3(name = "REGIONS")]
     fn regions() -> [&'static str; 5] {
-        let mut names = [""; 5];
-        for (region, name) in [
-            (Region::Side, "side"),
-            (Region::ProximalCap, "proximal_cap"),
-            (Region::DistalCap, "distal_cap"),
-            (Region::ProximalRim, "proximal_rim"),
-            (Region::DistalRim, "distal_rim"),
-        ] {
-            names[region as usize] = name;
-        }
-        names
+        // In the order of `voodoo_core::Region`.
+        ["side", "proximal_cap", "distal_cap", "proximal_rim", "distal_rim"]
     }
 }

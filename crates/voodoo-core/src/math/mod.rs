@@ -12,7 +12,7 @@ pub(crate) use absolute_orientation::Moments;
 pub use cholesky::solve_in_place;
 pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
-pub use linear_sum_assignment::{CostTable, linear_sum_assignment};
+pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
 pub use simd::{LANES, has_avx512, load, store, widest};
 pub(crate) use weighted_points::WeightedPoints;
