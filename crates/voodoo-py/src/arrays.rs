@@ -166,16 +166,10 @@ pub(crate) fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pos
         Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),
         None => value.extract().map_err(|_| wrong())?,
     };
-    let rotation = Mat3::from_cols_array_2d(&[
-        [rows[0][0], rows[0][1], rows[0][2]],
-        [rows[1][0], rows[1][1], rows[1][2]],
-        [rows[2][0], rows[2][1], rows[2][2]],
-    ])
-    .transpose();
-    let error = (rotation * rotation.transpose() - Mat3::IDENTITY)
-        .to_cols_array()
-        .iter()
-        .fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
+    let rotation =
+        Mat3::from_cols_array_2d(&[0, 1, 2].map(|row| [0, 1, 2].map(|column| rows[row][column]))).transpose();
+    let errors = (rotation * rotation.transpose() - Mat3::IDENTITY).to_cols_array();
+    let error = errors.iter().fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
     let translation = Vec3::new(rows[0][3], rows[1][3], rows[2][3]);
     // NaN fails every comparison, so each comparison is written to be true for valid values only.
     if !(error < 1e-4 && rotation.determinant() > 0.0 && translation.is_finite() && rows[3] == [0.0, 0.0, 0.0, 1.0]) {

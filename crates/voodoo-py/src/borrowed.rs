@@ -11,6 +11,16 @@ use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, Po
 use crate::errors::IntoPy;
 use crate::frame::PyFrame;
 
+/// Index of a name in a list, which it joins if it is new.
+pub(crate) fn number(names: &mut Vec<String>, name: &str) -> u16 {
+    let known = names.iter().position(|known| known == name);
+    let number = known.unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    });
+    number as u16
+}
+
 pub(crate) struct CloudData {
     pub points: PointArray,
     pub world_from_sensor: Pose,

@@ -168,20 +168,20 @@ impl PyEstimate {
 
     #[doc = stub!("Estimate.joints")]
     #[getter]
-    fn joints<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&slf.get().names.sites, &slf.get().joint_positions(slf.py())?)
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        rows(&self.names.sites, &self.joint_positions(py)?)
     }
 
     #[doc = stub!("Estimate.world_from_limb")]
     #[getter]
-    fn world_from_limb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&slf.get().names.limbs, &slf.get().limb_poses(slf.py())?)
+    fn world_from_limb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        rows(&self.names.limbs, &self.limb_poses(py)?)
     }
 
     #[doc = stub!("Estimate.covariance")]
     #[getter]
-    fn covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&slf.get().names.sites, &slf.get().joint_covariances(slf.py())?)
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        rows(&self.names.sites, &self.joint_covariances(py)?)
     }
 
     #[doc = stub!("Estimate.joint_covariances")]
@@ -193,77 +193,70 @@ impl PyEstimate {
 
     #[doc = stub!("Estimate.joint_sigma")]
     #[getter]
-    fn joint_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (this, sites) = (slf.get(), &slf.get().estimate.covariances.sites);
+    fn joint_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let sites = &self.estimate.covariances.sites;
         let sigma = sites.iter().flat_map(|covariance| (0..3).map(|axis| covariance.col(axis)[axis].sqrt()));
-        rows(&this.names.sites, &frozen(slf.py(), sigma.collect(), &[sites.len(), 3])?)
+        rows(&self.names.sites, &frozen(py, sigma.collect(), &[sites.len(), 3])?)
     }
 
     #[doc = stub!("Estimate.limb_covariance")]
     #[getter]
-    fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (this, limbs) = (slf.get(), &slf.get().estimate.covariances.limbs);
+    fn limb_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let limbs = &self.estimate.covariances.limbs;
         let all = limbs.iter().flatten().flatten().copied().collect();
-        rows(&this.names.limbs, &frozen(slf.py(), all, &[limbs.len(), 6, 6])?)
+        rows(&self.names.limbs, &frozen(py, all, &[limbs.len(), 6, 6])?)
     }
 
     #[doc = stub!("Estimate.angle_covariance")]
     #[getter]
-    fn angle_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        let turns = this.names.joints.iter().zip(&this.estimate.covariances.turns);
+    fn angle_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let turns = self.names.joints.iter().zip(&self.estimate.covariances.turns);
         let (names, turns): (Vec<_>, Vec<_>) = turns.filter_map(|(name, turn)| Some((name.as_ref()?, turn))).unzip();
         // Symmetric: columns are rows.
         let all = turns.iter().flat_map(|turn: &&Mat3| turn.to_cols_array()).collect();
-        rows(names, &frozen(slf.py(), all, &[turns.len(), 3, 3])?)
+        rows(names, &frozen(py, all, &[turns.len(), 3, 3])?)
     }
 
     #[doc = stub!("Estimate.length_sigma")]
     #[getter]
-    fn length_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.lengths.iter().copied()))
+    fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.covariances.lengths.iter().copied()))
     }
 
     #[doc = stub!("Estimate.girth_sigma")]
     #[getter]
-    fn girth_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.girths.iter().copied()))
+    fn girth_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.covariances.girths.iter().copied()))
     }
 
     #[doc = stub!("Estimate.limb_points")]
     #[getter]
-    fn limb_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_points.iter().copied()))
+    fn limb_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_points.iter().copied()))
     }
 
     #[doc = stub!("Estimate.limb_residual")]
     #[getter]
-    fn limb_residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_residual.iter().copied()))
+    fn limb_residual<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_residual.iter().copied()))
     }
 
     #[doc = stub!("Estimate.joint_gaps")]
     #[getter]
-    fn joint_gaps<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        let gaps = this.names.joints.iter().zip(&this.estimate.joint_gaps);
-        mapping(slf.py(), gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
+    fn joint_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let gaps = self.names.joints.iter().zip(&self.estimate.joint_gaps);
+        mapping(py, gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
     }
 
     #[doc = stub!("Estimate.sources")]
     #[getter]
-    fn sources<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        let reports = this.sources.iter().enumerate().map(|(index, name)| {
-            let report = this.estimate.sources.get(index).copied().unwrap_or_default();
+    fn sources<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let reports = self.sources.iter().enumerate().map(|(index, name)| {
+            let report = self.estimate.sources.get(index).copied().unwrap_or_default();
             let residual = if report.inliers > 0 { report.residual } else { f64::NAN };
             (name, (report.count, report.inliers, residual))
         });
-        mapping(slf.py(), reports)
+        mapping(py, reports)
     }
 
     /// For pickle and copy.

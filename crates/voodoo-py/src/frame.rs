@@ -8,7 +8,7 @@ use voodoo_core::math::{Aabb, Vec3};
 
 use crate::arguments;
 use crate::arrays::{ColorArray, DepthArray, PointArray, pose, unmasked, vector, wrong_array};
-use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, SiteData};
+use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, SiteData, number};
 use crate::camera::camera_of;
 use crate::errors::{exception, wrong_argument};
 use crate::sites::PySiteRay;
@@ -42,11 +42,7 @@ impl PyFrame {
     }
 
     fn source(&mut self, name: &str) -> u16 {
-        let index = self.sources.iter().position(|known| known == name).unwrap_or_else(|| {
-            self.sources.push(name.to_owned());
-            self.sources.len() - 1
-        });
-        index as u16
+        number(&mut self.sources, name)
     }
 }
 
@@ -156,15 +152,8 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
-        let data = SiteData {
-            site,
-            position: vector("position", position)?,
-            direction: None,
-            weight,
-            bias,
-            source: self.source(source),
-        };
-        self.sites.push(data);
+        let (position, source) = (vector("position", position)?, self.source(source));
+        self.sites.push(SiteData { site, position, direction: None, weight, bias, source });
         Ok(())
     }
 
@@ -179,15 +168,9 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
-        let data = SiteData {
-            site,
-            position: vector("origin", origin)?,
-            direction: Some(vector("direction", direction)?),
-            weight,
-            bias,
-            source: self.source(source),
-        };
-        self.sites.push(data);
+        let (position, direction) = (vector("origin", origin)?, Some(vector("direction", direction)?));
+        let source = self.source(source);
+        self.sites.push(SiteData { site, position, direction, weight, bias, source });
         Ok(())
     }
 

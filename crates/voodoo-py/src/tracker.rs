@@ -12,7 +12,7 @@ use voodoo_core::{Body, Frame, Tracker};
 
 use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{Borrowed, ColorViews, color_image};
+use crate::borrowed::{Borrowed, ColorViews, color_image, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -65,16 +65,6 @@ impl PyTracker {
         }
     }
 
-    /// Index of the color camera with this name.
-    fn camera(&mut self, name: &str) -> u16 {
-        let known = self.cameras.iter().position(|known| known == name);
-        let number = known.unwrap_or_else(|| {
-            self.cameras.push(name.to_owned());
-            self.cameras.len() - 1
-        });
-        number as u16
-    }
-
     /// The color images of a frame, whose cameras are identified by name.
     fn pictures<'a>(
         &mut self,
@@ -89,7 +79,7 @@ impl PyTracker {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(exception(py, "MeasurementError", text));
             }
-            colors.push(color_image(view, self.camera(name))?);
+            colors.push(color_image(view, number(&mut self.cameras, name))?);
         }
         Ok(colors)
     }
@@ -180,7 +170,7 @@ impl PyTracker {
         }
         let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
-        let camera = self.camera(source);
+        let camera = number(&mut self.cameras, source);
         self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
     }
 
