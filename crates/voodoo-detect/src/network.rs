@@ -143,44 +143,40 @@ impl Network {
 
     /// Checks that the shape of every layer matches that of the layer before.
     fn check(&self) -> Result<(), WeightsError> {
+        let shape = |layer: &Convolution| [layer.inputs(), layer.outputs()];
+        let linear = |layer: &Panels| [layer.inputs, layer.outputs];
+        let residual = |block: &Residual, channels: usize| {
+            let between = block.first.outputs();
+            [(shape(&block.first), [channels, between]), (shape(&block.second), [between, channels])]
+        };
         let mut channels = 2;
         let mut ends = Vec::new();
-        let mut chain = Vec::new();
+        let mut layers = Vec::new();
         for stage in &self.stages {
-            chain.push((&stage.reduce, channels, None));
-            channels = stage.reduce.outputs();
-            for block in &stage.blocks {
-                chain.push((&block.first, channels, Some(block.first.outputs())));
-                chain.push((&block.second, block.first.outputs(), Some(channels)));
-            }
-            ends.push(channels);
+            let outputs = stage.reduce.outputs();
+            layers.push((shape(&stage.reduce), [channels, outputs]));
+            layers.extend(stage.blocks.iter().flat_map(|block| residual(block, outputs)));
+            ends.push(outputs);
+            channels = outputs;
         }
-        chain.push((&self.top[0], ends[3], Some(ends[2])));
-        chain.push((&self.top[1], ends[2], Some(ends[1])));
-        chain.push((&self.middle.first, ends[1], Some(self.middle.first.outputs())));
-        chain.push((&self.middle.second, self.middle.first.outputs(), Some(ends[1])));
-        chain.push((&self.head, ends[1], None));
-        for (layer, inputs, outputs) in chain {
-            let outputs = outputs.unwrap_or(layer.outputs());
-            if layer.inputs() != inputs || layer.outputs() != outputs {
-                let found = format!("{} and {}", layer.inputs(), layer.outputs());
-                return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
-            }
-        }
+        layers.extend(residual(&self.middle, ends[1]));
         let [scale, length, length_scale] = &self.sizes;
-        let (pooled, joints, lengths) = (self.hidden.outputs, self.head.outputs() / A_JOINT, length.outputs);
-        let layers = [
-            (&self.visible, pooled, joints),
-            (&self.facing, pooled, 1),
-            (&self.person, pooled, 1),
-            (&self.hidden, ends[3], pooled),
-            (scale, pooled, joints),
-            (length, pooled, lengths),
-            (length_scale, pooled, lengths),
-        ];
-        for (layer, inputs, outputs) in layers {
-            if layer.inputs != inputs || layer.outputs != outputs {
-                let found = format!("{} and {}", layer.inputs, layer.outputs);
+        let (pooled, joints, lengths) = (self.hidden.outputs, self.joints(), length.outputs);
+        layers.extend([
+            (shape(&self.top[0]), [ends[3], ends[2]]),
+            (shape(&self.top[1]), [ends[2], ends[1]]),
+            (shape(&self.head), [ends[1], self.head.outputs()]),
+            (linear(&self.hidden), [ends[3], pooled]),
+            (linear(&self.visible), [pooled, joints]),
+            (linear(&self.facing), [pooled, 1]),
+            (linear(&self.person), [pooled, 1]),
+            (linear(scale), [pooled, joints]),
+            (linear(length), [pooled, lengths]),
+            (linear(length_scale), [pooled, lengths]),
+        ]);
+        for (found, [inputs, outputs]) in layers {
+            if found != [inputs, outputs] {
+                let found = format!("{} and {}", found[0], found[1]);
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
             }
         }

@@ -50,14 +50,11 @@ impl PyDetector {
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
         input.check(&any, None).map_err(|error| error.into_py(py))?;
-        let up = match up {
-            Some(up) => Some(
-                vector("up", up)?
-                    .try_normalize()
-                    .ok_or_else(|| wrong_argument(py, "up", "a vector that is not zero", up))?,
-            ),
-            None => None,
+        let direction = |up: &Bound<'_, PyAny>| {
+            let wrong = || wrong_argument(py, "up", "a vector that is not zero", up);
+            vector("up", up)?.try_normalize().ok_or_else(wrong)
         };
+        let up = up.map(direction).transpose()?;
         let detector = &mut self.0;
         let found = py.detach(|| {
             let mut found: Vec<(Detection, &DepthImage)> = Vec::new();

@@ -187,15 +187,13 @@ impl Body {
     }
 
     fn check(&self) -> Result<(), BodyError> {
+        let wrong = |key: &str, expected, found: &str| Err(BodyError::value(key, expected, found));
         if self.limbs.is_empty() {
             return Err(BodyError::Empty);
         }
         if self.limbs.len() > MOST_LIMBS || self.sites.len() > MOST_SITES {
-            return Err(BodyError::value(
-                "body",
-                "at most 1,000 limbs and 10,000 sites",
-                format!("{} and {}", self.limbs.len(), self.sites.len()),
-            ));
+            let found = format!("{} and {}", self.limbs.len(), self.sites.len());
+            return wrong("body", "at most 1,000 limbs and 10,000 sites", &found);
         }
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
@@ -211,18 +209,11 @@ impl Body {
                     check_joint(&format!("{key}.joint"), joint)?;
                 }
                 (None, _) => {
-                    return Err(BodyError::value(
-                        format!("{key}.parent"),
-                        "a parent (only the first limb is the root)",
-                        "none",
-                    ));
+                    return wrong(&format!("{key}.parent"), "a parent (only the first limb is the root)", "none");
                 }
                 (Some((parent, _)), _) => {
-                    return Err(BodyError::value(
-                        format!("{key}.parent"),
-                        "a limb that stands before this one",
-                        format!("limb {parent}"),
-                    ));
+                    let found = format!("limb {parent}");
+                    return wrong(&format!("{key}.parent"), "a limb that stands before this one", &found);
                 }
             }
         }
@@ -233,14 +224,11 @@ impl Body {
                 return Err(BodyError::Duplicate { key, name: site.name.clone() });
             }
             if site.limb >= self.limbs.len() {
-                return Err(BodyError::value(format!("{key}.limb"), "the index of a limb", site.limb.to_string()));
+                return wrong(&format!("{key}.limb"), "the index of a limb", &site.limb.to_string());
             }
             if !is_place(site.position) {
-                return Err(BodyError::value(
-                    format!("{key}.position"),
-                    "finite meters, 1e9 at most",
-                    format!("{:?}", site.position.to_array()),
-                ));
+                let found = format!("{:?}", site.position.to_array());
+                return wrong(&format!("{key}.position"), "finite meters, 1e9 at most", &found);
             }
         }
         Ok(())
