@@ -7,7 +7,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
-use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3, matrix};
 use voodoo_core::{Body, ColorPixels, DepthPixels, Limb, PointSlice};
 
 use crate::errors::{exception, wrong_argument};
@@ -185,6 +185,11 @@ pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<V
         pose(&format!("world_from_limb[{name}]"), Some(value))
     };
     values.iter().enumerate().map(named).collect()
+}
+
+/// The 4x4 matrices of poses, read-only.
+pub(crate) fn matrices<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    frozen(py, poses.iter().flat_map(matrix).flatten().collect(), &[poses.len(), 4, 4])
 }
 
 /// A read-only array of a given shape.

@@ -11,7 +11,7 @@ use voodoo_core::Body;
 use voodoo_core::Estimate;
 use voodoo_core::math::{Mat3, Vec3};
 
-use crate::arrays::frozen;
+use crate::arrays::{frozen, matrices};
 use crate::errors::exception;
 
 /// The names for the numbers of an estimate; shared by all estimates of one body.
@@ -158,12 +158,7 @@ impl PyEstimate {
     #[doc = stub!("Estimate.limb_poses")]
     #[getter]
     fn limb_poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
-        let poses = &self.estimate.world_from_limb;
-        frozen(
-            py,
-            poses.iter().flat_map(|pose| voodoo_core::math::matrix(pose).into_iter().flatten()).collect(),
-            &[poses.len(), 4, 4],
-        )
+        matrices(py, &self.estimate.world_from_limb)
     }
 
     #[doc = stub!("Estimate.joints")]

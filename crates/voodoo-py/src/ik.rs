@@ -10,7 +10,7 @@ use voodoo_ik::{
     SolverOptions, Trunk,
 };
 
-use crate::arrays::{frozen, limb_poses, pose};
+use crate::arrays::{frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
 use crate::ik_view::PyView;
@@ -159,11 +159,10 @@ impl PyChain {
     fn forward<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>) -> PyResult<(Array<'py>, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let sites: Vec<f64> =
             self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
-        let counts = (at.poses.len(), sites.len() / 3);
-        Ok((frozen(py, poses, &[counts.0, 4, 4])?, frozen(py, sites, &[counts.1, 3])?))
+        let count = sites.len() / 3;
+        Ok((matrices(py, &at.poses)?, frozen(py, sites, &[count, 3])?))
     }
 
     /// Derivative `(3, n)` of the position of a site.
@@ -271,13 +270,12 @@ impl PyChain {
             }
         });
         let at = solver.kinematics();
-        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let residuals: Vec<f64> = goals.iter().filter(|_| count > 0).map(|goal| goal.residual(at).length()).collect();
         Ok((
             frozen(py, angles, &[count, n])?,
             frozen(py, points, &[count, sites.len(), 3])?,
             numbers.into_iter().map(|all| frozen(py, all, &[count])).collect::<PyResult<_>>()?,
-            frozen(py, poses, &[at.poses.len(), 4, 4])?,
+            matrices(py, &at.poses)?,
             PyTuple::new(py, residuals)?,
         ))
     }

@@ -6,9 +6,9 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::ColorImage;
 use voodoo_core::math::Vec3;
 use voodoo_core::{Body, Frame, Tracker};
+use voodoo_core::{ColorImage, RegionLine};
 
 use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
@@ -57,14 +57,6 @@ pub(crate) fn body_before<'py>(
 }
 
 impl PyTracker {
-    fn snapshot(&self) -> PyEstimate {
-        PyEstimate {
-            estimate: self.tracker.estimate().clone(),
-            names: self.names.clone(),
-            sources: self.sources.clone(),
-        }
-    }
-
     /// The color images of a frame, whose cameras are identified by name.
     fn pictures<'a>(
         &mut self,
@@ -107,7 +99,11 @@ impl PyTracker {
 
     #[getter]
     fn estimate(&self) -> PyEstimate {
-        self.snapshot()
+        PyEstimate {
+            estimate: self.tracker.estimate().clone(),
+            names: self.names.clone(),
+            sources: self.sources.clone(),
+        }
     }
 
     #[pyo3(signature = (joints, *, fit_sizes=true))]
@@ -117,14 +113,14 @@ impl PyTracker {
         self.tracker.reset(&positions, fit_sizes).map_err(|error| error.into_py(py))?;
         self.body_changed();
         self.sources.clear();
-        Ok(self.snapshot())
+        Ok(self.estimate())
     }
 
     fn _reset_pose(&mut self, py: Python<'_>, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
         let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
         self.tracker.reset_pose(&poses).map_err(|error| error.into_py(py))?;
         self.sources.clear();
-        Ok(self.snapshot())
+        Ok(self.estimate())
     }
 
     /// Whether the tracker searches for a person while there is no pose.
@@ -157,7 +153,7 @@ impl PyTracker {
         self.sources.clone_from(&frame.sources);
         self.detector_failures += usize::from(self.tracker.detector_error().is_some());
         warn_of_detector(py, self.tracker.detector_error())?;
-        Ok(self.snapshot())
+        Ok(self.estimate())
     }
 
     /// Sets images of the empty scene of the camera with this name; an empty list discards them.
@@ -219,15 +215,12 @@ impl PyTracker {
     /// row.
     fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let camera = self.cameras.iter().position(|known| known == source);
-        let rows: Vec<Vec<f32>> = camera.map_or_else(Vec::new, |camera| {
-            let lines = self.tracker.region_lines(camera as u16);
-            lines
-                .map(|line| {
-                    let ([u, v], [nu, nv]) = (line.place, line.normal);
-                    vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
-                })
-                .collect()
-        });
+        let lines = camera.into_iter().flat_map(|camera| self.tracker.region_lines(camera as u16));
+        let row = |line: RegionLine| {
+            let ([u, v], [nu, nv]) = (line.place, line.normal);
+            vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
+        };
+        let rows: Vec<Vec<f32>> = lines.map(row).collect();
         PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
@@ -283,7 +276,7 @@ impl PyTracker {
             "Tracker(body={:?}, limbs={}, last={})",
             self.tracker.body().name(),
             self.names.limbs.len(),
-            self.snapshot().__repr__()
+            self.estimate().__repr__()
         )
     }
 }
