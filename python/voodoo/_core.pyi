@@ -28,6 +28,7 @@ __all__ = [
     "View",
     "__version__",
     "_estimate",
+    "_nobody",
     "body_before",
     "carried",
     "config_fields",
@@ -371,9 +372,16 @@ def expected_sites(tracker: Tracker | tuple[People, int], stamp: float) -> dict[
     """Site name -> predicted position (3,) [m] at a time; see voodoo.Tracker.predict."""
 
 def _estimate(
-    head: tuple[Any, ...], names: tuple[Any, ...], found: tuple[Any, ...], spread: tuple[Any, ...] | None = None
+    found: dict[str, Any],
+    limbs: Sequence[str],
+    sites: Sequence[str],
+    joints: Sequence[str | None],
+    sources: Sequence[str],
 ) -> Estimate:
-    """Restores an estimate from its pickled state; `spread` (the covariances) may be missing in older pickles."""
+    """Restores an estimate from its pickled state."""
+
+def _nobody(stamp: float) -> Estimate:
+    """The estimate of a frame in which nobody is tracked."""
 
 def config_fields() -> list[tuple[str, str, str, Any, tuple[float, float] | None, list[str]]]:
     """Name, documentation, unit, default, (least, greatest) and words of every configuration entry."""
@@ -932,8 +940,9 @@ class Chain:
     def solve(
         self,
         base: npt.ArrayLike,
-        start: npt.NDArray[np.float64],
+        starts: npt.NDArray[np.float64],
         goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
+        positions: npt.NDArray[np.float64] | None,
         segments: Sequence[tuple[str, str, float]] | None,
         depth: tuple[float, float],
         views: Sequence[View],
@@ -943,29 +952,7 @@ class Chain:
     ) -> tuple[
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],
+        list[npt.NDArray[np.float64]],
         npt.NDArray[np.float64],
         tuple[float, ...],
-        int,
-        bool,
-        float,
-    ]: ...
-    def solve_many(
-        self,
-        base: npt.ArrayLike,
-        starts: npt.NDArray[np.float64],
-        goals: Sequence[tuple[str, str, tuple[float, ...], float, int]],
-        positions: npt.NDArray[np.float64],
-        segments: Sequence[tuple[str, str, float]] | None,
-        depth: tuple[float, float],
-        views: Sequence[View],
-        how: tuple[int, float, float, float, float, float],
-        rest: Sequence[tuple[int, float]],
-    ) -> tuple[
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
-        npt.NDArray[np.float64],
     ]: ...

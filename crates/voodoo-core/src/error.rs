@@ -31,10 +31,8 @@ pub enum BodyError {
         name: String,
     },
     /// A name that is not in the body.
-    #[error("{key}: unknown {what} {name:?}; known are: {}", known.join(", "))]
+    #[error("{what}: unknown {what} {name:?}; known are: {}", known.join(", "))]
     Unknown {
-        /// Where the name was used.
-        key: String,
         /// `limb` or `site`.
         what: &'static str,
         /// The requested name.
@@ -42,7 +40,7 @@ pub enum BodyError {
         /// The known names.
         known: Vec<String>,
     },
-    /// A value outside its domain.
+    /// A value outside its domain, or a human name that contradicts the others.
     #[error("{key}: expected {expected}, found {found}")]
     Value {
         /// Key of the entry.
@@ -50,16 +48,6 @@ pub enum BodyError {
         /// The expected value.
         expected: &'static str,
         /// The value found.
-        found: String,
-    },
-    /// A limb, joint or site whose human name contradicts the others.
-    #[error("{key}: expected {expected}, found {found}")]
-    Role {
-        /// Key of the entry.
-        key: String,
-        /// What its name requires.
-        expected: &'static str,
-        /// What was found.
         found: String,
     },
     /// A shape that is not a valid solid.
@@ -70,6 +58,13 @@ pub enum BodyError {
         /// The error of the shape.
         source: ShapeError,
     },
+}
+
+impl BodyError {
+    /// A value outside its domain: the key of the entry, the expected value and the value found.
+    pub fn value(key: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
+        Self::Value { key: key.into(), expected, found: found.into() }
+    }
 }
 
 /// An invalid camera calibration.
@@ -119,9 +114,6 @@ pub enum TrackError {
     /// `step` before `reset`.
     #[error("the tracker has no pose yet: call reset first")]
     NotInitialized,
-    /// A stamp that is not finite.
-    #[error("stamp: expected a finite time in seconds, found {0}")]
-    Stamp(f64),
     /// A stamp that is not after the last one.
     #[error("stamp: expected a time after {previous} s, found {found} s")]
     TimeBackwards {

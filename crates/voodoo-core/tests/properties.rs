@@ -337,7 +337,10 @@ proptest! {
         prop_assert!(follow(&mut tracker, false) < 0.1);
         tracker.scale(1.0 / factor).unwrap();
         let forearm = human().limbs()[3].shape;
-        tracker.set_shape("l_forearm", forearm.scaled(factor).unwrap()).unwrap();
+        let [length, a0, b0, a1, b1] =
+            [forearm.length(), forearm.a0(), forearm.b0(), forearm.a1(), forearm.b1()].map(|size| factor * size);
+        let scaled = TaperedEllipticCylinder::new(length, a0, b0, a1, b1).unwrap();
+        tracker.set_shape("l_forearm", scaled).unwrap();
         prop_assert!(follow(&mut tracker, false) < 0.05);
         let held = TaperedEllipticCylinder::new(0.2, 0.1, 0.1, 0.1, 0.1).unwrap();
         let joint = Joint {

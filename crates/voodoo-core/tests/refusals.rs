@@ -237,7 +237,7 @@ fn joints_have_the_bands_of_their_kind() {
         let limbs = with_joint(|joint| joint.semi_axes = semi_axes);
         let joint = &limbs[1].parent.as_ref().unwrap().1;
         let points: Vec<Vec3> = joint.band_points().collect();
-        assert_eq!((joint.kind(), joint.band_count(), points.len()), (kind, count, count));
+        assert_eq!((joint.kind(), points.len()), (kind, count));
         assert!(points.iter().sum::<Vec3>().length() < 1e-12, "the bands lie about the center");
         for point in points {
             let (a, b) = (point.x.abs(), point.y.abs());
@@ -245,7 +245,8 @@ fn joints_have_the_bands_of_their_kind() {
         }
     }
     let human = Body::human(1.75, HumanModel::Papers).unwrap();
-    let bands: usize = human.limbs().iter().filter_map(|limb| Some(limb.parent.as_ref()?.1.band_count())).sum();
+    let bands: usize =
+        human.limbs().iter().filter_map(|limb| Some(limb.parent.as_ref()?.1.band_points().count())).sum();
     assert_eq!((human.limbs().len(), bands), (10, 4 + 2 * (1 + 2 + 4 + 2)), "neck; shoulders, elbows, hips, knees");
 }
 

@@ -106,7 +106,10 @@ mod tests {
             let crop = segmentation.crop(&candidate).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
             // Every pixel on the person, transformed back to the camera frame, coincides with a measured point.
-            let points: Vec<Vec3> = segmentation.pixels(&candidate).map(|(_, point)| point).collect();
+            let mut mask = Vec::new();
+            segmentation.mask(&candidate, &mut mask);
+            let point = |pixel: &usize| image.back_project(*pixel, 0.001 * image.pixels.get(*pixel));
+            let points: Vec<Vec3> = mask.iter().map(point).collect();
             let half = 0.5 * (SIZE as f64 - 1.0);
             let mut inside = 0;
             for (index, [depth, mask]) in crop.pixels.iter().enumerate().filter(|(_, pixel)| pixel[1] > 0.0) {

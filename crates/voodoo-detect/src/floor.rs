@@ -3,7 +3,7 @@
 
 use crate::view::ThinnedImage;
 use voodoo_core::Ground;
-use voodoo_core::math::{LANES, Vec3};
+use voodoo_core::math::{LANES, Points, Vec3};
 
 /// Approximate number of sampled points.
 const FLOOR_SAMPLES: usize = 1200;
@@ -24,33 +24,31 @@ const NEIGHBOR: f64 = 0.05;
 /// The plane is refitted to the points within these fractions of the trials' distance threshold.
 const NEARER: [f64; 2] = [0.7, 0.5];
 
-/// Single-precision points as a structure of arrays, with the tolerance of each point's distance from the floor.
+/// Points with the tolerance of each point's distance from the floor.
 #[derive(Debug, Default)]
 struct PointLanes {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
+    points: Points,
     near: Vec<f32>,
 }
 
 impl PointLanes {
     fn clear(&mut self) {
-        [&mut self.x, &mut self.y, &mut self.z, &mut self.near].into_iter().for_each(Vec::clear);
+        self.points.clear();
+        self.near.clear();
     }
 
     fn push(&mut self, point: Vec3) {
-        self.x.push(point.x as f32);
-        self.y.push(point.y as f32);
-        self.z.push(point.z as f32);
+        self.points.push(point.as_vec3().to_array());
         self.near.push((NEAR[0] + NEAR[1] * point.z * point.z) as f32);
     }
 
     /// Sums `worth` over the heights of the points above a plane, in units of the points' tolerances.
     fn sum(&self, plane: &Ground, worth: impl Fn(f32) -> f32) -> f64 {
-        let [a, b, c] = plane.normal.to_array().map(|value| value as f32);
+        let [a, b, c] = plane.normal.as_vec3().to_array();
         let offset = plane.offset as f32;
         let one = |x: f32, y: f32, z: f32, near: f32| worth((a * x + b * y + c * z - offset) / near);
-        let [x, y, z, near] = [&self.x, &self.y, &self.z, &self.near].map(|values| values.as_chunks::<LANES>());
+        let Points { x, y, z } = &self.points;
+        let [x, y, z, near] = [x, y, z, &self.near].map(|values| values.as_chunks::<LANES>());
         let mut sums = [0.0_f32; LANES];
         for (((x, y), z), near) in x.0.iter().zip(y.0).zip(z.0).zip(near.0) {
             for lane in 0..LANES {
@@ -75,7 +73,7 @@ impl FloorFinder {
     /// Returns the floor in the camera frame; `up` is the approximate upward direction in that frame.
     pub(crate) fn find(&mut self, view: &ThinnedImage, up: Vec3) -> Option<Ground> {
         self.sample(view, up);
-        let count = self.points.x.len();
+        let count = self.points.near.len();
         if self.level.len() < 20 {
             return None;
         }

@@ -201,12 +201,7 @@ impl Detect for Detector {
 
 /// World-frame box around a candidate's box.
 fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
-    let corners = [candidate.low, candidate.high];
-    let corner = |number: usize| {
-        let pick = |bit: usize, axis: usize| corners[(number >> bit) & 1][axis];
-        *world_from_camera * Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2))
-    };
-    Aabb::from_points((0..8).map(corner))
+    Aabb::from_points(Aabb::new(candidate.low, candidate.high).corners().map(|corner| *world_from_camera * corner))
 }
 
 /// Converts the network's output to a detection in the world frame.

@@ -51,21 +51,17 @@ impl Stage {
     }
 }
 
-/// A linear layer: a matrix and a bias.
-#[derive(Debug)]
-struct LinearLayer(Panels);
+/// Takes a linear layer: a matrix and a bias.
+fn linear(weights: &mut Weights, name: &str) -> Result<Panels, WeightsError> {
+    let layer = weights.layer(name, 2)?;
+    Ok(Panels::from_weights(&layer.weights, &layer.bias))
+}
 
-impl LinearLayer {
-    fn take(weights: &mut Weights, name: &str) -> Result<Self, WeightsError> {
-        let layer = weights.layer(name, 2)?;
-        Ok(Self(Panels::from_weights(&layer.weights, &layer.bias)))
-    }
-
-    fn apply(&self, values: &[f32]) -> Vec<f32> {
-        let mut out = vec![0.0; self.0.outputs];
-        self.0.apply(values, &mut out);
-        out
-    }
+/// What a linear layer makes of a row of values.
+fn product(layer: &Panels, values: &[f32]) -> Vec<f32> {
+    let mut out = vec![0.0; layer.outputs];
+    layer.apply(values, &mut out);
+    out
 }
 
 /// The network's output for an input image.
@@ -93,11 +89,12 @@ pub struct Network {
     top: [Convolution; 2],
     middle: Residual,
     head: Convolution,
-    hidden: Option<LinearLayer>,
-    visible: LinearLayer,
-    facing: LinearLayer,
-    person: LinearLayer,
-    sizes: Option<[LinearLayer; 3]>,
+    hidden: Panels,
+    visible: Panels,
+    facing: Panels,
+    person: Panels,
+    /// Scale of each joint's error, lengths, and scales of their errors.
+    sizes: [Panels; 3],
 }
 
 impl std::fmt::Debug for Network {
@@ -128,24 +125,17 @@ impl Network {
         ];
         let top =
             [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
-        let hidden = if weights.has("hidden.weight") { Some(LinearLayer::take(weights, "hidden")?) } else { None };
-        let sizes = ["scale", "length", "length_scale"];
-        let sizes = if weights.has("scale.weight") {
-            let [scale, length, length_scale] = sizes.map(|name| LinearLayer::take(weights, name));
-            Some([scale?, length?, length_scale?])
-        } else {
-            None
-        };
+        let [scale, length, length_scale] = ["scale", "length", "length_scale"].map(|name| linear(weights, name));
         let network = Self {
             middle: Residual::take(weights, "mid", SIZE / 8)?,
             head: Convolution::take(weights, "head", 1, SIZE / 8)?,
-            visible: LinearLayer::take(weights, "visible")?,
-            facing: LinearLayer::take(weights, "facing")?,
-            person: LinearLayer::take(weights, "person")?,
+            visible: linear(weights, "visible")?,
+            facing: linear(weights, "facing")?,
+            person: linear(weights, "person")?,
+            hidden: linear(weights, "hidden")?,
+            sizes: [scale?, length?, length_scale?],
             stages,
             top,
-            hidden,
-            sizes,
         };
         network.check()?;
         Ok(network)
@@ -153,42 +143,40 @@ impl Network {
 
     /// Checks that the shape of every layer matches that of the layer before.
     fn check(&self) -> Result<(), WeightsError> {
+        let shape = |layer: &Convolution| [layer.inputs(), layer.outputs()];
+        let linear = |layer: &Panels| [layer.inputs, layer.outputs];
+        let residual = |block: &Residual, channels: usize| {
+            let between = block.first.outputs();
+            [(shape(&block.first), [channels, between]), (shape(&block.second), [between, channels])]
+        };
         let mut channels = 2;
         let mut ends = Vec::new();
-        let mut chain = Vec::new();
+        let mut layers = Vec::new();
         for stage in &self.stages {
-            chain.push((&stage.reduce, channels, None));
-            channels = stage.reduce.outputs();
-            for block in &stage.blocks {
-                chain.push((&block.first, channels, Some(block.first.outputs())));
-                chain.push((&block.second, block.first.outputs(), Some(channels)));
-            }
-            ends.push(channels);
+            let outputs = stage.reduce.outputs();
+            layers.push((shape(&stage.reduce), [channels, outputs]));
+            layers.extend(stage.blocks.iter().flat_map(|block| residual(block, outputs)));
+            ends.push(outputs);
+            channels = outputs;
         }
-        chain.push((&self.top[0], ends[3], Some(ends[2])));
-        chain.push((&self.top[1], ends[2], Some(ends[1])));
-        chain.push((&self.middle.first, ends[1], Some(self.middle.first.outputs())));
-        chain.push((&self.middle.second, self.middle.first.outputs(), Some(ends[1])));
-        chain.push((&self.head, ends[1], None));
-        for (layer, inputs, outputs) in chain {
-            let outputs = outputs.unwrap_or(layer.outputs());
-            if layer.inputs() != inputs || layer.outputs() != outputs {
-                let found = format!("{} and {}", layer.inputs(), layer.outputs());
-                return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
-            }
-        }
-        let pooled = self.hidden.as_ref().map_or(ends[3], |hidden| hidden.0.outputs);
-        let joints = self.head.outputs() / A_JOINT;
-        let lengths = self.sizes.as_ref().map_or(0, |sizes| sizes[1].0.outputs);
-        let mut linear = vec![(&self.visible, pooled, joints), (&self.facing, pooled, 1), (&self.person, pooled, 1)];
-        linear.extend(self.hidden.iter().map(|hidden| (hidden, ends[3], pooled)));
-        if let Some([scale, length, length_scale]) = &self.sizes {
-            linear.extend([(scale, pooled, joints), (length, pooled, lengths), (length_scale, pooled, lengths)]);
-        }
-        for (layer, inputs, outputs) in linear {
-            let LinearLayer(layer) = layer;
-            if layer.inputs != inputs || layer.outputs != outputs {
-                let found = format!("{} and {}", layer.inputs, layer.outputs);
+        layers.extend(residual(&self.middle, ends[1]));
+        let [scale, length, length_scale] = &self.sizes;
+        let (pooled, joints, lengths) = (self.hidden.outputs, self.joints(), length.outputs);
+        layers.extend([
+            (shape(&self.top[0]), [ends[3], ends[2]]),
+            (shape(&self.top[1]), [ends[2], ends[1]]),
+            (shape(&self.head), [ends[1], self.head.outputs()]),
+            (linear(&self.hidden), [ends[3], pooled]),
+            (linear(&self.visible), [pooled, joints]),
+            (linear(&self.facing), [pooled, 1]),
+            (linear(&self.person), [pooled, 1]),
+            (linear(scale), [pooled, joints]),
+            (linear(length), [pooled, lengths]),
+            (linear(length_scale), [pooled, lengths]),
+        ]);
+        for (found, [inputs, outputs]) in layers {
+            if found != [inputs, outputs] {
+                let found = format!("{} and {}", found[0], found[1]);
                 return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
             }
         }
@@ -228,29 +216,20 @@ impl Network {
 
     /// Computes the outputs that depend on the whole image.
     fn overall(&self, pooled: &[f32]) -> Answer {
-        let mut values = pooled.to_vec();
-        if let Some(hidden) = &self.hidden {
-            values = hidden.apply(&values);
-            rectify(&mut values);
-        }
-        let [log_scale, log_lengths, log_length_scale] = match &self.sizes {
-            Some(layers) => [0, 1, 2].map(|number: usize| layers[number].apply(&values)),
-            None => [vec![UNKNOWN.ln(); self.joints()], Vec::new(), Vec::new()],
-        };
+        let mut values = product(&self.hidden, pooled);
+        rectify(&mut values);
+        let [log_scale, log_lengths, log_length_scale] = self.sizes.each_ref().map(|layer| product(layer, &values));
         Answer {
             joints: Vec::new(),
             log_scale,
-            visible: self.visible.apply(&values),
-            facing: self.facing.apply(&values)[0],
-            person: self.person.apply(&values)[0],
+            visible: product(&self.visible, &values),
+            facing: product(&self.facing, &values)[0],
+            person: product(&self.person, &values)[0],
             log_lengths,
             log_length_scale,
         }
     }
 }
-
-/// Scale of a joint's error if the network does not report it, meters.
-const UNKNOWN: f32 = 0.04;
 
 fn mean(map: &Map) -> Vec<f32> {
     let mut sum = vec![0.0; map.channels];

@@ -2,7 +2,7 @@
 //!
 //! No multiplication is fused with an addition: every processor gives the same bits.
 
-use voodoo_core::math::widest;
+use voodoo_core::math::{store, widest};
 
 /// Number of columns that are processed together.
 const TOGETHER: usize = 16;
@@ -90,15 +90,6 @@ impl Panels {
             here.zip(&sums).for_each(|(row, sums)| store(&mut row[column..][..width], sums));
         }
         (activations_last, out_last)
-    }
-}
-
-/// Copies the sums of the existing columns. Mostly all exist, and their number is then known to the compiler.
-#[inline(always)]
-fn store(to: &mut [f32], from: &[f32; TOGETHER]) {
-    match to.first_chunk_mut() {
-        Some(to) => *to = *from,
-        None => to.copy_from_slice(&from[..to.len()]),
     }
 }
 

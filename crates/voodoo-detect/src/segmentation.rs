@@ -49,11 +49,6 @@ impl Segmentation {
         self.floor
     }
 
-    /// Upward direction in the last image, camera frame.
-    pub fn up_direction(&self) -> Vec3 {
-        self.up
-    }
-
     /// The network's input for a candidate of the last image.
     pub fn crop(&self, candidate: &PersonCandidate) -> Option<Crop> {
         Crop::from_candidate(&self.view, &self.parts, candidate, self.up)
@@ -62,15 +57,9 @@ impl Segmentation {
     /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.
     pub fn mask(&self, candidate: &PersonCandidate, into: &mut Vec<usize>) {
         into.clear();
-        for (index, _) in self.pixels(candidate) {
-            self.view.block(index, into);
-        }
-    }
-
-    /// The pixels of a candidate: indices in the full image and points in the camera frame. Large images are subsampled.
-    pub fn pixels<'a>(&'a self, candidate: &'a PersonCandidate) -> impl Iterator<Item = (usize, Vec3)> + 'a {
         let of = |label: &u32| *label != NONE && candidate.labels.binary_search(label).is_ok();
-        let indices = self.parts.labels.iter().enumerate().filter(move |(_, label)| of(label)).map(|(index, _)| index);
-        indices.map(|index| (self.view.in_image(index), self.view.point(index)))
+        for (index, _) in self.parts.labels.iter().enumerate().filter(|(_, label)| of(label)) {
+            self.view.block(self.view.in_image(index), into);
+        }
     }
 }

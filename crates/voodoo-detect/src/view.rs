@@ -2,7 +2,7 @@
 
 use voodoo_core::Camera;
 use voodoo_core::Surroundings;
-use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::math::Vec3;
 use voodoo_core::{DepthImage, Ground};
 
 /// Columns and rows are subsampled until an image has at most this many pixels. A person at 4 m is then still 30 pixels wide and
@@ -47,24 +47,12 @@ impl ThinnedImage {
                 let slope = image.camera.pixel_ray(column, row).map(|value| value as f32);
                 let z = image.pixels.get(index) * image.meters_per_unit as f32;
                 let returned = z > RANGE[0] && z < RANGE[1] && !slope[0].is_nan();
-                let kept = returned && !around.explains(index, z);
+                let place = |[x, y]: [f32; 2]| f64::from(z) * Vec3::new(f64::from(x), f64::from(y), 1.0);
+                let excluded =
+                    || !around.excluded.is_empty() && around.excludes(image.world_from_sensor * place(slope));
+                let kept = returned && !around.explains(index, z) && !excluded();
                 self.depth.push(if kept { z } else { 0.0 });
                 self.slopes.push(slope);
-            }
-        }
-        self.exclude(&image.world_from_sensor, around);
-    }
-
-    fn exclude(&mut self, world_from_camera: &Pose, around: &Surroundings) {
-        if around.excluded.is_empty() {
-            return;
-        }
-        for index in 0..self.depth.len() {
-            if self.depth[index] > 0.0 {
-                let point = *world_from_camera * self.point(index);
-                if around.excludes(point) {
-                    self.depth[index] = 0.0;
-                }
             }
         }
     }

@@ -5,7 +5,7 @@
 //! product for each of the 16 positions: 16 multiplications instead of 36.
 
 use crate::product::Panels;
-use voodoo_core::math::widest;
+use voodoo_core::math::{load, store, widest};
 
 /// Edge of the kernel.
 pub(crate) const KERNEL: usize = 3;
@@ -93,8 +93,6 @@ fn of_kernel([a, b, c]: [f32; KERNEL]) -> [f32; TILE] {
 
 /// Channels that are transformed together.
 const CHANNELS: usize = 16;
-/// The values of these channels.
-type Values = [f32; CHANNELS];
 
 /// Transforms all tiles of a map, with zeros around the map.
 #[inline(always)]
@@ -176,22 +174,5 @@ fn transform_output(output_tiles: &[f32], edge: usize, channels: usize, out: &mu
                 }
             }
         }
-    }
-}
-
-/// Copies all channels, or those that remain.
-#[inline(always)]
-fn load(to: &mut Values, from: &[f32]) {
-    match from.first_chunk() {
-        Some(from) => *to = *from,
-        None => to[..from.len()].copy_from_slice(from),
-    }
-}
-
-#[inline(always)]
-fn store(to: &mut [f32], from: &Values) {
-    match to.first_chunk_mut() {
-        Some(to) => *to = *from,
-        None => to.copy_from_slice(&from[..to.len()]),
     }
 }

@@ -17,7 +17,7 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
     let mut segments = Vec::new();
     for (index, link) in model.links().iter().enumerate() {
         let limb = &body.limbs()[link.limb];
-        let Some((_, joint)) = &limb.parent else { continue };
+        let Some((parent, joint)) = &limb.parent else { continue };
         let start = joint.limb_from_joint.translation;
         let shape = &limb.shape;
         let radius = [margin * shape.a0().min(shape.b0()), margin * shape.a1().min(shape.b1())];
@@ -28,11 +28,10 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
             let farthest = sites.max_by(|a, b| (*a - start).length().total_cmp(&(*b - start).length()));
             ends.push(farthest.filter(|end| (*end - start).length() > 1e-6).unwrap_or(Vec3::Z * shape.length()));
         }
-        let parent = limb.parent.as_ref().map_or(0, |(parent, _)| *parent);
         // Limbs start inside the trunk that carries them; the trunk's own limbs lie in it.
         let apart = if branches(body, link.limb) {
             1.0
-        } else if branches(body, parent) {
+        } else if branches(body, *parent) {
             FREE_OF_TRUNK
         } else {
             0.0
@@ -45,8 +44,7 @@ pub fn bones(body: &Body, model: &ChainModel, margin: f64) -> Vec<Bone> {
 /// The trunk: limbs of the chain, and its base, from which several other limbs branch.
 pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
     let mut found = Vec::new();
-    let base =
-        model.links().first().and_then(|link| body.limbs()[link.limb].parent.as_ref().map(|(parent, _)| *parent));
+    let base = model.links().first().and_then(|link| body.parent(link.limb));
     let links = model.links().iter().enumerate().map(|(index, link)| (Carrier::Link(index), link.limb));
     for (carrier, limb) in base.map(|limb| (Carrier::Base, limb)).into_iter().chain(links) {
         if branches(body, limb) {
@@ -57,5 +55,5 @@ pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
 }
 
 fn branches(body: &Body, limb: usize) -> bool {
-    body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(parent, _)| *parent == limb)).count() > 2
+    body.children(limb).count() > 2
 }

@@ -27,7 +27,7 @@ pub struct Bone {
 #[derive(Clone, Copy, Debug)]
 pub struct Criterion<'a> {
     /// The silhouettes.
-    pub views: &'a [SilhouetteView<'a>],
+    pub views: &'a [&'a SilhouetteView],
     /// The bones.
     pub segments: &'a [Bone],
     /// The silhouette counts as the limb itself where its half width is at most this many radii; the bone is then centered in it.

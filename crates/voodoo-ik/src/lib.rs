@@ -22,5 +22,4 @@ pub use model::{ChainModel, Column, Kinematics, Link, Root, Turn};
 pub use project::{project, read};
 pub use solver::{IkSolver, Report, Rest, SolverOptions};
 pub use trunk::{Carrier, Trunk};
-pub use twist::log;
 pub use view::SilhouetteView;

@@ -3,7 +3,7 @@
 use voodoo_core::BodyError;
 use voodoo_core::kinematics::hinge_axis;
 use voodoo_core::math::{Mat3, Pose, Vec3};
-use voodoo_core::{Body, JointKind};
+use voodoo_core::{Body, JointKind, Limb};
 
 use super::twist::turn;
 
@@ -88,28 +88,19 @@ impl ChainModel {
         let mut model = Self { links: Vec::new(), names: Vec::new(), limits: Vec::new(), movers: Vec::new() };
         for limb in chosen {
             let Some(description) = body.limbs().get(limb) else {
-                return Err(value("limbs", "indices of limbs", limb.to_string()));
+                return Err(BodyError::value("limbs", "indices of limbs", limb.to_string()));
             };
-            model.add(limb, &description.name, description.parent.as_ref(), root)?;
+            model.add(limb, description, root)?;
         }
         Ok(model)
     }
 
-    fn add(
-        &mut self,
-        limb: usize,
-        name: &str,
-        joint: Option<&(usize, voodoo_core::Joint)>,
-        root: Root,
-    ) -> Result<(), BodyError> {
-        let start = self.names.len();
-        let parent = joint.and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
+    fn add(&mut self, limb: usize, description: &Limb, root: Root) -> Result<(), BodyError> {
+        let (start, joint) = (self.names.len(), &description.parent);
+        let parent = joint.as_ref().and_then(|(index, _)| self.links.iter().position(|link| link.limb == *index));
         if parent.is_none() && !self.links.is_empty() {
-            return Err(value(
-                "limbs",
-                "limbs that hang together, parents included",
-                format!("{name} without its parent"),
-            ));
+            let found = format!("{} without its parent", description.name);
+            return Err(BodyError::value("limbs", "limbs that hang together, parents included", found));
         }
         let free = [f64::NEG_INFINITY, f64::INFINITY];
         let first = self.links.is_empty();
@@ -251,8 +242,4 @@ fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> voodoo_core::math::
         columns.push(Column { omega, v: joint.translation.cross(omega) });
     }
     rotation
-}
-
-fn value(key: &str, expected: &'static str, found: String) -> BodyError {
-    BodyError::Value { key: key.into(), expected, found }
 }

@@ -3,9 +3,8 @@
 use super::goal::{Aim, Goal};
 use super::model::{ChainModel, Turn};
 use super::solver::{IkSolver, SolverOptions};
-use super::twist::rotation_vector;
 use voodoo_core::kinematics::joint_turn;
-use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::math::{Pose, Vec3, rotation_vector};
 use voodoo_core::{Body, Joint};
 
 /// Lever that weights a limb's rotation about its axis against its position, meters: approximately the radius of an arm.

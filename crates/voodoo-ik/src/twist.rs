@@ -1,36 +1,6 @@
-//! The logarithm of rigid motions (R07 eq. 6-9); its inverse is [`voodoo_core::exp`].
+//! Rotations of ball joints, and their derivatives.
 
-use nalgebra::Vector6;
-
-use voodoo_core::math::{Pose, Quat, ShortestAxis, Vec3};
-
-/// The twist `(omega, v)`, `omega` at most pi long, with `exp(log(T)) = T` (R07 eq. 8, 9).
-///
-/// R07 inverts `A = (I - exp(theta w^)) w^ + w w^T theta`. For a unit axis `w` and `theta v` instead of `v` that inverse is
-/// `I - [omega]/2 + k [omega]^2` with `k = (1 - (theta/2) cot(theta/2)) / theta^2`. It has no division by zero at 0 (a series is
-/// used there) and none at pi, where R07's formula for the axis, which divides by `sin(theta)`, breaks down.
-pub fn log(pose: &Pose) -> Vector6<f64> {
-    let omega = rotation_vector(pose.rotation);
-    let t = pose.translation;
-    let first = omega.cross(t);
-    let v = t - 0.5 * first + inverse_factor(omega.length_squared()) * omega.cross(first);
-    Vector6::new(omega.x, omega.y, omega.z, v.x, v.y, v.z)
-}
-
-/// Rotation vector of the shorter rotation, at most pi long; exact to rounding at 0 and at pi.
-pub(super) fn rotation_vector(rotation: Quat) -> Vec3 {
-    rotation.to_scaled_axis_shortest()
-}
-
-/// `(1 - (t/2) cot(t/2)) / t^2` as a function of the squared angle.
-fn inverse_factor(square: f64) -> f64 {
-    if square < 1e-4 {
-        1.0 / 12.0 + square / 720.0 + square * square / 30240.0
-    } else {
-        let half = 0.5 * square.sqrt();
-        (1.0 - half * half.cos() / half.sin()) / square
-    }
-}
+use voodoo_core::math::{Quat, Vec3};
 
 /// Rotation of a rotation vector and the two factors of its left Jacobian `I + b [v] + c [v]^2`, `b = (1 - cos t)/t^2`,
 /// `c = (t - sin t)/t^3`.

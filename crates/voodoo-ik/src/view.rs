@@ -14,25 +14,25 @@ const LEAST_RADII: f64 = 0.5;
 const MOST_RADII: f64 = 2.0;
 
 /// A calibrated silhouette: pinhole camera and signed Euclidean distance transform, pixels, negative inside the person.
-#[derive(Clone, Copy, Debug)]
-pub struct SilhouetteView<'a> {
+#[derive(Clone, Debug)]
+pub struct SilhouetteView {
     /// For every pixel, row by row, at least 2 x 2: the signed distance and, inside, the radius of the largest disc within the
     /// silhouette that covers the pixel, in pixels. That radius is half the local width. If all radii are zero, no bone is
     /// centered. The two values are stored together because they are read together.
-    pub pixels: &'a [[f32; 2]],
+    pub pixels: Vec<[f32; 2]>,
     /// For every pixel, the measured depth along the optical axis, meters, zero where there is none; empty without depth. A bone
     /// lies at least its radius behind the measured surface; where the silhouette is the limb itself, no farther.
-    pub depth: &'a [f32],
+    pub depth: Vec<f32>,
     /// Uncertainty of the silhouette's border, pixels. The required depth inside the silhouette is reduced by it. The midline
     /// between two borders is known to half of it.
     pub border: f64,
     /// The camera, without distortion: masks and depths must be undistorted before.
-    pub camera: &'a Camera,
+    pub camera: Camera,
     /// Pose of the world in the optical frame.
     pub camera_from_world: Pose,
 }
 
-impl SilhouetteView<'_> {
+impl SilhouetteView {
     /// Returns `max(distance + depth, 0)` of a point in the optical frame plus how far it lies in front of the measured depth,
     /// both in pixels, and the derivative with respect to the point.
     pub(super) fn outside(&self, x: Vec3, radius: f64, thin: f64) -> (f64, Vec3) {
@@ -44,7 +44,7 @@ impl SilhouetteView<'_> {
         let (px, py) = (x.x * inverse, x.y * inverse);
         let place = self.camera.pixel([px, py]).and_then(|place| self.locate(place));
         let Some(at) = place else { return (0.0, Vec3::ZERO) };
-        let Some([distance, half]) = at.sample(self.pixels, self.camera.width()) else { return (0.0, Vec3::ZERO) };
+        let Some([distance, half]) = at.sample(&self.pixels, self.camera.width()) else { return (0.0, Vec3::ZERO) };
         let [distance, mut du, mut dv] = distance.at(&at);
         let projected = fx * radius * inverse;
         let mut depth = (projected - self.border).max(0.0);
@@ -80,7 +80,7 @@ impl SilhouetteView<'_> {
     /// in pixels (meters as projected perpendicular to the line of sight), and the derivative with respect to the point.
     fn depth_violation(&self, at: &PixelPlace, x: Vec3, radius: f64, own_surface: bool) -> (f64, Vec3) {
         let nothing = (0.0, Vec3::ZERO);
-        let Some(corners) = at.corners(self.depth, self.camera.width()) else { return nothing };
+        let Some(corners) = at.corners(&self.depth, self.camera.width()) else { return nothing };
         let corners = corners.map(f64::from);
         let (least, most) = corners.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
         if at.beyond != [0.0; 2] || !(least > NEAREST && most < (1.0 + EDGE) * least) {

@@ -24,10 +24,10 @@ fn allocations() -> usize {
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
     let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
-    let view = SilhouetteView { pixels: &pixels, depth: &[], border: 1.0, camera: &camera, camera_from_world };
+    let view = SilhouetteView { pixels, depth: Vec::new(), border: 1.0, camera, camera_from_world };
     let segments = bones(&body, &model, 1.0);
     let trunk = trunk(&body, &model);
-    let criterion = Criterion { views: &[view], segments: &segments, thin: 1.7, trunk: &trunk };
+    let criterion = Criterion { views: &[&view], segments: &segments, thin: 1.7, trunk: &trunk };
     let mut solver = IkSolver::with_rest((6..model.freedoms()).map(|unknown| Rest { unknown, angle: 0.1 }).collect());
     let mut count = 0;
     for index in 0..WARM_UP + COUNTED {

@@ -94,12 +94,12 @@ fn half(at: f64, slope: f64) -> Vec<[f32; 2]> {
         .collect()
 }
 
-fn view(pixels: &[[f32; 2]]) -> SilhouetteView<'_> {
+fn view(pixels: Vec<[f32; 2]>) -> SilhouetteView {
     // Optical frame: z towards -x of the world, 3 m away.
     let rotation = Quat::from_mat3(&Mat3::from_cols(-Vec3::Z, Vec3::X, -Vec3::Y));
     let camera_from_world = Pose::from_parts(Vec3::new(0.0, 0.0, 3.0), rotation);
-    let camera = Box::leak(Box::new(Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap()));
-    SilhouetteView { pixels, depth: &[], border: 1.0, camera, camera_from_world }
+    let camera = Camera::pinhole(160, 120, [140.0, 140.0, 79.5, 59.5]).unwrap();
+    SilhouetteView { pixels, depth: Vec::new(), border: 1.0, camera, camera_from_world }
 }
 
 proptest! {
@@ -117,7 +117,7 @@ proptest! {
             arm.goal("l_elbow", &arm.within(&elbow), Vec3::ZERO, 1),
         ];
         let (pixels, bones, trunk) = (half(at, slope), bones(&arm.body, &arm.model, 1.1), trunk(&arm.body, &arm.model));
-        let criterion = Criterion { views: &[view(&pixels)], segments: &bones, thin: 1.7, trunk: &trunk };
+        let criterion = Criterion { views: &[&view(pixels)], segments: &bones, thin: 1.7, trunk: &trunk };
         let mut rest = rest_at(&rest[..arm.model.freedoms()]);
         rest.truncate(drawn);
         for levels in 0..=2 {
@@ -195,7 +195,7 @@ fn rest_goes_along_the_border_of_the_silhouette() {
     out[0] = 0.9;
     let rest = rest_at(&out);
     let pixels = half(79.5 + 140.0 * (side + 0.2) / 3.0, 0.0);
-    let criterion = Criterion { views: &[view(&pixels)], segments: &bones, thin: 0.0, trunk: &trunk };
+    let criterion = Criterion { views: &[&view(pixels)], segments: &bones, thin: 0.0, trunk: &trunk };
     let (from, to) = (arm.h(&criterion, &start), arm.h(&criterion, &out));
     assert!(from < 1e-9 && to > 1.0, "{from} {to}");
     let found = arm.solve(&[], Some(&criterion), &start, rest.clone());

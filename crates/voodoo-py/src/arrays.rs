@@ -1,72 +1,111 @@
 //! Conversion from and to NumPy arrays.
 
-use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::ndarray::Dimension;
+use numpy::{
+    Element, Ix2, Ix3, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
+    PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::type_object::PyTypeInfo;
-use voodoo_core::Body;
-use voodoo_core::Limb;
-use voodoo_core::PointSlice;
-use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3, matrix};
+use voodoo_core::{Body, ColorPixels, DepthPixels, Limb, PointSlice};
 
 use crate::errors::{exception, wrong_argument};
 
-/// Points as passed by the caller: single or double precision, contiguous.
-pub(crate) enum PointArray {
-    F32(Py<PyArray2<f32>>),
-    F64(Py<PyArray2<f64>>),
+/// An array of the caller that may have either of two types, contiguous and aligned.
+pub(crate) enum EitherArray<T, D, U, E> {
+    First(Py<PyArray<T, D>>),
+    Second(Py<PyArray<U, E>>),
 }
 
-/// A borrow of a [`PointArray`].
-pub(crate) enum PointView<'py> {
-    F32(PyReadonlyArray2<'py, f32>),
-    F64(PyReadonlyArray2<'py, f64>),
+/// A borrow of an [`EitherArray`].
+pub(crate) enum EitherView<'py, T: Element, D: Dimension, U: Element, E: Dimension> {
+    First(PyReadonlyArray<'py, T, D>),
+    Second(PyReadonlyArray<'py, U, E>),
+}
+
+/// Points `(N, 3)`: single or double precision.
+pub(crate) type PointArray = EitherArray<f32, Ix2, f64, Ix2>;
+/// A depth image `(height, width)`.
+pub(crate) type DepthArray = EitherArray<u16, Ix2, f32, Ix2>;
+/// An image `(height, width, 3)` or `(height, width)`.
+pub(crate) type ColorArray = EitherArray<u8, Ix3, u8, Ix2>;
+pub(crate) type PointView<'py> = EitherView<'py, f32, Ix2, f64, Ix2>;
+pub(crate) type DepthView<'py> = EitherView<'py, u16, Ix2, f32, Ix2>;
+pub(crate) type ColorView<'py> = EitherView<'py, u8, Ix3, u8, Ix2>;
+
+impl<T: Element, D: Dimension, U: Element, E: Dimension> EitherArray<T, D, U, E> {
+    /// The array; copied only where it is not contiguous and aligned. None of another type.
+    pub(crate) fn cast(value: &Bound<'_, PyAny>) -> Option<Self> {
+        let array = contiguous(value).ok()?;
+        let first = array.cast::<PyArray<T, D>>().map(|array| Self::First(array.clone().unbind()));
+        first.or_else(|_| array.cast::<PyArray<U, E>>().map(|array| Self::Second(array.clone().unbind()))).ok()
+    }
+
+    pub(crate) fn view<'py>(&self, py: Python<'py>) -> EitherView<'py, T, D, U, E> {
+        match self {
+            Self::First(array) => EitherView::First(array.bind(py).readonly()),
+            Self::Second(array) => EitherView::Second(array.bind(py).readonly()),
+        }
+    }
 }
 
 impl PointArray {
-    /// Takes an `(N, 3)` array of float32 or float64; copies only what is not contiguous and aligned.
+    /// Takes an `(N, 3)` array of float32 or float64 without a mask.
     pub(crate) fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let py = value.py();
-        let wrong = || {
-            let found = match value.cast::<PyUntypedArray>() {
-                Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
-                Err(_) => value.get_type().to_string(),
-            };
-            exception(
-                py,
-                "MeasurementError",
-                format!("{name}: expected an array of shape (N, 3) and dtype float32 or float64, found {found}"),
-            )
-        };
+        let wrong = || wrong_array(name, "shape (N, 3) and dtype float32 or float64", value);
         let array = value.cast::<PyUntypedArray>().map_err(|_| wrong())?;
         if array.ndim() != 2 || array.shape()[1] != 3 {
             return Err(wrong());
         }
         unmasked(name, value, "leave the masked rows out: points.data[~numpy.ma.getmaskarray(points).any(axis=1)]")?;
-        let contiguous = contiguous(value)?;
-        if let Ok(array) = contiguous.cast::<PyArray2<f32>>() {
-            Ok(Self::F32(array.clone().unbind()))
-        } else if let Ok(array) = contiguous.cast::<PyArray2<f64>>() {
-            Ok(Self::F64(array.clone().unbind()))
-        } else {
-            Err(wrong())
-        }
-    }
-
-    pub(crate) fn view<'py>(&self, py: Python<'py>) -> PointView<'py> {
-        match self {
-            Self::F32(array) => PointView::F32(array.bind(py).readonly()),
-            Self::F64(array) => PointView::F64(array.bind(py).readonly()),
-        }
+        Self::cast(value).ok_or_else(wrong)
     }
 }
 
 impl PointView<'_> {
-    pub(crate) fn slice(&self) -> PyResult<PointSlice<'_>> {
+    pub(crate) fn points(&self) -> PyResult<PointSlice<'_>> {
         Ok(match self {
-            Self::F32(view) => PointSlice::F32(view.as_slice()?.as_chunks().0),
-            Self::F64(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
+            Self::First(view) => PointSlice::F32(view.as_slice()?.as_chunks().0),
+            Self::Second(view) => PointSlice::F64(view.as_slice()?.as_chunks().0),
         })
     }
+}
+
+impl DepthView<'_> {
+    pub(crate) fn pixels(&self) -> PyResult<DepthPixels<'_>> {
+        Ok(match self {
+            Self::First(view) => DepthPixels::U16(view.as_slice()?),
+            Self::Second(view) => DepthPixels::F32(view.as_slice()?),
+        })
+    }
+}
+
+impl ColorArray {
+    /// Takes an image of dtype uint8, and its height and width.
+    pub(crate) fn new(image: &Bound<'_, PyAny>) -> Option<(Self, [usize; 2])> {
+        let shape = image.cast::<PyUntypedArray>().ok()?.shape();
+        let ([height, width] | [height, width, 3]) = *shape else { return None };
+        Some((Self::cast(image)?, [height, width]))
+    }
+}
+
+impl ColorView<'_> {
+    pub(crate) fn pixels(&self) -> PyResult<ColorPixels<'_>> {
+        Ok(match self {
+            Self::First(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
+            Self::Second(view) => ColorPixels::Gray(view.as_slice()?),
+        })
+    }
+}
+
+/// The error for what is no array of the expected kind.
+pub(crate) fn wrong_array(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
+    let found = match value.cast::<PyUntypedArray>() {
+        Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
+        Err(_) => value.get_type().to_string(),
+    };
+    exception(value.py(), "MeasurementError", format!("{name}: expected an array of {expected}, found {found}"))
 }
 
 /// Rejects NumPy's masked arrays: masked entries are ordinary numbers and would count as measured.
@@ -127,16 +166,10 @@ pub(crate) fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pos
         Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),
         None => value.extract().map_err(|_| wrong())?,
     };
-    let rotation = Mat3::from_cols_array_2d(&[
-        [rows[0][0], rows[0][1], rows[0][2]],
-        [rows[1][0], rows[1][1], rows[1][2]],
-        [rows[2][0], rows[2][1], rows[2][2]],
-    ])
-    .transpose();
-    let error = (rotation * rotation.transpose() - Mat3::IDENTITY)
-        .to_cols_array()
-        .iter()
-        .fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
+    let rotation =
+        Mat3::from_cols_array_2d(&[0, 1, 2].map(|row| [0, 1, 2].map(|column| rows[row][column]))).transpose();
+    let errors = (rotation * rotation.transpose() - Mat3::IDENTITY).to_cols_array();
+    let error = errors.iter().fold(0.0_f64, |worst, entry| worst.max(entry.abs()));
     let translation = Vec3::new(rows[0][3], rows[1][3], rows[2][3]);
     // NaN fails every comparison, so each comparison is written to be true for valid values only.
     if !(error < 1e-4 && rotation.determinant() > 0.0 && translation.is_finite() && rows[3] == [0.0, 0.0, 0.0, 1.0]) {
@@ -154,12 +187,9 @@ pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<V
     values.iter().enumerate().map(named).collect()
 }
 
-/// The rows of a pose's 4x4 matrix.
-pub(crate) fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
-    let rows = Mat3::from_quat(pose.rotation).transpose().to_cols_array_2d();
-    let t = pose.translation;
-    let row = |index: usize, shift: f64| [rows[index][0], rows[index][1], rows[index][2], shift];
-    [row(0, t.x), row(1, t.y), row(2, t.z), [0.0, 0.0, 0.0, 1.0]]
+/// The 4x4 matrices of poses, read-only.
+pub(crate) fn matrices<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    frozen(py, poses.iter().flat_map(matrix).flatten().collect(), &[poses.len(), 4, 4])
 }
 
 /// A read-only array of a given shape.

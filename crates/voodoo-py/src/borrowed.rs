@@ -2,18 +2,24 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Pose, Vec3};
 use voodoo_core::{Body, Camera};
-use voodoo_core::{
-    Cloud, DepthImage, DepthPixels, DetectedPerson, Frame, Ground, PositionRelation, RayRelation, Scope,
-};
-use voodoo_core::{ColorImage, ColorPixels};
+use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
 
-use crate::arrays::{PointArray, PointView, contiguous};
+use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, PointView};
 use crate::errors::IntoPy;
 use crate::frame::PyFrame;
+
+/// Index of a name in a list, which it joins if it is new.
+pub(crate) fn number(names: &mut Vec<String>, name: &str) -> u16 {
+    let known = names.iter().position(|known| known == name);
+    let number = known.unwrap_or_else(|| {
+        names.push(name.to_owned());
+        names.len() - 1
+    });
+    number as u16
+}
 
 pub(crate) struct CloudData {
     pub points: PointArray,
@@ -22,16 +28,6 @@ pub(crate) struct CloudData {
     pub limb: Option<String>,
     pub on_body: bool,
     pub source: u16,
-}
-
-pub(crate) enum DepthArray {
-    U16(Py<PyArray2<u16>>),
-    F32(Py<PyArray2<f32>>),
-}
-
-enum BorrowedPixels<'py> {
-    U16(PyReadonlyArray2<'py, u16>),
-    F32(PyReadonlyArray2<'py, f32>),
 }
 
 pub(crate) struct ImageData {
@@ -43,19 +39,7 @@ pub(crate) struct ImageData {
     pub source: u16,
 }
 
-/// An image as passed by the caller: color or gray.
-pub enum ColorArray {
-    Color(Py<PyArray3<u8>>),
-    Gray(Py<PyArray2<u8>>),
-}
-
-/// A borrow of a [`ColorArray`].
-pub enum ColorPixelView<'py> {
-    Color(PyReadonlyArray3<'py, u8>),
-    Gray(PyReadonlyArray2<'py, u8>),
-}
-
-pub struct ColorData {
+pub(crate) struct ColorData {
     pub pixels: ColorArray,
     pub camera: Arc<Camera>,
     pub world_from_sensor: Pose,
@@ -63,53 +47,24 @@ pub struct ColorData {
     pub source: u16,
 }
 
-/// A borrow of a [`ColorData`].
-pub struct ColorView<'py, 'a> {
-    pixels: ColorPixelView<'py>,
-    pub data: &'a ColorData,
+/// The depth images of a frame, and borrows of their arrays.
+pub(crate) type DepthViews<'py, 'a> = Vec<(DepthView<'py>, &'a ImageData)>;
+/// The color images of a frame, and borrows of their arrays.
+pub(crate) type ColorViews<'py, 'a> = Vec<(ColorView<'py>, &'a ColorData)>;
+
+/// The depth images of these views.
+pub(crate) fn depth_images<'a>(views: &'a DepthViews) -> PyResult<Vec<DepthImage<'a>>> {
+    let image = |(view, data): &'a (DepthView, &ImageData)| {
+        let ImageData { ref camera, meters_per_unit, world_from_sensor, weight, source, .. } = **data;
+        Ok(DepthImage { pixels: view.pixels()?, camera, meters_per_unit, world_from_sensor, weight, source })
+    };
+    views.iter().map(image).collect()
 }
 
-impl ColorArray {
-    /// Takes a contiguous array of shape (height, width, 3) or (height, width) and dtype uint8; none of another kind.
-    pub fn new(image: &Bound<'_, PyAny>) -> Option<(Self, [usize; 2])> {
-        let array = contiguous(image).ok()?;
-        if let Ok(array) = array.cast::<PyArray3<u8>>() {
-            let shape = array.shape();
-            return (shape[2] == 3).then(|| (Self::Color(array.clone().unbind()), [shape[0], shape[1]]));
-        }
-        let array = array.cast::<PyArray2<u8>>().ok()?;
-        Some((Self::Gray(array.clone().unbind()), [array.shape()[0], array.shape()[1]]))
-    }
-
-    pub fn view<'py>(&self, py: Python<'py>) -> ColorPixelView<'py> {
-        match self {
-            Self::Color(array) => ColorPixelView::Color(array.bind(py).readonly()),
-            Self::Gray(array) => ColorPixelView::Gray(array.bind(py).readonly()),
-        }
-    }
-}
-
-impl ColorPixelView<'_> {
-    pub fn pixels(&self) -> PyResult<ColorPixels<'_>> {
-        Ok(match self {
-            Self::Color(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
-            Self::Gray(view) => ColorPixels::Gray(view.as_slice()?),
-        })
-    }
-}
-
-impl ColorData {
-    pub fn view<'py>(&self, py: Python<'py>) -> ColorView<'py, '_> {
-        ColorView { pixels: self.pixels.view(py), data: self }
-    }
-}
-
-impl ColorView<'_, '_> {
-    /// The image as one of the camera with this index.
-    pub fn image(&self, number: u16) -> PyResult<ColorImage<'_>> {
-        let ColorData { ref camera, world_from_sensor, stamp, source, .. } = *self.data;
-        Ok(ColorImage { pixels: self.pixels.pixels()?, camera, world_from_sensor, stamp, number, source })
-    }
+/// A color image as one of the camera with this index.
+pub(crate) fn color_image<'a>((view, data): &'a (ColorView, &ColorData), number: u16) -> PyResult<ColorImage<'a>> {
+    let ColorData { ref camera, world_from_sensor, stamp, source, .. } = **data;
+    Ok(ColorImage { pixels: view.pixels()?, camera, world_from_sensor, stamp, number, source })
 }
 
 pub(crate) struct SiteData {
@@ -129,57 +84,71 @@ impl SiteData {
     }
 }
 
-/// A person who was found in this instant: positions of sites, and log odds.
-pub(crate) struct PersonData {
-    pub positions: Vec<SiteData>,
-    pub person: f64,
-}
-
 /// Everything a step borrows: the views keep the arrays alive and readable.
-pub struct Borrowed<'py> {
-    clouds: Vec<(PointView<'py>, Pose, f64, Scope, u16)>,
-    images: Vec<ImageView<'py>>,
-    pub positions: Vec<PositionRelation>,
-    pub rays: Vec<RayRelation>,
+pub(crate) struct Borrowed<'py, 'a> {
+    clouds: Vec<(PointView<'py>, Scope, &'a CloudData)>,
+    images: DepthViews<'py, 'a>,
+    positions: Vec<PositionRelation>,
+    rays: Vec<RayRelation>,
     detections: Vec<(Vec<PositionRelation>, f64)>,
-    pub ground: Option<Ground>,
 }
 
-/// A depth image, and its array and camera.
-struct ImageView<'py> {
-    pixels: BorrowedPixels<'py>,
-    camera: Arc<Camera>,
-    meters_per_unit: f64,
-    world_from_sensor: Pose,
-    weight: f64,
-    source: u16,
-}
+impl<'py, 'a> Borrowed<'py, 'a> {
+    /// Borrows the arrays of a frame and looks the names up in `body`.
+    pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body) -> PyResult<Self> {
+        let cloud = |cloud: &'a CloudData| {
+            let scope = match &cloud.limb {
+                Some(name) => Scope::Limb(body.limb_index(name).map_err(|error| error.into_py(py))?),
+                None if cloud.on_body => Scope::Body,
+                None => Scope::Free,
+            };
+            Ok((cloud.points.view(py), scope, cloud))
+        };
+        let (mut positions, mut rays) = (Vec::new(), Vec::new());
+        let index = |data: &SiteData| body.site_index(&data.site).map_err(|error| error.into_py(py));
+        for data in &frame.sites {
+            let site = index(data)?;
+            let SiteData { position: origin, weight, bias, source, .. } = *data;
+            match data.direction {
+                None => positions.push(data.relation(site)),
+                Some(direction) => rays.push(RayRelation { site, origin, direction, weight, bias, source }),
+            }
+        }
+        let person = |(positions, person): &(Vec<SiteData>, f64)| {
+            let positions = positions.iter().map(|data| Ok(data.relation(index(data)?)));
+            Ok((positions.collect::<PyResult<_>>()?, *person))
+        };
+        let clouds = frame.clouds.iter().map(cloud).collect::<PyResult<_>>()?;
+        let detections = frame.detections.iter().map(person).collect::<PyResult<_>>()?;
+        Ok(Self { clouds, images: frame.depth_views(py), positions, rays, detections })
+    }
 
-impl Borrowed<'_> {
-    pub fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
-        self.clouds
-            .iter()
-            .map(|(view, world_from_sensor, weight, scope, source)| {
-                Ok(Cloud {
-                    points: view.slice()?,
-                    world_from_sensor: *world_from_sensor,
-                    weight: *weight,
-                    scope: *scope,
-                    source: *source,
-                })
-            })
-            .collect()
+    pub(crate) fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
+        let clouds = self.clouds.iter().map(|(view, scope, data)| {
+            let CloudData { world_from_sensor, weight, source, .. } = **data;
+            Ok(Cloud { points: view.points()?, world_from_sensor, weight, scope: *scope, source })
+        });
+        clouds.collect()
+    }
+
+    pub(crate) fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
+        depth_images(&self.images)
+    }
+
+    /// The detected persons.
+    pub(crate) fn detections(&self) -> Vec<DetectedPerson<'_>> {
+        self.detections.iter().map(|(positions, person)| DetectedPerson { positions, person: *person }).collect()
     }
 
     /// The frame of these views and of what was borrowed with them from `held`.
-    pub fn frame<'a>(
-        &'a self,
-        held: &'a PyFrame,
-        clouds: &'a [Cloud<'a>],
-        images: &'a [DepthImage<'a>],
-        colors: &'a [ColorImage<'a>],
-        detections: &'a [DetectedPerson<'a>],
-    ) -> Frame<'a> {
+    pub(crate) fn frame<'b>(
+        &'b self,
+        held: &'b PyFrame,
+        clouds: &'b [Cloud<'b>],
+        images: &'b [DepthImage<'b>],
+        colors: &'b [ColorImage<'b>],
+        detections: &'b [DetectedPerson<'b>],
+    ) -> Frame<'b> {
         Frame::empty(held.stamp)
             .with_clouds(clouds)
             .with_images(images)
@@ -187,95 +156,8 @@ impl Borrowed<'_> {
             .with_positions(&self.positions)
             .with_rays(&self.rays)
             .with_detections(detections)
-            .with_ground(self.ground)
+            .with_ground(held.ground)
             .with_excluded(&held.excluded)
-    }
-
-    /// The detected persons.
-    pub fn detections(&self) -> Vec<DetectedPerson<'_>> {
-        self.detections.iter().map(|(positions, person)| DetectedPerson { positions, person: *person }).collect()
-    }
-
-    pub fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
-        self.images
-            .iter()
-            .map(|image| {
-                let pixels = match &image.pixels {
-                    BorrowedPixels::U16(view) => DepthPixels::U16(view.as_slice()?),
-                    BorrowedPixels::F32(view) => DepthPixels::F32(view.as_slice()?),
-                };
-                let ImageView { ref camera, meters_per_unit, world_from_sensor, weight, source, .. } = *image;
-                Ok(DepthImage { pixels, camera, meters_per_unit, world_from_sensor, weight, source })
-            })
-            .collect()
-    }
-}
-
-/// The content of a `Frame`.
-#[derive(Clone, Copy)]
-pub(crate) struct Held<'a> {
-    pub clouds: &'a [CloudData],
-    pub images: &'a [ImageData],
-    pub sites: &'a [SiteData],
-    pub detections: &'a [PersonData],
-    pub ground: Option<Ground>,
-}
-
-impl Held<'_> {
-    /// Borrows the arrays and looks the names up in `body`.
-    pub(crate) fn borrow_for<'py>(self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
-        let clouds = self
-            .clouds
-            .iter()
-            .map(|cloud| {
-                let scope = match &cloud.limb {
-                    Some(name) => Scope::Limb(body.limb_index(name).map_err(|error| error.into_py(py))?),
-                    None if cloud.on_body => Scope::Body,
-                    None => Scope::Free,
-                };
-                Ok((cloud.points.view(py), cloud.world_from_sensor, cloud.weight, scope, cloud.source))
-            })
-            .collect::<PyResult<_>>()?;
-        let images = self
-            .images
-            .iter()
-            .map(|image| {
-                let pixels = match &image.pixels {
-                    DepthArray::U16(array) => BorrowedPixels::U16(array.bind(py).readonly()),
-                    DepthArray::F32(array) => BorrowedPixels::F32(array.bind(py).readonly()),
-                };
-                ImageView {
-                    pixels,
-                    camera: Arc::clone(&image.camera),
-                    meters_per_unit: image.meters_per_unit,
-                    world_from_sensor: image.world_from_sensor,
-                    weight: image.weight,
-                    source: image.source,
-                }
-            })
-            .collect();
-        let (mut positions, mut rays) = (Vec::new(), Vec::new());
-        let index = |data: &SiteData| body.site_index(&data.site).map_err(|error| error.into_py(py));
-        for data in self.sites {
-            let site = index(data)?;
-            match data.direction {
-                None => positions.push(data.relation(site)),
-                Some(direction) => rays.push(RayRelation {
-                    site,
-                    origin: data.position,
-                    direction,
-                    weight: data.weight,
-                    bias: data.bias,
-                    source: data.source,
-                }),
-            }
-        }
-        let person = |data: &PersonData| {
-            let positions = data.positions.iter().map(|data| Ok(data.relation(index(data)?)));
-            Ok((positions.collect::<PyResult<_>>()?, data.person))
-        };
-        let detections = self.detections.iter().map(person).collect::<PyResult<_>>()?;
-        Ok(Borrowed { clouds, images, positions, rays, detections, ground: self.ground })
     }
 }
 
@@ -288,7 +170,7 @@ pub(crate) struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     /// `first` is the index of the first source of the person's own measurements.
-    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed<'_>, first: u16) -> PyResult<Self> {
+    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed, first: u16) -> PyResult<Self> {
         let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
         let positions =
             own.positions.iter().map(|relation| PositionRelation { source: relation.source + first, ..*relation });

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::Lens;
-use voodoo_sensors::eye::Matrix;
+use voodoo_core::math::{Affine3, Vec3};
 
 use crate::arrays::rows;
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -15,11 +15,7 @@ type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
 #[doc = stub!("Camera")]
 #[pyclass(name = "Camera", module = "voodoo._core", frozen)]
-pub struct PyCamera {
-    pub camera: Arc<Camera>,
-    model: String,
-    coefficients: Vec<f64>,
-}
+pub struct PyCamera(Arc<Camera>);
 
 #[pymethods]
 impl PyCamera {
@@ -35,34 +31,34 @@ impl PyCamera {
         let camera = Lens::from_model(&model, &coefficients)
             .and_then(|lens| Camera::new(width, height, intrinsics, lens))
             .map_err(|error| error.into_py(py))?;
-        Ok(Self { camera: Arc::new(camera), model, coefficients })
+        Ok(Self(Arc::new(camera)))
     }
 
     fn __getnewargs__(&self) -> Arguments {
-        let ([fx, fy], [cx, cy]) = (self.camera.focal(), self.camera.center());
-        let (width, height) = (self.camera.width(), self.camera.height());
-        (width, height, [fx, fy, cx, cy], self.model.clone(), self.coefficients.clone())
+        let ([fx, fy], [cx, cy], lens) = (self.0.focal(), self.0.center(), self.0.lens());
+        let coefficients = lens.coefficients().to_vec();
+        (self.0.width(), self.0.height(), [fx, fy, cx, cy], lens.model().to_owned(), coefficients)
     }
 
     #[doc = stub!("Camera.project")]
     fn project<'py>(&self, points: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let pixel = |[x, y, z]: &[f64; 3]| {
             let before = x.is_finite() && y.is_finite() && z.is_finite() && *z > 0.0;
-            before.then(|| self.camera.pixel([x / z, y / z])).flatten().unwrap_or([f64::NAN; 2])
+            before.then(|| self.0.pixel([x / z, y / z])).flatten().unwrap_or([f64::NAN; 2])
         };
         pairs(points.py(), rows("points", &points)?.iter().map(pixel))
     }
 
     #[doc = stub!("Camera.undistorted")]
     fn undistorted<'py>(&self, pixels: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let ray = |pixel: &[f64; 2]| self.camera.ray(*pixel).unwrap_or([f64::NAN; 2]);
+        let ray = |pixel: &[f64; 2]| self.0.ray(*pixel).unwrap_or([f64::NAN; 2]);
         pairs(pixels.py(), rows("pixels", &pixels)?.iter().map(ray))
     }
 
     #[doc = stub!("Camera.rays")]
     fn rays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let rays = py.detach(|| self.camera.rays());
-        PyArray1::from_slice(py, rays.as_flattened()).reshape([self.camera.height(), self.camera.width(), 2])
+        let rays = py.detach(|| self.0.rays());
+        PyArray1::from_slice(py, rays.as_flattened()).reshape([self.0.height(), self.0.width(), 2])
     }
 }
 
@@ -74,22 +70,19 @@ fn pairs<'py>(py: Python<'py>, found: impl ExactSizeIterator<Item = [f64; 2]>) -
 /// The core's camera of a `voodoo.Camera`.
 pub(crate) fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
     let core = camera.getattr("core").ok().and_then(|core| core.cast_into::<PyCamera>().ok());
-    core.map(|core| Arc::clone(&core.get().camera)).ok_or_else(|| {
+    core.map(|core| Arc::clone(&core.get().0)).ok_or_else(|| {
         let found = camera.get_type().name().map_or_else(|_| "something else".into(), |name| name.to_string());
         let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
         exception(camera.py(), "MeasurementError", text)
     })
 }
 
-/// The rows of a 4x4 array.
-pub(crate) fn rows_of(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix> {
-    let entries: Option<[f64; 16]> = (value.dims() == numpy::Ix2(4, 4)).then(|| {
-        let mut entries = value.as_array().iter().copied().collect::<Vec<_>>();
-        entries.resize(16, 0.0);
-        <[f64; 16]>::try_from(entries).unwrap_or_default()
-    });
-    match entries {
-        Some(entries) => Ok([0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| entries[4 * row + column]))),
-        None => Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any())),
+/// The transform of a 4x4 array.
+pub(crate) fn affine(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Affine3> {
+    if value.dims() != numpy::Ix2(4, 4) {
+        return Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any()));
     }
+    let entries = value.as_array();
+    let column = |column: usize| Vec3::new(entries[[0, column]], entries[[1, column]], entries[[2, column]]);
+    Ok(Affine3::from_cols(column(0), column(1), column(2), column(3)))
 }

@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use voodoo_core::HumanModel;
 use voodoo_core::math::{Pose, Vec3};
-use voodoo_core::{Body, Frame};
+use voodoo_core::{Body, Camera, Frame};
 use voodoo_core::{DepthImage, DepthPixels, Ground};
-use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_core::{Detect, DetectError, Detection, DetectionQuery, Surroundings};
 use voodoo_detect::crop::SIZE;
 use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
 use crate::arrays::{contiguous, vector};
+use crate::borrowed::depth_images;
 use crate::camera::camera_of;
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::frame::PyFrame;
@@ -44,35 +45,31 @@ impl PyDetector {
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
         let any = Body::human(1.75, HumanModel::Full).map_err(|error| error.into_py(py))?;
-        let borrowed = frame.borrow_images(py, &any)?;
-        let images = borrowed.images()?;
+        let views = frame.depth_views(py);
+        let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
         input.check(&any, None).map_err(|error| error.into_py(py))?;
-        let up = match up {
-            Some(up) => Some(
-                vector("up", up)?
-                    .try_normalize()
-                    .ok_or_else(|| wrong_argument(py, "up", "a vector that is not zero", up))?,
-            ),
-            None => None,
+        let direction = |up: &Bound<'_, PyAny>| {
+            let wrong = || wrong_argument(py, "up", "a vector that is not zero", up);
+            vector("up", up)?.try_normalize().ok_or_else(wrong)
         };
+        let up = up.map(direction).transpose()?;
         let detector = &mut self.0;
         let found = py.detach(|| {
-            let mut found: Vec<PyDetection> = Vec::new();
+            let mut found: Vec<(Detection, &DepthImage)> = Vec::new();
             for image in &images {
                 let around =
                     Surroundings { ground: input.ground, up, excluded: input.excluded, ..Surroundings::default() };
-                for detection in detector.detect(image, &around, DetectionQuery::All)? {
-                    let source = frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
-                    found.push(PyDetection { detection, size: [image.camera.height(), image.camera.width()], source });
-                }
+                let persons = detector.detect(image, &around, DetectionQuery::All)?;
+                found.extend(persons.into_iter().map(|detection| (detection, image)));
             }
             Ok::<_, DetectError>(found)
         });
         let mut found = found.map_err(|error| exception(py, "MeasurementError", error.to_string()))?;
-        found.sort_by(|a, b| b.detection.person.total_cmp(&a.detection.person));
-        Ok(found)
+        found.sort_by(|(a, _), (b, _)| b.person.total_cmp(&a.person));
+        let source = |image: &DepthImage| frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
+        found.iter().map(|(detection, image)| PyDetection::new(py, detection, image, source(image))).collect()
     }
 
     fn __repr__(&self) -> String {
@@ -82,10 +79,40 @@ impl PyDetector {
 
 #[doc = stub!("Detection")]
 #[pyclass(name = "Detection", module = "voodoo", frozen)]
-pub struct PyDetection {
-    detection: Detection,
-    size: [usize; 2],
+pub(crate) struct PyDetection {
+    #[doc = stub!("Detection.joints")]
+    #[pyo3(get)]
+    joints: Py<PyDict>,
+    #[doc = stub!("Detection.joint_sigma")]
+    #[pyo3(get)]
+    joint_sigma: Py<PyDict>,
+    #[doc = stub!("Detection.visible")]
+    #[pyo3(get)]
+    visible: Py<PyDict>,
+    #[doc = stub!("Detection.lengths")]
+    #[pyo3(get)]
+    lengths: Py<PyDict>,
+    #[doc = stub!("Detection.length_sigma")]
+    #[pyo3(get)]
+    length_sigma: Py<PyDict>,
+    #[doc = stub!("Detection.stature")]
+    #[pyo3(get)]
+    stature: f64,
+    #[doc = stub!("Detection.facing")]
+    #[pyo3(get)]
+    facing: f64,
+    #[doc = stub!("Detection.confidence")]
+    #[pyo3(get)]
+    confidence: f64,
+    #[doc = stub!("Detection.source")]
+    #[pyo3(get)]
     source: String,
+    #[doc = stub!("Detection.mask")]
+    #[pyo3(get)]
+    mask: Py<PyArray2<bool>>,
+    #[doc = stub!("Detection.floor")]
+    #[pyo3(get)]
+    floor: Option<([f64; 3], f64)>,
 }
 
 /// Converts log odds to a probability.
@@ -93,118 +120,52 @@ fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-impl PyDetection {
-    fn of_joints<'py, T: IntoPyObject<'py>>(
-        &self,
-        py: Python<'py>,
-        value: impl Fn(&DetectedJoint) -> T,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for (name, joint) in JOINTS.iter().zip(self.detection.joints.iter().flatten()) {
-            dict.set_item(name, value(joint))?;
-        }
-        Ok(dict)
-    }
+/// An image of the pixels with these indices, as a mask.
+fn mask(py: Python<'_>, camera: &Camera, pixels: &[usize]) -> PyResult<Py<PyArray2<bool>>> {
+    let mut mask = vec![false; camera.pixels()];
+    pixels.iter().for_each(|pixel| mask[*pixel] = true);
+    Ok(PyArray1::from_vec(py, mask).reshape([camera.height(), camera.width()])?.unbind())
+}
 
-    fn of_lengths<'py>(&self, py: Python<'py>, value: impl Fn([f64; 2]) -> f64) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for (name, length) in LENGTHS.iter().zip(&self.detection.lengths) {
-            dict.set_item(name, value(*length))?;
-        }
-        Ok(dict)
+impl PyDetection {
+    fn new(py: Python<'_>, found: &Detection, image: &DepthImage, source: String) -> PyResult<Self> {
+        let joints = || JOINTS.iter().zip(found.joints.iter().flatten());
+        let lengths = || LENGTHS.iter().zip(&found.lengths);
+        let positions = joints().map(|(name, joint)| (name, PyArray1::from_slice(py, &joint.position.to_array())));
+        Ok(Self {
+            joints: positions.into_py_dict(py)?.unbind(),
+            joint_sigma: joints().map(|(name, joint)| (name, joint.sigma)).into_py_dict(py)?.unbind(),
+            visible: joints().map(|(name, joint)| (name, joint.visible)).into_py_dict(py)?.unbind(),
+            lengths: lengths().map(|(name, [length, _])| (name, *length)).into_py_dict(py)?.unbind(),
+            length_sigma: lengths().map(|(name, [length, part])| (name, length * part)).into_py_dict(py)?.unbind(),
+            stature: found.lengths.last().map_or(f64::NAN, |length| length[0]),
+            facing: probability(found.facing.unwrap_or(0.0)),
+            confidence: probability(found.person),
+            source,
+            mask: mask(py, image.camera, &found.pixels)?,
+            floor: found.floor.map(|floor| (floor.normal.to_array(), floor.offset)),
+        })
     }
 }
 
 #[pymethods]
 impl PyDetection {
-    #[doc = stub!("Detection.joints")]
-    #[getter]
-    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.of_joints(py, |joint| PyArray1::from_slice(py, &joint.position.to_array()))
-    }
-
-    #[doc = stub!("Detection.joint_sigma")]
-    #[getter]
-    fn joint_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.of_joints(py, |joint| joint.sigma)
-    }
-
-    #[doc = stub!("Detection.visible")]
-    #[getter]
-    fn visible<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.of_joints(py, |joint| joint.visible)
-    }
-
-    #[doc = stub!("Detection.lengths")]
-    #[getter]
-    fn lengths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.of_lengths(py, |[length, _]| length)
-    }
-
-    #[doc = stub!("Detection.length_sigma")]
-    #[getter]
-    fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.of_lengths(py, |[length, relative]| length * relative)
-    }
-
-    #[doc = stub!("Detection.stature")]
-    #[getter]
-    fn stature(&self) -> f64 {
-        self.detection.lengths.last().map_or(f64::NAN, |length| length[0])
-    }
-
-    #[doc = stub!("Detection.facing")]
-    #[getter]
-    fn facing(&self) -> f64 {
-        probability(self.detection.facing.unwrap_or(0.0))
-    }
-
-    #[doc = stub!("Detection.confidence")]
-    #[getter]
-    fn confidence(&self) -> f64 {
-        probability(self.detection.person)
-    }
-
-    #[doc = stub!("Detection.source")]
-    #[getter]
-    fn source(&self) -> &str {
-        &self.source
-    }
-
-    #[doc = stub!("Detection.mask")]
-    #[getter]
-    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        let mut mask = vec![false; self.size[0] * self.size[1]];
-        self.detection.pixels.iter().for_each(|pixel| mask[*pixel] = true);
-        PyArray1::from_vec(py, mask).reshape(self.size)
-    }
-
-    #[doc = stub!("Detection.floor")]
-    #[getter]
-    fn floor(&self) -> Option<([f64; 3], f64)> {
-        self.detection.floor.map(|floor| (floor.normal.to_array(), floor.offset))
-    }
-
     fn __repr__(&self) -> String {
-        let Detection { joints, .. } = &self.detection;
-        let at = joints.get(2).copied().flatten().map_or([f64::NAN; 3], |root| root.position.to_array());
         format!(
-            "Detection(source={:?}, confidence={:.2}, facing={:.2}, stature={:.2}, humanoid_root=({:.2}, {:.2}, {:.2}))",
-            self.source,
-            self.confidence(),
-            self.facing(),
-            self.stature(),
-            at[0],
-            at[1],
-            at[2],
+            "Detection(source={:?}, confidence={:.2}, facing={:.2}, stature={:.2})",
+            self.source, self.confidence, self.facing, self.stature
         )
     }
 }
 
 #[doc = stub!("PersonCandidate")]
 #[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen)]
-pub struct PyCandidate {
+pub(crate) struct PyCandidate {
+    #[doc = stub!("PersonCandidate.crop")]
+    #[pyo3(get)]
     crop: Py<PyArray3<f32>>,
+    #[doc = stub!("PersonCandidate.mask")]
+    #[pyo3(get)]
     mask: Py<PyArray2<bool>>,
     #[doc = stub!("PersonCandidate.middle")]
     #[pyo3(get)]
@@ -218,21 +179,6 @@ pub struct PyCandidate {
     #[doc = stub!("PersonCandidate.floor")]
     #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
-}
-
-#[pymethods]
-impl PyCandidate {
-    #[doc = stub!("PersonCandidate.crop")]
-    #[getter]
-    fn crop(&self, py: Python<'_>) -> Py<PyArray3<f32>> {
-        self.crop.clone_ref(py)
-    }
-
-    #[doc = stub!("PersonCandidate.mask")]
-    #[getter]
-    fn mask(&self, py: Python<'_>) -> Py<PyArray2<bool>> {
-        self.mask.clone_ref(py)
-    }
 }
 
 #[doc = stub!("person_candidates")]
@@ -272,13 +218,11 @@ pub(crate) fn person_candidates<'py>(
     let (mut found, mut pixels) = (Vec::new(), Vec::new());
     for candidate in segmentation.candidates().iter().take(most) {
         let Some(crop) = segmentation.crop(candidate) else { continue };
-        let mut mask = vec![false; width * height];
         segmentation.mask(candidate, &mut pixels);
-        pixels.iter().for_each(|pixel| mask[*pixel] = true);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
         found.push(PyCandidate {
             crop: PyArray1::from_vec(py, channels).reshape([2, SIZE, SIZE])?.unbind(),
-            mask: PyArray1::from_vec(py, mask).reshape([height, width])?.unbind(),
+            mask: mask(py, &camera, &pixels)?,
             middle: crop.middle,
             roll: crop.roll,
             area: candidate.area,

@@ -8,11 +8,11 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple};
-use voodoo_core::math::Vec3;
+use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
-use crate::arrays::{contiguous, matrix, vector};
+use crate::arrays::{contiguous, vector};
 use crate::errors::{exception, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
@@ -219,22 +219,20 @@ fn mapping<'py, T>(person: &Bound<'py, PyAny>, attribute: &str) -> PyResult<Hash
 where
     T: for<'a> FromPyObject<'a, 'py>,
 {
-    let Some(found) = person.getattr_opt(attribute)?.filter(|found| !found.is_none()) else {
-        return Ok(HashMap::new());
-    };
-    let pairs = found.call_method0("items").and_then(|items| items.try_iter()?.collect::<PyResult<Vec<_>>>());
-    let entry = |pair: &Bound<'py, PyAny>| -> PyResult<(String, T)> {
-        let value = pair.get_item(1)?.extract::<T>().map_err(Into::into)?;
-        Ok((pair.get_item(0)?.extract()?, value))
-    };
-    pairs
-        .and_then(|pairs| pairs.iter().map(entry).collect())
-        .map_err(|_| wrong_argument(person.py(), attribute, "a mapping from names", &found))
+    let Some(found) = given(person, attribute)? else { return Ok(HashMap::new()) };
+    let pairs = found.py().get_type::<PyDict>().call1((&found,));
+    let found_pairs = pairs.and_then(|pairs| pairs.extract());
+    found_pairs.map_err(|_| wrong_argument(person.py(), attribute, "a mapping from names", &found))
+}
+
+/// An attribute; none where it is missing or None.
+fn given<'py>(person: &Bound<'py, PyAny>, attribute: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+    Ok(person.getattr_opt(attribute)?.filter(|found| !found.is_none()))
 }
 
 /// An attribute that is one number, or a mapping with one for every joint.
 fn of_each(person: &Bound<'_, PyAny>, attribute: &str, default: f64) -> PyResult<impl Fn(&str) -> f64> {
-    let found = person.getattr_opt(attribute)?.filter(|found| !found.is_none());
+    let found = given(person, attribute)?;
     let one = found.as_ref().map_or(Some(default), |found| found.extract::<f64>().ok());
     let each: HashMap<String, f64> = if one.is_some() { HashMap::new() } else { mapping(person, attribute)? };
     Ok(move |name: &str| one.or_else(|| each.get(name).copied()).unwrap_or(default))
@@ -242,7 +240,7 @@ fn of_each(person: &Bound<'_, PyAny>, attribute: &str, default: f64) -> PyResult
 
 /// Log odds of an attribute that is a probability, or None.
 fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>> {
-    let Some(found) = person.getattr_opt(attribute)?.filter(|found| !found.is_none()) else { return Ok(None) };
+    let Some(found) = given(person, attribute)? else { return Ok(None) };
     let probability = found.extract::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
     let probability = probability
         .ok_or_else(|| wrong_argument(person.py(), attribute, "a probability, from 0 to 1", &found))?
@@ -252,7 +250,7 @@ fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>>
 
 /// The attribute `floor`: normal and offset, or None.
 fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
-    let Some(found) = person.getattr_opt("floor")?.filter(|found| !found.is_none()) else { return Ok(None) };
+    let Some(found) = given(person, "floor")? else { return Ok(None) };
     let wrong = |_| wrong_argument(person.py(), "floor", "a unit normal and an offset in meters", &found);
     let (normal, offset): (Bound<'_, PyAny>, f64) = found.extract().map_err(wrong)?;
     let normal: Vec3 = vector("floor[0]", &normal)?;
@@ -261,7 +259,7 @@ fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
 
 /// The attribute `mask` (height, width) bool, as indices; none where it is missing or None.
 fn pixels(person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Vec<usize>> {
-    let Some(found) = person.getattr_opt("mask")?.filter(|found| !found.is_none()) else { return Ok(Vec::new()) };
+    let Some(found) = given(person, "mask")? else { return Ok(Vec::new()) };
     let array = contiguous(&found).ok().and_then(|array| array.cast_into::<PyArray2<bool>>().ok());
     let [height, width] = [image.camera.height(), image.camera.width()];
     let array = array.filter(|array| array.shape() == [height, width]).ok_or_else(|| {

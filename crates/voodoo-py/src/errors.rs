@@ -1,5 +1,7 @@
 //! Core errors become the exceptions of `voodoo.errors`.
 
+use std::fmt::Display;
+
 use pyo3::prelude::*;
 use voodoo_core::ShapeError;
 use voodoo_core::{BodyError, CameraError, ConfigError, TrackError};
@@ -14,41 +16,40 @@ pub(crate) fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
 }
 
 /// Translation of a core error; a trait because both types are foreign here.
-pub(crate) trait IntoPy {
-    fn into_py(self, py: Python<'_>) -> PyErr;
+pub(crate) trait IntoPy: Display + Sized {
+    /// Its class in `voodoo.errors`.
+    const CLASS: &'static str;
+
+    fn class(&self) -> &'static str {
+        Self::CLASS
+    }
+
+    fn into_py(self, py: Python<'_>) -> PyErr {
+        exception(py, self.class(), self.to_string())
+    }
 }
 
 impl IntoPy for BodyError {
-    fn into_py(self, py: Python<'_>) -> PyErr {
-        exception(py, "BodyError", self.to_string())
-    }
+    const CLASS: &'static str = "BodyError";
 }
 
 impl IntoPy for CameraError {
-    fn into_py(self, py: Python<'_>) -> PyErr {
-        exception(py, "CameraError", self.to_string())
-    }
+    const CLASS: &'static str = "CameraError";
 }
 
 impl IntoPy for ShapeError {
-    fn into_py(self, py: Python<'_>) -> PyErr {
-        exception(py, "BodyError", self.to_string())
-    }
+    const CLASS: &'static str = "BodyError";
 }
 
 impl IntoPy for ConfigError {
-    fn into_py(self, py: Python<'_>) -> PyErr {
-        exception(py, "ConfigError", self.to_string())
-    }
+    const CLASS: &'static str = "ConfigError";
 }
 
 impl IntoPy for TrackError {
-    fn into_py(self, py: Python<'_>) -> PyErr {
-        let class = match self {
-            Self::Body(_) => "BodyError",
-            _ => "MeasurementError",
-        };
-        exception(py, class, self.to_string())
+    const CLASS: &'static str = "MeasurementError";
+
+    fn class(&self) -> &'static str {
+        if matches!(self, Self::Body(_)) { BodyError::CLASS } else { Self::CLASS }
     }
 }
 

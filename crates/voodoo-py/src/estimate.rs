@@ -6,12 +6,12 @@ use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
+use pythonize::{depythonize, pythonize};
 use voodoo_core::Body;
-use voodoo_core::Covariances;
-use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
-use voodoo_core::{Estimate, LimbStatus, SourceReport, Status};
+use voodoo_core::Estimate;
+use voodoo_core::math::{Mat3, Vec3};
 
-use crate::arrays::frozen;
+use crate::arrays::{frozen, matrices};
 use crate::errors::exception;
 
 /// The names for the numbers of an estimate; shared by all estimates of one body.
@@ -71,79 +71,30 @@ fn rows<'py, 'a>(
     Ok(PyMappingProxy::new(all.py(), dict.as_mapping()))
 }
 
-/// Stamp, status, mean squared distance, steps.
-type Head = (f64, String, f64, usize);
-/// Of limbs, sites, joints and sources.
-type AllNames = (Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
-/// Status and poses (position, quaternion) of limbs, sites, points and residuals of limbs, gaps of joints, reports of sources.
-type PoseParts = (
-    Vec<String>,
-    Vec<([f64; 3], [f64; 4])>,
-    Vec<[f64; 3]>,
-    Vec<usize>,
-    Vec<f64>,
-    Vec<f64>,
-    Vec<(usize, usize, f64, f64)>,
-);
-
-/// Covariances of sites (nine numbers each), limbs (36) and joints (nine); standard deviations of lengths and girths.
-type SpreadParts = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>);
-
-/// All of an estimate.
-type Kept = (Head, AllNames, PoseParts, SpreadParts);
-
-fn spread_of(found: &Covariances) -> SpreadParts {
-    let flat = |all: &[Mat3]| all.iter().flat_map(Mat3::to_cols_array).collect();
-    let limbs = found.limbs.iter().flatten().flatten().copied().collect();
-    (flat(&found.sites), limbs, flat(&found.turns), found.lengths.clone(), found.girths.clone())
-}
-
-fn covariances((sites, limbs, turns, lengths, girths): SpreadParts) -> Covariances {
-    let matrices = |flat: &[f64]| flat.as_chunks::<9>().0.iter().map(Mat3::from_cols_array).collect();
-    let limb = |flat: &[f64; 36]| std::array::from_fn(|row| std::array::from_fn(|column| flat[6 * row + column]));
-    Covariances {
-        sites: matrices(&sites),
-        limbs: limbs.as_chunks::<36>().0.iter().map(limb).collect(),
-        turns: matrices(&turns),
-        lengths,
-        girths,
-    }
-}
+/// The arguments of [`_estimate`]: the estimate as plain Python, and the names of limbs, sites, joints and sources.
+type Plain<'py> = (Bound<'py, PyAny>, Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
 
 #[doc = stub!("_estimate")]
 #[pyfunction]
-#[pyo3(signature = (head, names, found, spread=None))]
 pub(crate) fn _estimate(
-    py: Python<'_>,
-    head: Head,
-    names: AllNames,
-    found: PoseParts,
-    spread: Option<SpreadParts>,
+    found: &Bound<'_, PyAny>,
+    limbs: Vec<String>,
+    sites: Vec<String>,
+    joints: Vec<Option<String>>,
+    sources: Vec<String>,
 ) -> PyResult<PyEstimate> {
-    let wrong = |word: &str| exception(py, "MeasurementError", format!("estimate: found the unknown status {word:?}"));
-    let (stamp, status, mean_squared_distance, steps) = head;
-    let (limbs, sites, joints, sources) = names;
-    let (limb_status, poses, places, limb_points, limb_residual, joint_gaps, reports) = found;
-    let limb_of = |word: &String| LimbStatus::ALL.iter().find(|status| status.name() == word).copied();
-    let report = |(count, inliers, weight, residual)| {
-        let mut report = SourceReport::default();
-        (report.count, report.inliers, report.weight, report.residual) = (count, inliers, weight, residual);
-        report
-    };
-    let mut estimate = Estimate::default();
-    (estimate.stamp, estimate.mean_squared_distance, estimate.steps) = (stamp, mean_squared_distance, steps);
-    estimate.status = Status::ALL.iter().find(|known| known.name() == status).copied().ok_or_else(|| wrong(&status))?;
-    estimate.limb_status =
-        limb_status.iter().map(|word| limb_of(word).ok_or_else(|| wrong(word))).collect::<PyResult<_>>()?;
-    estimate.world_from_limb = poses
-        .into_iter()
-        .map(|(position, rotation)| Pose::from_parts(Vec3::from_array(position), Quat::from_array(rotation)))
-        .collect();
-    estimate.sites = places.into_iter().map(Vec3::from_array).collect();
-    (estimate.limb_points, estimate.limb_residual, estimate.joint_gaps) = (limb_points, limb_residual, joint_gaps);
-    estimate.sources = reports.into_iter().map(report).collect();
-    estimate.covariances = spread.map(covariances).unwrap_or_default();
+    let estimate = depythonize(found).map_err(|error| {
+        exception(found.py(), "MeasurementError", format!("estimate: expected a pickled one, {error}"))
+    })?;
     Ok(PyEstimate { estimate, names: Arc::new(Names::new(limbs, sites, joints)), sources })
+}
+
+#[doc = stub!("_nobody")]
+#[pyfunction]
+pub(crate) fn _nobody(stamp: f64) -> PyEstimate {
+    let mut estimate = Estimate::default();
+    estimate.stamp = stamp;
+    PyEstimate { estimate, names: Arc::new(Names::new(Vec::new(), Vec::new(), Vec::new())), sources: Vec::new() }
 }
 
 #[pymethods]
@@ -207,30 +158,25 @@ impl PyEstimate {
     #[doc = stub!("Estimate.limb_poses")]
     #[getter]
     fn limb_poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
-        let poses = &self.estimate.world_from_limb;
-        frozen(
-            py,
-            poses.iter().flat_map(|pose| voodoo_core::math::matrix(pose).into_iter().flatten()).collect(),
-            &[poses.len(), 4, 4],
-        )
+        matrices(py, &self.estimate.world_from_limb)
     }
 
     #[doc = stub!("Estimate.joints")]
     #[getter]
-    fn joints<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&slf.get().names.sites, &slf.get().joint_positions(slf.py())?)
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        rows(&self.names.sites, &self.joint_positions(py)?)
     }
 
     #[doc = stub!("Estimate.world_from_limb")]
     #[getter]
-    fn world_from_limb<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&slf.get().names.limbs, &slf.get().limb_poses(slf.py())?)
+    fn world_from_limb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        rows(&self.names.limbs, &self.limb_poses(py)?)
     }
 
     #[doc = stub!("Estimate.covariance")]
     #[getter]
-    fn covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        rows(&slf.get().names.sites, &slf.get().joint_covariances(slf.py())?)
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        rows(&self.names.sites, &self.joint_covariances(py)?)
     }
 
     #[doc = stub!("Estimate.joint_covariances")]
@@ -242,18 +188,18 @@ impl PyEstimate {
 
     #[doc = stub!("Estimate.joint_sigma")]
     #[getter]
-    fn joint_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (this, sites) = (slf.get(), &slf.get().estimate.covariances.sites);
+    fn joint_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let sites = &self.estimate.covariances.sites;
         let sigma = sites.iter().flat_map(|covariance| (0..3).map(|axis| covariance.col(axis)[axis].sqrt()));
-        rows(&this.names.sites, &frozen(slf.py(), sigma.collect(), &[sites.len(), 3])?)
+        rows(&self.names.sites, &frozen(py, sigma.collect(), &[sites.len(), 3])?)
     }
 
     #[doc = stub!("Estimate.limb_covariance")]
     #[getter]
-    fn limb_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let (this, limbs) = (slf.get(), &slf.get().estimate.covariances.limbs);
+    fn limb_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let limbs = &self.estimate.covariances.limbs;
         let all = limbs.iter().flatten().flatten().copied().collect();
-        rows(&this.names.limbs, &frozen(slf.py(), all, &[limbs.len(), 6, 6])?)
+        rows(&self.names.limbs, &frozen(py, all, &[limbs.len(), 6, 6])?)
     }
 
     #[doc = stub!("Estimate.root_covariance")]
@@ -265,80 +211,62 @@ impl PyEstimate {
 
     #[doc = stub!("Estimate.angle_covariance")]
     #[getter]
-    fn angle_covariance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        let turns = this.names.joints.iter().zip(&this.estimate.covariances.turns);
+    fn angle_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let turns = self.names.joints.iter().zip(&self.estimate.covariances.turns);
         let (names, turns): (Vec<_>, Vec<_>) = turns.filter_map(|(name, turn)| Some((name.as_ref()?, turn))).unzip();
         // Symmetric: columns are rows.
         let all = turns.iter().flat_map(|turn: &&Mat3| turn.to_cols_array()).collect();
-        rows(names, &frozen(slf.py(), all, &[turns.len(), 3, 3])?)
+        rows(names, &frozen(py, all, &[turns.len(), 3, 3])?)
     }
 
     #[doc = stub!("Estimate.length_sigma")]
     #[getter]
-    fn length_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.lengths.iter().copied()))
+    fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.covariances.lengths.iter().copied()))
     }
 
     #[doc = stub!("Estimate.girth_sigma")]
     #[getter]
-    fn girth_sigma<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.covariances.girths.iter().copied()))
+    fn girth_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.covariances.girths.iter().copied()))
     }
 
     #[doc = stub!("Estimate.limb_points")]
     #[getter]
-    fn limb_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_points.iter().copied()))
+    fn limb_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_points.iter().copied()))
     }
 
     #[doc = stub!("Estimate.limb_residual")]
     #[getter]
-    fn limb_residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        mapping(slf.py(), this.names.limbs.iter().zip(this.estimate.limb_residual.iter().copied()))
+    fn limb_residual<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_residual.iter().copied()))
     }
 
     #[doc = stub!("Estimate.joint_gaps")]
     #[getter]
-    fn joint_gaps<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        let gaps = this.names.joints.iter().zip(&this.estimate.joint_gaps);
-        mapping(slf.py(), gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
+    fn joint_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let gaps = self.names.joints.iter().zip(&self.estimate.joint_gaps);
+        mapping(py, gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
     }
 
     #[doc = stub!("Estimate.sources")]
     #[getter]
-    fn sources<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let this = slf.get();
-        let reports = this.sources.iter().enumerate().map(|(index, name)| {
-            let report = this.estimate.sources.get(index).copied().unwrap_or_default();
+    fn sources<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        let reports = self.sources.iter().enumerate().map(|(index, name)| {
+            let report = self.estimate.sources.get(index).copied().unwrap_or_default();
             let residual = if report.inliers > 0 { report.residual } else { f64::NAN };
             (name, (report.count, report.inliers, residual))
         });
-        mapping(slf.py(), reports)
+        mapping(py, reports)
     }
 
     /// For pickle and copy.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
-        let (found, names) = (&self.estimate, &*self.names);
-        let pose = |pose: &Pose| (pose.translation.to_array(), pose.rotation.to_array());
-        let source = |report: &SourceReport| (report.count, report.inliers, report.weight, report.residual);
-        let head = (found.stamp, self.status().to_owned(), found.mean_squared_distance, found.steps);
-        let all = (names.limbs.clone(), names.sites.clone(), names.joints.clone(), self.sources.clone());
-        let rest = (
-            found.limb_status.iter().map(|status| status.name().to_owned()).collect(),
-            found.world_from_limb.iter().map(pose).collect(),
-            found.sites.iter().map(Vec3::to_array).collect(),
-            found.limb_points.clone(),
-            found.limb_residual.clone(),
-            found.joint_gaps.clone(),
-            found.sources.iter().map(source).collect(),
-        );
-        Ok((py.import("voodoo._core")?.getattr("_estimate")?, (head, all, rest, spread_of(&found.covariances))))
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Plain<'py>)> {
+        let Names { limbs, sites, joints, .. } = &*self.names;
+        let found = pythonize(py, &self.estimate)?;
+        let plain = (found, limbs.clone(), sites.clone(), joints.clone(), self.sources.clone());
+        Ok((py.import("voodoo._core")?.getattr("_estimate")?, plain))
     }
 
     pub fn __repr__(&self) -> String {

@@ -1,17 +1,14 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
-use numpy::{PyArray2, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Body;
 use voodoo_core::Ground;
 use voodoo_core::math::{Aabb, Vec3};
 
 use crate::arguments;
-use crate::arrays::{PointArray, contiguous, pose, unmasked, vector};
-use crate::borrowed::{
-    Borrowed, CloudData, ColorArray, ColorData, ColorView, DepthArray, Held, ImageData, PersonData, SiteData,
-};
+use crate::arrays::{ColorArray, DepthArray, PointArray, pose, unmasked, vector, wrong_array};
+use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, SiteData, number};
 use crate::camera::camera_of;
 use crate::errors::{exception, wrong_argument};
 use crate::sites::PySiteRay;
@@ -26,36 +23,26 @@ pub struct PyFrame {
     pub(crate) images: Vec<ImageData>,
     pub(crate) colors: Vec<ColorData>,
     pub(crate) sites: Vec<SiteData>,
-    pub(crate) detections: Vec<PersonData>,
+    /// Positions of the sites of persons who were found in this instant, and log odds.
+    pub(crate) detections: Vec<(Vec<SiteData>, f64)>,
     pub(crate) ground: Option<Ground>,
     pub(crate) excluded: Vec<Aabb>,
     pub sources: Vec<String>,
 }
 
 impl PyFrame {
-    /// Borrows the arrays and looks the names up in `body`.
-    pub fn borrow_for<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
-        let Self { clouds, images, sites, detections, ground, .. } = self;
-        Held { clouds, images, sites, detections, ground: *ground }.borrow_for(py, body)
-    }
-
-    /// Borrows the depth images alone.
-    pub fn borrow_images<'py>(&self, py: Python<'py>, body: &Body) -> PyResult<Borrowed<'py>> {
-        Held { clouds: &[], images: &self.images, sites: &[], detections: &[], ground: self.ground }
-            .borrow_for(py, body)
+    /// Borrows the depth images.
+    pub(crate) fn depth_views<'py>(&self, py: Python<'py>) -> DepthViews<'py, '_> {
+        self.images.iter().map(|data| (data.pixels.view(py), data)).collect()
     }
 
     /// Borrows the color images.
-    pub fn color_views<'py>(&self, py: Python<'py>) -> Vec<ColorView<'py, '_>> {
-        self.colors.iter().map(|data| data.view(py)).collect()
+    pub(crate) fn color_views<'py>(&self, py: Python<'py>) -> ColorViews<'py, '_> {
+        self.colors.iter().map(|data| (data.pixels.view(py), data)).collect()
     }
 
     fn source(&mut self, name: &str) -> u16 {
-        let index = self.sources.iter().position(|known| known == name).unwrap_or_else(|| {
-            self.sources.push(name.to_owned());
-            self.sources.len() - 1
-        });
-        index as u16
+        number(&mut self.sources, name)
     }
 }
 
@@ -104,33 +91,16 @@ impl PyFrame {
     ) -> PyResult<()> {
         let camera = camera_of(camera)?;
         let [height, width] = [camera.height(), camera.width()];
-        let py = image.py();
-        let wrong = || {
-            let found = match image.cast::<PyUntypedArray>() {
-                Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
-                Err(_) => image.get_type().to_string(),
-            };
-            exception(
-                py,
-                "MeasurementError",
-                format!("image: expected an array of shape (height, width) and dtype uint16 or float32, found {found}"),
-            )
-        };
-        let array = contiguous(image).map_err(|_| wrong())?;
+        let wrong = || wrong_array("image", "shape (height, width) and dtype uint16 or float32", image);
+        let array = image.cast::<PyUntypedArray>().map_err(|_| wrong())?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
-        let (pixels, size) = if let Ok(array) = array.cast::<PyArray2<u16>>() {
-            (DepthArray::U16(array.clone().unbind()), array.dims())
-        } else if let Ok(array) = array.cast::<PyArray2<f32>>() {
-            (DepthArray::F32(array.clone().unbind()), array.dims())
-        } else {
-            return Err(wrong());
-        };
-        if [size[0], size[1]] != [height, width] {
+        let pixels = DepthArray::cast(image).ok_or_else(wrong)?;
+        if array.shape() != [height, width] {
             let text = format!(
-                "image: expected {height} rows of {width} pixels, as its camera has, found shape [{}, {}]",
-                size[0], size[1]
+                "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",
+                array.shape()
             );
-            return Err(exception(py, "MeasurementError", text));
+            return Err(exception(image.py(), "MeasurementError", text));
         }
         let data = ImageData {
             pixels,
@@ -182,15 +152,8 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
-        let data = SiteData {
-            site,
-            position: vector("position", position)?,
-            direction: None,
-            weight,
-            bias,
-            source: self.source(source),
-        };
-        self.sites.push(data);
+        let (position, source) = (vector("position", position)?, self.source(source));
+        self.sites.push(SiteData { site, position, direction: None, weight, bias, source });
         Ok(())
     }
 
@@ -205,15 +168,9 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
-        let data = SiteData {
-            site,
-            position: vector("origin", origin)?,
-            direction: Some(vector("direction", direction)?),
-            weight,
-            bias,
-            source: self.source(source),
-        };
-        self.sites.push(data);
+        let (position, direction) = (vector("origin", origin)?, Some(vector("direction", direction)?));
+        let source = self.source(source);
+        self.sites.push(SiteData { site, position, direction, weight, bias, source });
         Ok(())
     }
 
@@ -233,7 +190,7 @@ impl PyFrame {
             Ok(SiteData { site, position, direction: None, weight, bias: 0.0, source })
         };
         let positions = joints.iter().map(position).collect::<PyResult<_>>()?;
-        self.detections.push(PersonData { positions, person: log_odds });
+        self.detections.push((positions, log_odds));
         Ok(())
     }
 

@@ -1,22 +1,24 @@
 //! `Chain` of inverse kinematics; `voodoo.ik` validates and names inputs and outputs.
 
-use numpy::{PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArrayDyn, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
 use voodoo_core::math::Vec3;
 use voodoo_ik::{
-    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SolverOptions, Trunk,
+    self, Aim, Bone, Carrier, ChainModel, Criterion, Goal, IkSolver, Kinematics, Rest, Root, SilhouetteView,
+    SolverOptions, Trunk,
 };
 
-use crate::arrays::{frozen, limb_poses, pose};
+use crate::arrays::{frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
 use crate::errors::{IntoPy, exception};
 use crate::ik_view::PyView;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
-/// angles, poses, sites, residuals, steps, converged, h
-type Solved<'py> = (Array<'py>, Array<'py>, Array<'py>, Bound<'py, PyTuple>, usize, bool, f64);
+/// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, each `(N,)`; and
+/// of the last posture, poses `(P, 4, 4)` and the residual of every goal.
+type Solved<'py> = (Array<'py>, Array<'py>, Vec<Array<'py>>, Array<'py>, Bound<'py, PyTuple>);
 /// site, "position" or "line", position or (direction, moment), weight, level
 type GoalParts = (String, String, [f64; 6], f64, usize);
 /// site, site, radius
@@ -65,20 +67,12 @@ impl PyChain {
             .collect()
     }
 
-    fn segments(&self, py: Python<'_>, parts: &[SegmentParts]) -> PyResult<Vec<Bone>> {
-        parts
-            .iter()
-            .map(|(a, b, radius)| {
-                Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
-            })
-            .collect()
-    }
-
     fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
-        match parts {
-            Some(parts) => self.segments(py, &parts),
-            None => Ok(voodoo_ik::bones(&self.body, &self.model, margin)),
-        }
+        let Some(parts) = parts else { return Ok(voodoo_ik::bones(&self.body, &self.model, margin)) };
+        let bone = |(a, b, radius): &SegmentParts| {
+            Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+        };
+        parts.iter().map(bone).collect()
     }
 
     /// The trunk, and limbs of the body beside the chain with their world poses.
@@ -165,11 +159,10 @@ impl PyChain {
     fn forward<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>) -> PyResult<(Array<'py>, Array<'py>)> {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
         let sites: Vec<f64> =
             self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
-        let counts = (at.poses.len(), sites.len() / 3);
-        Ok((frozen(py, poses, &[counts.0, 4, 4])?, frozen(py, sites, &[counts.1, 3])?))
+        let count = sites.len() / 3;
+        Ok((matrices(py, &at.poses)?, frozen(py, sites, &[count, 3])?))
     }
 
     /// Derivative `(3, n)` of the position of a site.
@@ -196,7 +189,7 @@ impl PyChain {
         let py = base.py();
         let at = self.place(py, base, &angles)?;
         let segments = self.bones(py, segments, depth.0)?;
-        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
+        let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
         let trunk = self.trunk(py, &others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
@@ -224,13 +217,15 @@ impl PyChain {
         Ok(angles)
     }
 
-    /// One posture: angles, poses `(P, 4, 4)`, sites `(S, 3)`, residual of every goal, steps, converged, h.
+    /// Postures that share sites, images and options, from starts `(N, n)`; with positions `(N, K, 3)` of the goals, or all with
+    /// the same. Releases the GIL.
     #[allow(clippy::too_many_arguments, reason = "called by voodoo.ik only")]
     fn solve<'py>(
         &self,
         base: &Bound<'py, PyAny>,
-        start: PyReadonlyArray1<'py, f64>,
+        starts: PyReadonlyArray2<'py, f64>,
         goals: Vec<GoalParts>,
+        positions: Option<PyReadonlyArray3<'py, f64>>,
         segments: Option<Vec<SegmentParts>>,
         depth: (f64, f64),
         views: Vec<PyRef<'py, PyView>>,
@@ -239,93 +234,49 @@ impl PyChain {
         rest: Vec<(usize, f64)>,
     ) -> PyResult<Solved<'py>> {
         let py = base.py();
-        let mut angles = start.as_slice()?.to_vec();
-        self.checked(py, &angles)?;
-        let base = pose("world_from_base", Some(base))?;
-        let goals = self.goals(py, &goals)?;
-        let mut ordered = goals.clone();
-        ordered.sort_by_key(|goal| goal.level);
-        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
-        let trunk = self.trunk(py, &others)?;
-        let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
-        let mut solver = resting(&rest);
-        let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &options(how), &mut angles);
-        let at = solver.kinematics();
-        let residuals = goals.iter().map(|goal| goal.residual(at).length());
-        let residuals = PyTuple::new(py, residuals.collect::<Vec<_>>())?;
-        let poses: Vec<f64> = at.poses.iter().flat_map(voodoo_core::math::matrix).flatten().collect();
-        let sites: Vec<f64> =
-            self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
-        let (limbs, points, n) = (at.poses.len(), sites.len() / 3, angles.len());
-        Ok((
-            frozen(py, angles, &[n])?,
-            frozen(py, poses, &[limbs, 4, 4])?,
-            frozen(py, sites, &[points, 3])?,
-            residuals,
-            report.steps,
-            report.converged,
-            report.h,
-        ))
-    }
-
-    /// Many postures that share sites, images and options: angles `(N, n)`, sites `(N, S, 3)`, h `(N,)`, steps `(N,)`,
-    /// postures tried and those compared with images `(N,)`, converged `(N,)` as 0 and 1. Starts `(N, n)`, positions `(N, K, 3)`.
-    /// Releases the GIL.
-    #[allow(clippy::too_many_arguments, clippy::type_complexity, reason = "called by voodoo.ik only")]
-    fn solve_many<'py>(
-        &self,
-        base: &Bound<'py, PyAny>,
-        starts: PyReadonlyArray2<'py, f64>,
-        goals: Vec<GoalParts>,
-        positions: PyReadonlyArray3<'py, f64>,
-        segments: Option<Vec<SegmentParts>>,
-        depth: (f64, f64),
-        views: Vec<PyRef<'py, PyView>>,
-        how: OptionParts,
-        rest: Vec<(usize, f64)>,
-    ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>)> {
-        let py = base.py();
+        let [count, n] = [starts.shape()[0], starts.shape()[1]];
+        let mut angles = starts.as_slice()?.to_vec();
+        (0..count).try_for_each(|index| self.checked(py, &angles[index * n..(index + 1) * n]))?;
         let base = pose("world_from_base", Some(base))?;
         let mut goals = self.goals(py, &goals)?;
         let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
-        let views: Vec<voodoo_ik::SilhouetteView> = views.iter().map(|view| view.view()).collect();
-        let trunk = voodoo_ik::trunk(&self.body, &self.model);
+        let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
+        let trunk = self.trunk(py, &others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
-        let (count, n) = (starts.shape()[0], self.model.freedoms());
-        let mut angles = starts.as_slice()?.to_vec();
-        let positions = positions.as_slice()?;
+        let positions = positions.as_ref().map(|positions| positions.as_slice()).transpose()?;
         let sites: Vec<(usize, Vec3)> = self.site_links().map(|(_, link, x)| (link, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let [mut h, mut steps, mut tried, mut compared, mut converged] = [const { Vec::new() }; 5];
+        let mut numbers = [const { Vec::new() }; 5];
+        let mut solver = resting(&rest);
+        let mut ordered = Vec::new();
         py.detach(|| {
-            let mut solver = resting(&rest);
             let width = 3 * goals.len();
             for index in 0..count {
-                let (rows, _) = positions[index * width..(index + 1) * width].as_chunks::<3>();
+                let rows = positions.map_or(&[][..], |all| all[index * width..(index + 1) * width].as_chunks::<3>().0);
                 for (goal, position) in goals.iter_mut().zip(rows) {
                     goal.aim = Aim::Position(Vec3::from_array(*position));
                 }
+                ordered.clone_from(&goals);
+                ordered.sort_by_key(|goal: &Goal| goal.level);
                 let row = &mut angles[index * n..(index + 1) * n];
-                let report = solver.solve(&self.model, &base, &goals, Some(&criterion), &how, row);
+                let report = solver.solve(&self.model, &base, &ordered, Some(&criterion), &how, row);
                 let at = solver.kinematics();
                 points.extend(sites.iter().flat_map(|(link, x)| at.poses[*link].transform_point(*x).to_array()));
-                h.push(report.h);
-                steps.push(report.steps as f64);
-                tried.push(report.tried as f64);
-                compared.push(report.compared as f64);
-                converged.push(f64::from(u8::from(report.converged)));
+                let counts = [report.steps, report.tried, report.compared, usize::from(report.converged)];
+                let [steps, tried, compared, converged] = counts.map(|count| count as f64);
+                let found = [report.h, steps, tried, compared, converged];
+                numbers.iter_mut().zip(found).for_each(|(all, number)| all.push(number));
             }
         });
+        let at = solver.kinematics();
+        let residuals: Vec<f64> = goals.iter().filter(|_| count > 0).map(|goal| goal.residual(at).length()).collect();
         Ok((
             frozen(py, angles, &[count, n])?,
             frozen(py, points, &[count, sites.len(), 3])?,
-            frozen(py, h, &[count])?,
-            frozen(py, steps, &[count])?,
-            frozen(py, tried, &[count])?,
-            frozen(py, compared, &[count])?,
-            frozen(py, converged, &[count])?,
+            numbers.into_iter().map(|all| frozen(py, all, &[count])).collect::<PyResult<_>>()?,
+            matrices(py, &at.poses)?,
+            PyTuple::new(py, residuals)?,
         ))
     }
 }

@@ -1,11 +1,9 @@
 //! `View` of inverse kinematics: one silhouette with its camera.
 
-use std::sync::Arc;
-
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
-use voodoo_core::math::Pose;
+use voodoo_ik::SilhouetteView;
 
 use crate::arrays::pose;
 use crate::camera::camera_of;
@@ -13,13 +11,7 @@ use crate::errors::exception;
 
 #[doc = stub!("View")]
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
-pub struct PyView {
-    pixels: Vec<[f32; 2]>,
-    depth: Vec<f32>,
-    border: f64,
-    camera: Arc<Camera>,
-    camera_from_world: Pose,
-}
+pub struct PyView(pub SilhouetteView);
 
 #[pymethods]
 impl PyView {
@@ -42,24 +34,12 @@ impl PyView {
             let message = format!("camera: expected a pinhole camera of {width} x {height} pixels, found {camera:?}");
             return Err(exception(camera_from_world.py(), "MeasurementError", message));
         }
-        Ok(Self {
+        Ok(Self(SilhouetteView {
             pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),
             depth: depth.map_or(Ok(Vec::new()), |depth| depth.as_slice().map(<[f32]>::to_vec))?,
             border,
-            camera,
+            camera: Camera::clone(&camera),
             camera_from_world: pose("camera_from_world", Some(camera_from_world))?,
-        })
-    }
-}
-
-impl PyView {
-    pub(crate) fn view(&self) -> voodoo_ik::SilhouetteView<'_> {
-        voodoo_ik::SilhouetteView {
-            pixels: &self.pixels,
-            depth: &self.depth,
-            border: self.border,
-            camera: &self.camera,
-            camera_from_world: self.camera_from_world,
-        }
+        }))
     }
 }

@@ -2,12 +2,12 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use voodoo_core::math::{CostTable, Vec3};
+use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
 use crate::arrays::{PointArray, rows};
-use crate::camera::{camera_of, rows_of};
+use crate::camera::{affine, camera_of};
 use crate::errors::IntoPy;
 use crate::people::TrackedBody;
 use crate::sites::{PySiteGate, PySiteRay, places_of};
@@ -47,7 +47,7 @@ impl PyKeypointLayout {
         least: f64,
     ) -> PyResult<Option<usize>> {
         let camera = camera_of(camera)?;
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
+        let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
         let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place))).collect();
         let people = people.iter().map(|keypoints| rows("keypoints", keypoints)).collect::<PyResult<Vec<_>>>()?;
@@ -75,7 +75,7 @@ impl PyKeypointLayout {
         before: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Observed<'py>> {
         let camera = camera_of(camera)?;
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
+        let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
         let found: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
         let pixels: Vec<[f64; 2]> =
@@ -124,8 +124,7 @@ impl PyKeypointLayout {
 #[pyfunction]
 pub(crate) fn linear_sum_assignment(costs: PyReadonlyArray2<'_, f64>) -> Vec<(usize, usize)> {
     let costs = costs.as_array();
-    let table = CostTable::from_fn(costs.nrows(), costs.ncols(), |row, column| costs[[row, column]]);
-    voodoo_core::math::linear_sum_assignment(&table)
+    voodoo_core::math::linear_sum_assignment(costs.nrows(), costs.ncols(), &|row, column| costs[[row, column]])
 }
 
 #[doc = stub!("carried")]
@@ -138,10 +137,12 @@ pub(crate) fn carried<'py>(
     elapsed: f64,
     world_from_sensor: Option<PyReadonlyArray2<'py, f64>>,
 ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-    let pose = world_from_sensor.as_ref().map(|pose| rows_of("world_from_sensor", pose)).transpose()?;
+    let pose = world_from_sensor.as_ref().map(|pose| affine("world_from_sensor", pose)).transpose()?;
     let array = PointArray::new("points", points)?;
     let view = array.view(py);
-    let moved = voodoo_sensors::carried::carried(view.slice()?, tracker.tracker()?, elapsed, pose.as_ref());
+    let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
     let moved = moved.map_err(|error| error.into_py(py))?;
-    moved.map(|moved| PyArray1::from_slice(py, moved.as_flattened()).reshape([moved.len(), 3])).transpose()
+    let array =
+        |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);
+    moved.map(array).transpose()
 }

@@ -48,7 +48,7 @@ mod _core {
     #[pymodule_export]
     use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]
-    use super::estimate::{_estimate, PyEstimate};
+    use super::estimate::{_estimate, _nobody, PyEstimate};
     #[pymodule_export]
     use super::frame::PyFrame;
     #[pymodule_export]

@@ -9,7 +9,7 @@ use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::{BodyTracker, Frame, People};
 
 use crate::body::PyBody;
-use crate::borrowed::Parts;
+use crate::borrowed::{Borrowed, Parts, color_image};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception};
@@ -84,15 +84,15 @@ impl PyPeople {
         own: Vec<(usize, PyRef<'_, PyFrame>)>,
     ) -> PyResult<Vec<(usize, PyEstimate)>> {
         let body = self.people.prototype();
-        let all = frame.borrow_for(py, body)?;
+        let all = Borrowed::new(py, frame, body)?;
         let (clouds, images) = (all.clouds()?, all.images()?);
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
-        let colors = numbered.map(|(view, camera)| view.image(camera)).collect::<PyResult<Vec<_>>>()?;
+        let colors = numbered.map(|(view, camera)| color_image(view, camera)).collect::<PyResult<Vec<_>>>()?;
         let detections = all.detections();
         let input = all.frame(frame, &clouds, &images, &colors, &detections);
         // A person's own measurements follow the common ones; their sources are numbered consecutively.
-        let owned = own.iter().map(|(_, frame)| frame.borrow_for(py, body)).collect::<PyResult<Vec<_>>>()?;
+        let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body)).collect::<PyResult<Vec<_>>>()?;
         let parts = owned
             .iter()
             .map(|own| Parts::new(&input, own, frame.sources.len() as u16))

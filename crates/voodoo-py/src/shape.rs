@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Points, Pose};
-use voodoo_core::{Region, SurfaceBatch, TaperedEllipticCylinder};
+use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
 use crate::arrays::{PointArray, vector};
@@ -89,27 +89,19 @@ impl PyShape {
     fn closest_points(&self, py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<PyClosestPoints> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
-        let slice = view.slice()?;
-        let (batch, bad) = py.detach(|| {
-            let mut queries = Points::default();
-            let mut bad = None;
-            for index in 0..slice.len() {
-                let point = slice.get(index);
-                if !point.is_finite() {
-                    bad = Some(index);
-                }
-                queries.push(point.to_array().map(|value| value as f32));
-            }
-            let mut batch = SurfaceBatch::default();
-            if bad.is_none() {
-                self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
-            }
-            (batch, bad)
-        });
-        if let Some(row) = bad {
+        let slice = view.points()?;
+        if let Some(row) = (0..slice.len()).rfind(|row| !slice.get(*row).is_finite()) {
             let found = format!("points: expected finite meters, found {:?} in row {row}", slice.get(row).to_array());
             return Err(crate::errors::exception(py, "MeasurementError", found));
         }
+        let batch = py.detach(|| {
+            let (mut queries, mut batch) = (Points::default(), SurfaceBatch::default());
+            for index in 0..slice.len() {
+                queries.push(slice.get(index).to_array().map(|value| value as f32));
+            }
+            self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
+            batch
+        });
         let interleave = |points: &Points| -> PyResult<Py<PyAny>> {
             let mut values = Vec::with_capacity(3 * points.len());
             for ((x, y), z) in points.x.iter().zip(&points.y).zip(&points.z) {
@@ -131,31 +123,15 @@ impl PyShape {
     }
 
     fn __repr__(&self) -> String {
-        let s = &self.0;
-        format!(
-            "TaperedEllipticCylinder(length={}, a0={}, b0={}, a1={}, b1={})",
-            s.length(),
-            s.a0(),
-            s.b0(),
-            s.a1(),
-            s.b1()
-        )
+        let (length, a0, b0, a1, b1) = self.__getnewargs__();
+        format!("TaperedEllipticCylinder(length={length}, a0={a0}, b0={b0}, a1={a1}, b1={b1})")
     }
 
     /// Names of the values of `ClosestPoints.region`.
     #[classattr]
     #[pyo3(name = "REGIONS")]
     fn regions() -> [&'static str; 5] {
-        let mut names = [""; 5];
-        for (region, name) in [
-            (Region::Side, "side"),
-            (Region::ProximalCap, "proximal_cap"),
-            (Region::DistalCap, "distal_cap"),
-            (Region::ProximalRim, "proximal_rim"),
-            (Region::DistalRim, "distal_rim"),
-        ] {
-            names[region as usize] = name;
-        }
-        names
+        // In the order of `voodoo_core::Region`.
+        ["side", "proximal_cap", "distal_cap", "proximal_rim", "distal_rim"]
     }
 }

@@ -4,15 +4,14 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use voodoo_core::DepthPixels;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::skin::colors::CHROMA_BINS;
 use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
-use crate::arrays::{contiguous, rows};
-use crate::camera::{camera_of, rows_of};
+use crate::arrays::{DepthArray, rows};
+use crate::camera::{affine, camera_of};
 use crate::errors::{IntoPy, exception, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
@@ -110,7 +109,7 @@ impl PySkinCue {
         others: Vec<TrackedBody<'py>>,
     ) -> PyResult<Vec<Ray<'py>>> {
         let camera = camera_of(camera)?;
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
+        let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
         for (site, names) in self.names.iter().enumerate() {
             let places = places_of(predicted, names.iter().map(String::as_str))?;
@@ -121,21 +120,16 @@ impl PySkinCue {
             predicted.call_method0("keys")?.try_iter()?.map(|name| name?.extract()).collect::<PyResult<_>>()?;
         let joints: Vec<Vec3> = places_of(predicted, names.iter().map(String::as_str))?.into_iter().flatten().collect();
         let depth_camera = depth.as_ref().map(|(_, _, camera, _)| camera_of(camera)).transpose()?;
-        let (units, meters);
+        let mut view = None;
+        if let Some((image, ..)) = &depth {
+            let expected = "an array of shape (height, width) and dtype uint16 or float32";
+            let array = DepthArray::cast(image).ok_or_else(|| wrong_argument(py, "depth", expected, image))?;
+            view = Some(array.view(py));
+        }
         let mut beside = None;
-        if let (Some((image, per_unit, _, pose)), Some(camera)) = (&depth, &depth_camera) {
-            let wrong =
-                || wrong_argument(py, "depth", "an array of shape (height, width) and dtype uint16 or float32", image);
-            let array = contiguous(image).map_err(|_| wrong())?;
-            units = array.cast::<PyArray2<u16>>().ok().map(|array| array.readonly());
-            meters = array.cast::<PyArray2<f32>>().ok().map(|array| array.readonly());
-            let pixels = match (&units, &meters) {
-                (Some(units), _) => DepthPixels::U16(units.as_slice()?),
-                (_, Some(meters)) => DepthPixels::F32(meters.as_slice()?),
-                _ => return Err(wrong()),
-            };
-            let depth = Eye { world_from_sensor: rows_of("world_from_depth", pose)?, camera };
-            let found = DepthBeside::new(pixels, *per_unit, depth, eye);
+        if let (Some((_, per_unit, _, pose)), Some(camera), Some(view)) = (&depth, &depth_camera, &view) {
+            let depth = Eye { world_from_sensor: affine("world_from_depth", pose)?, camera };
+            let found = DepthBeside::new(view.pixels()?, *per_unit, depth, eye);
             beside = Some(found.map_err(|error| error.into_py(py))?);
         }
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
@@ -168,7 +162,7 @@ impl PySkinCue {
         camera: &Bound<'py, PyAny>,
     ) -> PyResult<()> {
         let camera = camera_of(camera)?;
-        let eye = Eye { world_from_sensor: rows_of("world_from_sensor", &world_from_sensor)?, camera: &camera };
+        let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (image, joints) = (colors_of(&image)?, vectors("joints", &joints)?);
         let sites = vectors("sites", &sites)?;
         let sites: Vec<Option<Vec3>> =

@@ -6,13 +6,13 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::ColorImage;
 use voodoo_core::math::Vec3;
 use voodoo_core::{Body, Frame, Tracker};
+use voodoo_core::{ColorImage, RegionLine};
 
-use crate::arrays::{PointArray, limb_poses, rows, vector};
+use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{ColorArray, ColorView};
+use crate::borrowed::{Borrowed, ColorViews, color_image, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{IntoPy, exception, wrong_argument};
@@ -57,39 +57,21 @@ pub(crate) fn body_before<'py>(
 }
 
 impl PyTracker {
-    fn snapshot(&self) -> PyEstimate {
-        PyEstimate {
-            estimate: self.tracker.estimate().clone(),
-            names: self.names.clone(),
-            sources: self.sources.clone(),
-        }
-    }
-
-    /// Index of the color camera with this name.
-    fn camera(&mut self, name: &str) -> u16 {
-        let known = self.cameras.iter().position(|known| known == name);
-        let number = known.unwrap_or_else(|| {
-            self.cameras.push(name.to_owned());
-            self.cameras.len() - 1
-        });
-        number as u16
-    }
-
     /// The color images of a frame, whose cameras are identified by name.
     fn pictures<'a>(
         &mut self,
         py: Python<'_>,
         frame: &PyFrame,
-        views: &'a [ColorView<'_, '_>],
+        views: &'a ColorViews,
     ) -> PyResult<Vec<ColorImage<'a>>> {
         let mut colors = Vec::with_capacity(views.len());
         for view in views {
-            let name = &frame.sources[usize::from(view.data.source)];
-            if view.data.camera.distorts() {
+            let name = &frame.sources[usize::from(view.1.source)];
+            if view.1.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
                 return Err(exception(py, "MeasurementError", text));
             }
-            colors.push(view.image(self.camera(name))?);
+            colors.push(color_image(view, number(&mut self.cameras, name))?);
         }
         Ok(colors)
     }
@@ -117,7 +99,11 @@ impl PyTracker {
 
     #[getter]
     fn estimate(&self) -> PyEstimate {
-        self.snapshot()
+        PyEstimate {
+            estimate: self.tracker.estimate().clone(),
+            names: self.names.clone(),
+            sources: self.sources.clone(),
+        }
     }
 
     #[pyo3(signature = (joints, *, fit_sizes=true))]
@@ -127,14 +113,14 @@ impl PyTracker {
         self.tracker.reset(&positions, fit_sizes).map_err(|error| error.into_py(py))?;
         self.body_changed();
         self.sources.clear();
-        Ok(self.snapshot())
+        Ok(self.estimate())
     }
 
     fn _reset_pose(&mut self, py: Python<'_>, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
         let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
         self.tracker.reset_pose(&poses).map_err(|error| error.into_py(py))?;
         self.sources.clear();
-        Ok(self.snapshot())
+        Ok(self.estimate())
     }
 
     /// Whether the tracker searches for a person while there is no pose.
@@ -156,7 +142,7 @@ impl PyTracker {
 
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
-        let borrowed = frame.borrow_for(py, self.tracker.body())?;
+        let borrowed = Borrowed::new(py, frame, self.tracker.body())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
         let colors = self.pictures(py, frame, &views)?;
@@ -167,7 +153,7 @@ impl PyTracker {
         self.sources.clone_from(&frame.sources);
         self.detector_failures += usize::from(self.tracker.detector_error().is_some());
         warn_of_detector(py, self.tracker.detector_error())?;
-        Ok(self.snapshot())
+        Ok(self.estimate())
     }
 
     /// Sets images of the empty scene of the camera with this name; an empty list discards them.
@@ -180,7 +166,7 @@ impl PyTracker {
         }
         let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
-        let camera = self.camera(source);
+        let camera = number(&mut self.cameras, source);
         self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
     }
 
@@ -199,8 +185,8 @@ impl PyTracker {
         let tracker = &mut self.tracker;
         let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(|error| error.into_py(py))?;
         let likely = PyDict::new(py);
-        for ((pixels, picture), view) in found.into_iter().zip(&colors).zip(&views) {
-            let name = &frame.sources[usize::from(view.data.source)];
+        for ((pixels, picture), (_, data)) in found.into_iter().zip(&colors).zip(&views) {
+            let name = &frame.sources[usize::from(data.source)];
             likely.set_item(
                 name,
                 PyArray1::from_vec(py, pixels).reshape([picture.camera.height(), picture.camera.width()])?,
@@ -229,15 +215,12 @@ impl PyTracker {
     /// row.
     fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let camera = self.cameras.iter().position(|known| known == source);
-        let rows: Vec<Vec<f32>> = camera.map_or_else(Vec::new, |camera| {
-            let lines = self.tracker.region_lines(camera as u16);
-            lines
-                .map(|line| {
-                    let ([u, v], [nu, nv]) = (line.place, line.normal);
-                    vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
-                })
-                .collect()
-        });
+        let lines = camera.into_iter().flat_map(|camera| self.tracker.region_lines(camera as u16));
+        let row = |line: RegionLine| {
+            let ([u, v], [nu, nv]) = (line.place, line.normal);
+            vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
+        };
+        let rows: Vec<Vec<f32>> = lines.map(row).collect();
         PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
@@ -245,7 +228,7 @@ impl PyTracker {
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
-        let slice = view.slice()?;
+        let slice = view.points()?;
         let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
         Ok(PyArray1::from_vec(py, distances))
     }
@@ -254,7 +237,7 @@ impl PyTracker {
     fn limb_distances<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
-        let slice = view.slice()?;
+        let slice = view.points()?;
         let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(|error| error.into_py(py))?;
         PyArray2::from_vec2(py, &distances).map_err(|error| PyValueError::new_err(error.to_string()))
     }
@@ -293,7 +276,7 @@ impl PyTracker {
             "Tracker(body={:?}, limbs={}, last={})",
             self.tracker.body().name(),
             self.names.limbs.len(),
-            self.snapshot().__repr__()
+            self.estimate().__repr__()
         )
     }
 }

@@ -1,10 +1,7 @@
 //! Extrapolates points that were measured before the frame to its time: each moves with the limb that it lies on.
 
-use crate::eye::Matrix;
-use voodoo_core::BodyTracker;
-use voodoo_core::PointSlice;
-use voodoo_core::TrackError;
-use voodoo_core::math::matrix;
+use voodoo_core::math::{Aabb, Affine3, Mat3, Vec3};
+use voodoo_core::{BodyTracker, LimbMotion, PointSlice, TrackError};
 
 /// Points farther than this from every limb belong to the scene and are not moved, meters.
 const NEAR: f64 = 0.20;
@@ -27,164 +24,103 @@ pub fn carried(
     points: PointSlice,
     tracker: &BodyTracker,
     elapsed: f64,
-    world_from_sensor: Option<&Matrix>,
-) -> Result<Option<Vec<[f64; 3]>>, TrackError> {
+    world_from_sensor: Option<&Affine3>,
+) -> Result<Option<Vec<Vec3>>, TrackError> {
     let Some(motion) = tracker.limb_motion().filter(|_| elapsed.abs() >= SAME_TIME) else { return Ok(None) };
-    let [poses, before] = [motion.now, motion.before].map(|poses| poses.iter().map(matrix).collect::<Vec<_>>());
-    let carrying = Carrying {
-        poses: &poses,
-        before: &before,
-        interval: motion.interval,
-        elapsed: elapsed.clamp(-LONGEST, LONGEST),
-        near: NEAR,
-        fraction: tracker.config().prediction,
-        max_speed: FASTEST_LIMB,
-    };
-    let mut moved: Vec<[f64; 3]> = (0..points.len()).map(|index| points.get(index).to_array()).collect();
-    world_from_sensor.iter().for_each(|pose| in_world(&mut moved, pose));
+    let (elapsed, fraction) = (elapsed.clamp(-LONGEST, LONGEST), tracker.config().prediction);
+    let carrying = Carrying { motion, elapsed, fraction };
+    let mut moved: Vec<Vec3> = (0..points.len()).map(|index| points.get(index)).collect();
+    if let Some(pose) = world_from_sensor {
+        moved.iter_mut().for_each(|point| *point = pose.transform_point3(*point));
+    }
     let around = carrying.around(&moved);
     if !around.is_empty() {
-        let chosen: Vec<[f64; 3]> = around.iter().map(|index| moved[*index]).collect();
-        let away = tracker.limb_distances(PointSlice::F64(&chosen))?.concat();
-        carrying.carry(&mut moved, &around, &away);
+        let chosen: Vec<[f64; 3]> = around.iter().map(|index| moved[*index].to_array()).collect();
+        let away = tracker.limb_distances(PointSlice::F64(&chosen))?;
+        if away.len() == motion.now.len() {
+            carrying.carry(&mut moved, &around, &away);
+        }
     }
-    world_from_sensor.iter().for_each(|pose| in_sensor(&mut moved, pose));
+    if let Some(pose) = world_from_sensor {
+        moved.iter_mut().for_each(|point| *point = pose.matrix3.mul_transpose_vec3(*point - pose.translation));
+    }
     Ok(Some(moved))
-}
-
-/// World positions of points in a sensor frame, meters.
-fn in_world(points: &mut [[f64; 3]], pose: &Matrix) {
-    for point in points {
-        let [x, y, z] = *point;
-        *point = [0, 1, 2].map(|axis| pose[axis][0] * x + pose[axis][1] * y + pose[axis][2] * z + pose[axis][3]);
-    }
-}
-
-/// Inverse of the transform to the world frame.
-fn in_sensor(points: &mut [[f64; 3]], pose: &Matrix) {
-    for point in points {
-        let offset = [0, 1, 2].map(|axis| point[axis] - pose[axis][3]);
-        // The inverse of a rigid pose.
-        *point = [0, 1, 2].map(|axis| (0..3).map(|row| offset[row] * pose[row][axis]).sum());
-    }
 }
 
 /// Motion of the limbs, and the parameters of the extrapolation.
 #[derive(Clone, Copy, Debug)]
 struct Carrying<'a> {
-    /// Poses of all limbs.
-    poses: &'a [Matrix],
-    /// Poses of all limbs in an earlier estimate.
-    before: &'a [Matrix],
-    /// Time between the two estimates, seconds.
-    interval: f64,
+    motion: LimbMotion<'a>,
     /// Time of extrapolation, seconds.
     elapsed: f64,
-    /// Points farther than this from every limb belong to the scene and are not moved, meters.
-    near: f64,
     /// Factor applied to the limbs' velocity.
     fraction: f64,
-    /// A limb with a greater speed has jumped, meters per second; its points are not moved.
-    max_speed: f64,
 }
 
 impl Carrying<'_> {
     /// Which points may be on a limb.
-    fn around(&self, points: &[[f64; 3]]) -> Vec<usize> {
-        let origins = || self.poses.iter().map(|pose| [0, 1, 2].map(|axis| pose[axis][3]));
-        let low = origins().fold([f64::INFINITY; 3], |low, place| [0, 1, 2].map(|axis| place[axis].min(low[axis])));
-        let high =
-            origins().fold([f64::NEG_INFINITY; 3], |high, place| [0, 1, 2].map(|axis| place[axis].max(high[axis])));
-        let within = |place: &[f64; 3]| {
-            (0..3).all(|axis| place[axis] > low[axis] - LONGEST_LIMB && place[axis] < high[axis] + LONGEST_LIMB)
+    fn around(&self, points: &[Vec3]) -> Vec<usize> {
+        let origins = Aabb::from_points(self.motion.now.iter().map(|pose| pose.translation));
+        let within = |place: Vec3| {
+            place.cmpgt(origins.mins - LONGEST_LIMB).all() && place.cmplt(origins.maxs + LONGEST_LIMB).all()
         };
-        points.iter().enumerate().filter(|(_, place)| within(place)).map(|(index, _)| index).collect()
+        (0..points.len()).filter(|index| within(points[*index])).collect()
     }
 
-    /// Moves the points that may be on a limb, given their distances from each limb, limb by limb, meters.
-    fn carry(&self, points: &mut [[f64; 3]], around: &[usize], away: &[f32]) {
-        let count = around.len();
-        if self.poses.len() != self.before.len() || away.len() != count * self.poses.len() {
-            return;
-        }
-        let mut moves: Vec<Option<Matrix>> = vec![None; self.poses.len()];
+    /// Moves the points that may be on a limb, given for each limb their distances from it, meters.
+    fn carry(&self, points: &mut [Vec3], around: &[usize], away: &[Vec<f32>]) {
+        let changes: Vec<Affine3> = (0..away.len()).map(|limb| self.change(limb)).collect();
         for (column, &index) in around.iter().enumerate() {
             let mut nearest = (0, f32::INFINITY);
-            for limb in 0..self.poses.len() {
-                let distance = away[limb * count + column];
-                nearest = if distance < nearest.1 { (limb, distance) } else { nearest };
+            for (limb, away) in away.iter().enumerate() {
+                nearest = if away[column] < nearest.1 { (limb, away[column]) } else { nearest };
             }
-            if f64::from(nearest.1) >= self.near {
+            if f64::from(nearest.1) >= NEAR {
                 continue;
             }
-            let limb = nearest.0;
-            let change = *moves[limb].get_or_insert_with(|| self.change(limb));
-            let place = points[index];
-            let velocity = [0, 1, 2].map(|axis| {
-                let row = &change[axis];
-                row[0] * place[0] + row[1] * place[1] + row[2] * place[2] + row[3]
-            });
-            let speed = velocity.iter().map(|value| value * value).sum::<f64>().sqrt();
-            if speed < self.max_speed * self.fraction {
-                points[index] = [0, 1, 2].map(|axis| place[axis] + self.elapsed * velocity[axis]);
+            let velocity = changes[nearest.0].transform_point3(points[index]);
+            if velocity.length() < FASTEST_LIMB * self.fraction {
+                points[index] += self.elapsed * velocity;
             }
         }
     }
 
     /// Rate of change of a limb's transform over the last interval (world from world), per second.
-    fn change(&self, limb: usize) -> Matrix {
-        let (now, then) = (&self.poses[limb], &self.before[limb]);
-        // The inverse of a rigid pose.
-        let turn = |row: usize, column: usize| (0..3).map(|axis| now[row][axis] * then[column][axis]).sum::<f64>();
-        let mut change = [[0.0; 4]; 4];
-        for row in 0..3 {
-            let turned = [0, 1, 2].map(|column| turn(row, column));
-            let shift = now[row][3] - (0..3).map(|column| turned[column] * then[column][3]).sum::<f64>();
-            for column in 0..3 {
-                let still = f64::from(u8::from(row == column));
-                change[row][column] = (turned[column] - still) / self.interval * self.fraction;
-            }
-            change[row][3] = shift / self.interval * self.fraction;
-        }
-        change
+    fn change(&self, limb: usize) -> Affine3 {
+        let [now, then] = [self.motion.now, self.motion.before]
+            .map(|poses| Affine3::from_rotation_translation(poses[limb].rotation, poses[limb].translation));
+        let turned = now.matrix3 * then.matrix3.transpose();
+        let shift = now.translation - turned * then.translation;
+        let scale = |value: f64| value / self.motion.interval * self.fraction;
+        let columns = (turned - Mat3::IDENTITY).to_cols_array().map(scale);
+        Affine3::from_mat3_translation(Mat3::from_cols_array(&columns), Vec3::from_array(shift.to_array().map(scale)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use voodoo_core::math::Pose;
 
     #[test]
     fn points_go_on_with_their_limb_and_the_scene_stays() {
-        let pose = |angle: f64, x: f64| {
-            let (sine, cosine) = angle.sin_cos();
-            [[cosine, -sine, 0.0, x], [sine, cosine, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-        };
-        let (poses, before) = ([pose(0.3, 0.03)], [pose(0.3, 0.0)]);
-        let carrying = Carrying {
-            poses: &poses,
-            before: &before,
-            interval: 0.1,
-            elapsed: 0.05,
-            near: 0.2,
-            fraction: 1.0,
-            max_speed: 8.0,
-        };
-        let points = [[0.1, 1.0, 0.0], [0.0, 0.2, 0.0], [5.0, 5.0, 5.0]];
+        let pose = |angle: f64, x: f64| Pose::new(Vec3::new(x, 1.0, 0.0), Vec3::Z * angle);
+        let (now, before) = ([pose(0.3, 0.03)], [pose(0.3, 0.0)]);
+        let motion = LimbMotion { now: &now, before: &before, interval: 0.1 };
+        let carrying = Carrying { motion, elapsed: 0.05, fraction: 1.0 };
+        let points = [Vec3::new(0.1, 1.0, 0.0), Vec3::new(0.0, 0.2, 0.0), Vec3::splat(5.0)];
         assert_eq!(carrying.around(&points), [0, 1]);
         let mut moved = points;
-        carrying.carry(&mut moved, &[0, 1], &[0.1, 0.3]);
-        assert!((moved[0][0] - 0.115).abs() < 1e-12 && moved[1..] == points[1..]);
-        let turning = Carrying { poses: &[pose(0.35, 0.0)], ..carrying };
+        carrying.carry(&mut moved, &[0, 1], &[vec![0.1, 0.3]]);
+        assert!((moved[0].x - 0.115).abs() < 1e-12 && moved[1..] == points[1..]);
+        let turned = [pose(0.35, 0.0)];
+        let turning = Carrying { motion: LimbMotion { now: &turned, ..motion }, ..carrying };
         let mut moved = points;
-        turning.carry(&mut moved, &[0], &[0.1]);
-        assert!((moved[0][1] - 1.0 - 0.5 * 0.1 * 0.05_f64.sin()).abs() < 1e-12);
+        turning.carry(&mut moved, &[0], &[vec![0.1]]);
+        assert!((moved[0].y - 1.0 - 0.5 * 0.1 * 0.05_f64.sin()).abs() < 1e-12);
+        let far = [pose(0.3, 0.83)];
         let mut jumped = points;
-        Carrying { max_speed: 0.1, ..carrying }.carry(&mut jumped, &[0], &[0.1]);
+        Carrying { motion: LimbMotion { now: &far, ..motion }, ..carrying }.carry(&mut jumped, &[0], &[vec![0.1]]);
         assert_eq!(jumped, points);
-        let mut there = points;
-        in_world(&mut there, &poses[0]);
-        in_sensor(&mut there, &poses[0]);
-        assert!(there.iter().flatten().zip(points.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 }

@@ -1,16 +1,13 @@
 //! A color camera and its pose.
 
 use voodoo_core::Camera;
-use voodoo_core::math::Vec3;
-
-/// A 4x4 transform, row by row.
-pub type Matrix = [[f64; 4]; 4];
+use voodoo_core::math::{Affine3, Mat3, Vec3};
 
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
 pub struct Eye<'a> {
     /// Pose of the camera.
-    pub world_from_sensor: Matrix,
+    pub world_from_sensor: Affine3,
     /// Its calibration.
     pub camera: &'a Camera,
 }
@@ -24,22 +21,17 @@ impl Eye<'_> {
 
     /// Focal point in the world, meters.
     pub fn origin(&self) -> Vec3 {
-        self.column(3)
+        self.world_from_sensor.translation
     }
 
     /// Optical axis in the world.
     pub fn axis(&self) -> Vec3 {
-        self.column(2)
-    }
-
-    fn column(&self, column: usize) -> Vec3 {
-        Vec3::from_array([0, 1, 2].map(|row| self.world_from_sensor[row][column]))
+        self.world_from_sensor.matrix3.z_axis
     }
 
     /// A world position in the camera frame, meters.
     pub fn in_sensor(&self, place: Vec3) -> Vec3 {
-        let offset = place - self.origin();
-        Vec3::from_array([0, 1, 2].map(|column| offset.dot(self.column(column))))
+        self.world_from_sensor.matrix3.mul_transpose_vec3(place - self.origin())
     }
 
     /// Column and row of a position in the camera frame; NaN where it is not visible.
@@ -54,12 +46,14 @@ impl Eye<'_> {
 
     /// Position in the world at `(x/z, y/z)` and the depth z, meters.
     pub fn place(&self, [x, y]: [f64; 2], z: f64) -> Vec3 {
-        self.origin() + z * (x * self.column(0) + y * self.column(1) + self.column(2))
+        let Mat3 { x_axis, y_axis, z_axis } = self.world_from_sensor.matrix3;
+        self.origin() + z * (x * x_axis + y * y_axis + z_axis)
     }
 
     /// Unit vector in the world through `(x/z, y/z)`.
     pub fn direction(&self, [x, y]: [f64; 2]) -> Vec3 {
-        (x * self.column(0) + y * self.column(1) + self.column(2)).normalize()
+        let Mat3 { x_axis, y_axis, z_axis } = self.world_from_sensor.matrix3;
+        (x * x_axis + y * y_axis + z_axis).normalize()
     }
 }
 
@@ -71,8 +65,8 @@ mod tests {
 
     #[test]
     fn the_ray_behind_a_pixel_leads_to_what_is_visible_there() {
-        let world_from_sensor =
-            [[0.0, 0.0, 1.0, 0.5], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.2], [0.0, 0.0, 0.0, 1.0]];
+        let axes = Mat3::from_cols(-Vec3::Y, -Vec3::Z, Vec3::X);
+        let world_from_sensor = Affine3::from_mat3_translation(axes, Vec3::new(0.5, 0.0, 1.2));
         let lens = Lens::PlumbBob([-0.2, 0.05, 0.001, 0.0, 0.0]);
         let camera = Camera::new(320, 240, [300.0, 310.0, 159.5, 119.5], lens).unwrap();
         let eye = Eye { world_from_sensor, camera: &camera };

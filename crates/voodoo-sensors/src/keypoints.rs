@@ -196,10 +196,8 @@ mod tests {
     }
     #[test]
     fn what_was_visible_becomes_a_ray_or_a_place_or_is_dropped() {
-        let world_from_sensor =
-            [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
         let camera = voodoo_core::Camera::pinhole(320, 240, [300.0, 300.0, 160.0, 120.0]).unwrap();
-        let eye = Eye { world_from_sensor, camera: &camera };
+        let eye = Eye { world_from_sensor: voodoo_core::math::Affine3::IDENTITY, camera: &camera };
         let sensor = Sensor { eye, source: "camera", noise: 3.0, place_sigma: 0.03, stamp: 0.0 };
         let pixel = SitePixel { pixel: [160.0, 120.0], confidence: 1.0 };
         let observation =

@@ -46,12 +46,7 @@ impl SiteGate {
     }
 
     fn remember(&mut self, site: &str, source: &str, stamp: f64) {
-        match self.last.get_mut(source).and_then(|sites| sites.get_mut(site)) {
-            Some(last) => *last = stamp,
-            None => {
-                self.last.entry(source.to_owned()).or_default().insert(site.to_owned(), stamp);
-            }
-        }
+        self.last.entry(source.to_owned()).or_default().insert(site.to_owned(), stamp);
     }
 }
 

@@ -168,10 +168,11 @@ def solve(
     options = chosen_options(options, changes)
     views = core_views(images)
     begin = start.angles if isinstance(start, Posture) else chain.rest() if start is None else start
-    angles, poses, sites, residuals, steps, converged, h = chain.core.solve(
+    angles, sites, (h, steps, _, _, converged), poses, residuals = chain.core.solve(
         base_pose(world_from_base),
-        vector(begin),
+        vector(begin)[np.newaxis],
         target_parts(targets),
+        None,
         listed_bones(options.bones),
         (options.margin, options.thin),
         views,
@@ -180,14 +181,14 @@ def solve(
         rest_parts(chain, rest),
     )
     return Posture(
-        angles=angles,
+        angles=angles[0],
         angle_names=chain.angle_names,
-        joints=named(chain.site_names, sites),
+        joints=named(chain.site_names, sites[0]),
         world_from_limb=named(chain.limb_names, poses),
         residuals=residuals,
-        h=h,
-        steps=steps,
-        converged=converged,
+        h=float(h[0]),
+        steps=int(steps[0]),
+        converged=bool(converged[0]),
         images=len(views),
     )
 
@@ -232,7 +233,7 @@ def solve_many(
     begin = np.ascontiguousarray(np.broadcast_to(begin, (len(places), n)))
     goals = [Target.at(site, (0.0, 0.0, 0.0)).parts() for site in sites]
     views = core_views(images)
-    found = chain.core.solve_many(
+    angles, joints, (h, steps, tried, compared, converged), *_ = chain.core.solve(
         base_pose(world_from_base),
         begin,
         goals,
@@ -240,10 +241,10 @@ def solve_many(
         listed_bones(options.bones),
         (options.margin, options.thin),
         views,
+        [],
         options.parts(),
         rest_parts(chain, rest),
     )
-    angles, joints, h, steps, tried, compared, converged = found
     return Postures(angles, joints, h, steps, tried, compared, converged != 0.0)
 
 

@@ -5,9 +5,8 @@
 
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
+use crate::visibility::ALONG_LIMB;
 
-/// Positions on a limb's axis, as fractions of its length.
-const ON_AXIS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// A position this deep in another limb counts as inside it, meters: limbs are soft, and thinner or thicker than their models.
 const DEEP: f64 = 0.03;
 
@@ -38,7 +37,7 @@ impl Buried {
                     (place - middle).length_squared() < reach * reach && body.are_apart(limb, other) && depth() > DEEP
                 })
             };
-            2 * ON_AXIS.iter().filter(inside).count() > ON_AXIS.len()
+            2 * ALONG_LIMB.iter().filter(inside).count() > ALONG_LIMB.len()
         }));
         limbs
     }

@@ -1,9 +1,9 @@
 //! Steps 4b-6: named sites with positions and rays, and the elastic bands (K06 IV-B.4-6, K07 4.3).
 
 use crate::association::correspondence::{Band, Correspondences, SitePair};
-use crate::body::Body;
+use crate::body::{Body, Site};
 use crate::math::{Mat3, Pose, Vec3};
-use crate::observation::frame::Frame;
+use crate::observation::frame::{Frame, PositionRelation, RayRelation};
 
 /// Weight of the bands of a limb without measurements, in points; only their proportions matter there.
 const UNMEASURED: f64 = 1.0;
@@ -19,48 +19,24 @@ impl Correspondences {
     /// Point-to-point pairs, and for every ray the closest point on it (K06 IV-B.4 and 5).
     pub(crate) fn add_sites(&mut self, body: &Body, poses: &[Pose], frame: &Frame, origin: Vec3) {
         self.sites.clear();
-        let place = |site: usize| {
-            let site = &body.sites()[site];
-            (site.limb, site.position, poses[site.limb] * site.position)
+        let pair = |site: usize, target: &dyn Fn(Vec3) -> Vec3, across: Mat3, (base_weight, bias, source)| {
+            let Site { limb, position: local, .. } = body.sites()[site];
+            let x = poses[limb] * local;
+            let p = target(x);
+            let weight = base_weight * beyond(bias, (x - p).length());
+            SitePair { limb, local, x, p, weight, base_weight, bias, across, information: across * weight, source }
         };
-        for relation in frame.positions {
-            let (limb, local, x) = place(relation.site);
-            let p = relation.position - origin;
-            let weight = relation.weight * beyond(relation.bias, (x - p).length());
-            self.sites.push(SitePair {
-                limb,
-                local,
-                x,
-                p,
-                weight,
-                base_weight: relation.weight,
-                bias: relation.bias,
-                across: Mat3::IDENTITY,
-                information: Mat3::IDENTITY * weight,
-                source: relation.source,
-            });
+        for PositionRelation { site, position, weight, bias, source } in frame.positions {
+            let target = |_| *position - origin;
+            self.sites.push(pair(*site, &target, Mat3::IDENTITY, (*weight, *bias, *source)));
         }
-        for relation in frame.rays {
-            let (limb, local, x) = place(relation.site);
-            let start = relation.origin - origin;
-            let direction = relation.direction.normalize();
+        for RayRelation { site, origin: start, direction, weight, bias, source } in frame.rays {
+            let (start, direction) = (*start - origin, direction.normalize());
             // A site behind the sensor is pulled towards the sensor, not towards the mirror image of the ray.
-            let p = start + direction * (x - start).dot(direction).max(0.0);
+            let target = |x: Vec3| start + direction * (x - start).dot(direction).max(0.0);
             let across = Mat3::IDENTITY
                 - Mat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z);
-            let weight = relation.weight * beyond(relation.bias, (x - p).length());
-            self.sites.push(SitePair {
-                limb,
-                local,
-                x,
-                p,
-                weight,
-                base_weight: relation.weight,
-                bias: relation.bias,
-                across,
-                information: across * weight,
-                source: relation.source,
-            });
+            self.sites.push(pair(*site, &target, across, (*weight, *bias, *source)));
         }
     }
 
@@ -71,17 +47,12 @@ impl Correspondences {
         measured.clear();
         for limb in 0..poses.len() {
             let weight = ratio * self.measured_weight(limb);
-            let joints = body.limbs().iter().enumerate();
-            let count = joints
-                .filter(|(index, other)| {
-                    other.parent.as_ref().is_some_and(|(parent, _)| *index == limb || *parent == limb)
-                })
-                .count();
+            let count = body.children(limb).count() + usize::from(body.parent(limb).is_some());
             measured.push(if weight > 0.0 { weight } else { UNMEASURED } / count.max(1) as f64);
         }
         for (child, limb) in body.limbs().iter().enumerate() {
             let Some((parent, joint)) = &limb.parent else { continue };
-            let fraction = joint.weight / joint.band_count() as f64;
+            let fraction = joint.weight / joint.band_points().count() as f64;
             for point in joint.band_points() {
                 self.bands.push(Band {
                     parent: *parent,
@@ -114,7 +85,7 @@ mod tests {
         }
         all.add_bands(&body, &poses, 0.4, &mut Vec::new());
         let joints: usize =
-            body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_count()).sum();
+            body.limbs().iter().flat_map(|limb| &limb.parent).map(|(_, joint)| joint.band_points().count()).sum();
         assert_eq!(all.bands.len(), joints);
         for limb in 0..poses.len() {
             // Every band counts at both ends.

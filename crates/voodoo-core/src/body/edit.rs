@@ -12,18 +12,14 @@ impl Body {
     /// The body with all lengths multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Self, BodyError> {
         if !factor.is_finite() || factor <= 0.0 {
-            return Err(BodyError::Value {
-                key: "factor".into(),
-                expected: "a finite factor above zero",
-                found: factor.to_string(),
-            });
+            return Err(BodyError::value("factor", "a finite factor above zero", factor.to_string()));
         }
         let scale_pose = |pose: &Pose| Pose::from_parts(pose.translation * factor, pose.rotation);
         let mut body = self.clone();
         for limb in &mut body.limbs {
             limb.shape = limb
                 .shape
-                .scaled(factor)
+                .stretched(factor, [factor; 4])
                 .map_err(|source| BodyError::Shape { key: format!("limbs.{}", limb.name), source })?;
             if let Some((_, joint)) = &mut limb.parent {
                 joint.parent_from_joint = scale_pose(&joint.parent_from_joint);
@@ -111,11 +107,7 @@ impl Body {
     pub fn without_limb(&self, name: &str) -> Result<(Self, Vec<usize>), BodyError> {
         let removed = self.limb_index(name)?;
         if removed == 0 {
-            return Err(BodyError::Value {
-                key: "limb".into(),
-                expected: "a limb other than the root",
-                found: name.into(),
-            });
+            return Err(BodyError::value("limb", "a limb other than the root", name));
         }
         let mut new_index: Vec<Option<usize>> = Vec::with_capacity(self.limbs.len());
         let mut kept = Vec::new();

@@ -148,9 +148,7 @@ impl Body {
     /// Whether the limb moves little relative to its parent, so that its landmarks also determine the parent: a clavicle on the
     /// chest.
     fn carried(&self, limb: usize) -> bool {
-        let little =
-            |joint: &Joint| joint.limits.is_some_and(|limits| limits.iter().all(|[low, high]| high - low < RIGID));
-        self.limbs()[limb].parent.as_ref().is_some_and(|(_, joint)| little(joint))
+        self.limbs()[limb].parent.as_ref().is_some_and(|(_, joint)| turns_less(joint, RIGID))
     }
 
     /// Scale of the whole body: measured distances divided by model distances between landmarks of the same limb.
@@ -175,8 +173,8 @@ impl Body {
         let mut trunk = vec![true];
         for limb in &self.limbs()[1..] {
             let steady =
-                |joint: &Joint| joint.limits.is_some_and(|limits| limits.iter().all(|[low, high]| high - low < STEADY));
-            trunk.push(limb.parent.as_ref().is_some_and(|(parent, joint)| trunk[*parent] && steady(joint)));
+                limb.parent.as_ref().is_some_and(|(parent, joint)| trunk[*parent] && turns_less(joint, STEADY));
+            trunk.push(steady);
         }
         let mut central: Vec<(Vec3, Vec3)> = Vec::new();
         for limb in (0..trunk.len()).filter(|limb| trunk[*limb]) {
@@ -309,8 +307,8 @@ impl Body {
         let mut factors: Vec<(usize, f64)> = Vec::new();
         for limb in 0..self.limbs.len() {
             let Some(other) = twin(limb).filter(|other| length(*other) * UNEQUAL > length(limb)) else { continue };
-            let parent = self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
-            let next = parent.into_iter().chain(self.children(limb)).find_map(|next| Some((next, twin(next)?)));
+            let next =
+                self.parent(limb).into_iter().chain(self.children(limb)).find_map(|next| Some((next, twin(next)?)));
             let sides = next.filter(|(next, beside)| length(*next) > length(*beside)).map(|(next, beside)| {
                 let (own, opposite) = ([limb, next], [other, beside]);
                 if is_unequal(own) < is_unequal(opposite) { (opposite, own) } else { (own, opposite) }
@@ -350,6 +348,11 @@ impl Body {
             }
         }
     }
+}
+
+/// Whether all ranges of a joint are narrower than this, radians.
+fn turns_less(joint: &Joint, range: f64) -> bool {
+    joint.limits.is_some_and(|limits| limits.iter().all(|[low, high]| high - low < range))
 }
 
 /// The measured position of a site.

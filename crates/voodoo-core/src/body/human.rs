@@ -142,117 +142,87 @@ impl Surface {
     }
 }
 
-/// One limb in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
-struct LimbSpec {
-    name: String,
-    standing_from_limb: Pose,
-    length: f64,
-    axes: [f64; 4],
-    parent: Option<(usize, JointSpec)>,
-    match_caps: [bool; 2],
-}
-
-/// A joint in the standing frame. Its frame has x along `flexion` and z along `along`; limits and motion in radians.
-struct JointSpec {
-    name: String,
-    center: Vec3,
-    flexion: Vec3,
-    along: Vec3,
-    semi_axes: [f64; 2],
-    limits: [[f64; 2]; 3],
-    motion: f64,
-}
-
+/// The parts of a human in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
 #[derive(Default)]
 struct Builder {
-    parts: Vec<LimbSpec>,
-    sites: Vec<(String, usize, Vec3)>,
+    limbs: Vec<Limb>,
+    /// Pose of each limb in the standing frame.
+    poses: Vec<Pose>,
+    sites: Vec<Site>,
 }
 
 impl Builder {
-    /// Adds a limb between two places. The x axis of its frame points to the `front` as far as possible.
+    /// Adds a limb between two places. The x axis of its frame points to the `front` as far as possible. The ellipses of its joint
+    /// are given in the standing frame.
     fn limb(
         &mut self,
         name: impl Into<String>,
         [start, end]: [Vec3; 2],
         front: Vec3,
-        axes: [f64; 4],
-        parent: Option<(usize, JointSpec)>,
+        [a0, b0, a1, b1]: [f64; 4],
+        parent: Option<(usize, Joint)>,
         match_caps: [bool; 2],
-    ) -> usize {
+    ) -> Result<usize, BodyError> {
+        let name = name.into();
         let length = (end - start).length();
         let along = (end - start) / length;
         let x = (front - along * front.dot(along)).normalize();
         let rotation = Quat::from_mat3(&Mat3::from_cols(x, along.cross(x), along));
-        let standing_from_limb = Pose::from_parts(start, rotation);
-        self.parts.push(LimbSpec { name: name.into(), standing_from_limb, length, axes, parent, match_caps });
-        self.parts.len() - 1
+        let pose = Pose::from_parts(start, rotation);
+        let shape = TaperedEllipticCylinder::new(length, a0, b0, a1, b1)
+            .map_err(|source| BodyError::Shape { key: format!("limbs.{name}"), source })?;
+        let parent = parent.map(|(parent, joint)| {
+            let parent_from_joint = self.poses[parent].inv_mul(&joint.parent_from_joint);
+            (parent, Joint { parent_from_joint, limb_from_joint: pose.inv_mul(&joint.limb_from_joint), ..joint })
+        });
+        self.limbs.push(Limb { name, shape, parent, match_caps });
+        self.poses.push(pose);
+        Ok(self.limbs.len() - 1)
     }
 
     fn site(&mut self, name: impl Into<String>, limb: usize, position: Vec3) {
-        self.sites.push((name.into(), limb, position));
+        let position = self.poses[limb].inverse_transform_point(position);
+        self.sites.push(Site { name: name.into(), limb, position });
     }
 
     /// Adds the pelvis or torso, and the parts of the trunk above it. Returns the limbs that carry the legs and the arms.
-    fn trunk(&mut self, model: HumanModel) -> (usize, usize) {
-        let link = |name: &str, center: Vec3, semi_axes: [f64; 2], limits, motion| JointSpec {
-            name: name.into(),
-            center,
-            flexion: Vec3::Y,
-            along: Vec3::Z,
-            semi_axes,
-            limits,
-            motion,
+    fn trunk(&mut self, model: HumanModel) -> Result<(usize, usize), BodyError> {
+        let link = |name: &str, center: Vec3, semi_axis: f64, limits, motion| {
+            joint(name, center, [Vec3::Y, Vec3::Z], [semi_axis; 2], limits, motion)
         };
-        let neck =
-            |semi_axis: f64| link("vc7", Vec3::Z * VC7, [semi_axis; 2], [[-0.9, 1.0], [-0.7, 0.7], [-1.2, 1.2]], 0.15);
+        let vc7 = link("vc7", Vec3::Z * VC7, 0.02, [[-0.9, 1.0], [-0.7, 0.7], [-1.2, 1.2]], 0.15);
         let upright = |surface: Surface, from: f64, to: f64| surface.ends([Vec3::Z * from, Vec3::Z * to], 0.0);
         let build = model.build();
         let [base, center, tip] = build.skull;
-        let (legs, arms) = match model {
-            HumanModel::Papers => {
-                let torso = self.limb("torso", upright(TORSO, 0.490, 0.835), Vec3::X, TORSO.axes, None, [false; 2]);
-                (torso, torso)
-            }
-            HumanModel::Full | HumanModel::Measured => {
-                let pelvis = self.limb(
-                    "pelvis",
-                    upright(build.pelvis, 0.485, WAIST),
-                    Vec3::X,
-                    build.pelvis.axes,
-                    None,
-                    [false; 2],
-                );
-                let spine = link("vl3", Vec3::Z * WAIST, [0.04; 2], [[-0.5, 1.3], [-0.6, 0.6], [-0.8, 0.8]], 0.12);
-                let chest = upright(build.thorax, WAIST, 0.830);
-                let thorax = self.limb("thorax", chest, Vec3::X, build.thorax.axes, Some((pelvis, spine)), [false; 2]);
-                (pelvis, thorax)
-            }
-        };
-        let (neck, skull) = match model {
-            HumanModel::Papers => {
-                let line = upright(PAPERS_HEAD, VC7, VC7 + 0.135);
-                let head = self.limb("head", line, Vec3::X, PAPERS_HEAD.axes, Some((arms, neck(0.02))), [false, true]);
-                (head, head)
-            }
-            HumanModel::Full | HumanModel::Measured => {
-                let line = upright(build.neck, 0.830, 0.910);
-                let bottom = self.limb("neck", line, Vec3::X, build.neck.axes, Some((arms, neck(0.02))), [false; 2]);
-                let limits = [[-0.6, 0.6], [-0.4, 0.4], [-0.8, 0.8]];
-                let skull = link("skullbase", Vec3::new(base, 0.0, SKULLBASE), [0.015; 2], limits, 0.10);
-                let line = upright(build.head, 0.880, 0.995);
-                (bottom, self.limb("head", line, Vec3::X, build.head.axes, Some((bottom, skull)), [false, true]))
-            }
+        let (front, none) = (Vec3::X, [false; 2]);
+        let [legs, arms, neck, skull] = if model == HumanModel::Papers {
+            let torso = self.limb("torso", upright(TORSO, 0.490, 0.835), front, TORSO.axes, None, none)?;
+            let line = upright(PAPERS_HEAD, VC7, VC7 + 0.135);
+            let head = self.limb("head", line, front, PAPERS_HEAD.axes, Some((torso, vc7)), [false, true])?;
+            [torso, torso, head, head]
+        } else {
+            let hips = upright(build.pelvis, 0.485, WAIST);
+            let pelvis = self.limb("pelvis", hips, front, build.pelvis.axes, None, none)?;
+            let spine = link("vl3", Vec3::Z * WAIST, 0.04, [[-0.5, 1.3], [-0.6, 0.6], [-0.8, 0.8]], 0.12);
+            let chest = upright(build.thorax, WAIST, 0.830);
+            let thorax = self.limb("thorax", chest, front, build.thorax.axes, Some((pelvis, spine)), none)?;
+            let line = upright(build.neck, 0.830, 0.910);
+            let neck = self.limb("neck", line, front, build.neck.axes, Some((thorax, vc7)), none)?;
+            let limits = [[-0.6, 0.6], [-0.4, 0.4], [-0.8, 0.8]];
+            let skullbase = link("skullbase", Vec3::new(base, 0.0, SKULLBASE), 0.015, limits, 0.10);
+            let line = upright(build.head, 0.880, 0.995);
+            let head = self.limb("head", line, front, build.head.axes, Some((neck, skullbase)), [false, true])?;
+            [pelvis, thorax, neck, head]
         };
         self.site("humanoid_root", legs, Vec3::new(build.root, 0.0, 0.535));
         self.site("vc7", neck, Vec3::Z * VC7);
         self.site("skullbase", skull, Vec3::new(base, 0.0, SKULLBASE));
         self.site("head_center", skull, Vec3::new(center, 0.0, 0.937));
         self.site("skull_tip", skull, Vec3::new(tip, 0.0, 0.997));
-        (legs, arms)
+        Ok((legs, arms))
     }
 
-    fn arm(&mut self, model: HumanModel, prefix: &str, side: f64, thorax: usize) {
+    fn arm(&mut self, model: HumanModel, prefix: &str, side: f64, thorax: usize) -> Result<(), BodyError> {
         let named = |name: &str| format!("{prefix}_{name}");
         let shoulder = Vec3::new(model.build().arm, side * SHOULDER[0], SHOULDER[1]);
         let elbow = shoulder - Vec3::Z * UPPER_ARM;
@@ -261,7 +231,7 @@ impl Builder {
         let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
         let carrier = match model {
             HumanModel::Papers => thorax,
-            HumanModel::Full | HumanModel::Measured => self.clavicle(model.build(), prefix, side, thorax),
+            HumanModel::Full | HumanModel::Measured => self.clavicle(model.build(), prefix, side, thorax)?,
         };
         let surface = model.build().upper_arm;
         let upper = self.limb(
@@ -269,78 +239,58 @@ impl Builder {
             surface.ends([shoulder + Vec3::Z * DELTOID, elbow], side),
             Vec3::X,
             surface.axes,
-            Some((carrier, arm_link(named("shoulder"), shoulder, [0.0; 2], shoulder_limits, 0.35))),
+            Some((carrier, joint(named("shoulder"), shoulder, hanging(), [0.0; 2], shoulder_limits, 0.35))),
             [false; 2],
-        );
+        )?;
         self.site(named("shoulder"), upper, shoulder);
         let (end, caps) = match model {
             // The ten-limb model has no hand: its forearm ends at the knuckles.
             HumanModel::Papers => (wrist - Vec3::Z * KNUCKLES, [false, true]),
             HumanModel::Full | HumanModel::Measured => (wrist, [false; 2]),
         };
-        let link = arm_link(named("elbow"), elbow, [0.02, 0.0], [[-0.1, 2.7], [0.0; 2], [0.0; 2]], 0.45);
+        let link = joint(named("elbow"), elbow, hanging(), [0.02, 0.0], [[-0.1, 2.7], [0.0; 2], [0.0; 2]], 0.45);
         let surface = model.build().forearm;
         let line = surface.ends([elbow, end], side);
-        let forearm = self.limb(named("forearm"), line, Vec3::X, surface.axes, Some((upper, link)), caps);
+        let forearm = self.limb(named("forearm"), line, Vec3::X, surface.axes, Some((upper, link)), caps)?;
         let last = match model {
             HumanModel::Papers => forearm,
             HumanModel::Full | HumanModel::Measured => {
                 let limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
-                let link = arm_link(named("wrist"), wrist, [0.012; 2], limits, 0.3);
+                let link = joint(named("wrist"), wrist, hanging(), [0.012; 2], limits, 0.3);
                 let line = [wrist, wrist - Vec3::Z * HAND];
-                self.limb(named("hand"), line, Vec3::X, HAND_AXES, Some((forearm, link)), [false, true])
+                self.limb(named("hand"), line, Vec3::X, HAND_AXES, Some((forearm, link)), [false, true])?
             }
         };
         self.site(named("elbow"), forearm, elbow);
         self.site(named("wrist"), last, wrist);
         self.site(named("hand"), last, wrist - Vec3::Z * HAND_CENTER);
+        Ok(())
     }
 
     /// Adds a clavicle. It carries the arm and moves slightly on the chest: a raised arm raises its shoulder.
-    fn clavicle(&mut self, build: &Build, prefix: &str, side: f64, thorax: usize) -> usize {
+    fn clavicle(&mut self, build: &Build, prefix: &str, side: f64, thorax: usize) -> Result<usize, BodyError> {
         let [x, y, z] = STERNOCLAVICULAR;
-        let link = JointSpec {
-            name: format!("{prefix}_sternoclavicular"),
-            center: Vec3::new(x, side * y, z),
-            // The joint's x axis points forward: positive rotations about it raise the left shoulder.
-            flexion: Vec3::X,
-            along: Vec3::Z,
-            semi_axes: [0.0; 2],
-            limits: [mirrored([-0.15, 0.70], side), [-0.1, 0.1], [-0.4, 0.4]],
-            motion: 0.015,
-        };
+        // The joint's x axis points forward: positive rotations about it raise the left shoulder.
+        let limits = [mirrored([-0.15, 0.70], side), [-0.1, 0.1], [-0.4, 0.4]];
+        let (name, center) = (format!("{prefix}_sternoclavicular"), Vec3::new(x, side * y, z));
+        let link = joint(name, center, [Vec3::X, Vec3::Z], [0.0; 2], limits, 0.015);
         let line = build.slope.map(|[x, y, z]| Vec3::new(x, side * y, z));
         self.limb(format!("{prefix}_clavicle"), line, Vec3::Z, build.clavicle.axes, Some((thorax, link)), [false; 2])
     }
 
-    fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) {
+    fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) -> Result<(), BodyError> {
         let named = |name: &str| format!("{prefix}_{name}");
         let hip = Vec3::new(0.0, side * HIP[0], HIP[1]);
         let knee = Vec3::new(0.0, hip.y, KNEE);
         let ankle = Vec3::new(0.0, hip.y, ANKLE);
         let hip_limits = [[-0.6, 2.3], mirrored([-1.0, 0.5], side), mirrored([-0.8, 0.8], side)];
-        let link_hip = JointSpec {
-            name: named("hip"),
-            center: hip,
-            flexion: -Vec3::Y,
-            along: -Vec3::Z,
-            semi_axes: [0.02, 0.005],
-            limits: hip_limits,
-            motion: 0.25,
-        };
+        let link = joint(named("hip"), hip, hanging(), [0.02, 0.005], hip_limits, 0.25);
         let surface = model.build().thigh;
         let line = surface.ends([hip, knee], side);
-        let thigh = self.limb(named("thigh"), line, Vec3::X, surface.axes, Some((pelvis, link_hip)), [false; 2]);
+        let thigh = self.limb(named("thigh"), line, Vec3::X, surface.axes, Some((pelvis, link)), [false; 2])?;
         // A hanging calf bends backward, which is a rotation about the axis to the left.
-        let link_knee = JointSpec {
-            name: named("knee"),
-            center: knee,
-            flexion: Vec3::Y,
-            along: -Vec3::Z,
-            semi_axes: [0.028, 0.0],
-            limits: [[-0.1, 2.6], [0.0; 2], [0.0; 2]],
-            motion: 0.30,
-        };
+        let knee_limits = [[-0.1, 2.6], [0.0; 2], [0.0; 2]];
+        let link = joint(named("knee"), knee, [Vec3::Y, -Vec3::Z], [0.028, 0.0], knee_limits, 0.30);
         self.site(named("hip"), thigh, hip);
         let (end, caps) = match model {
             HumanModel::Papers => (knee - Vec3::Z * KNEE, [false, true]),
@@ -348,61 +298,41 @@ impl Builder {
         };
         let surface = model.build().calf;
         let line = surface.ends([knee, end], side);
-        let calf = self.limb(named("calf"), line, Vec3::X, surface.axes, Some((thigh, link_knee)), caps);
+        let calf = self.limb(named("calf"), line, Vec3::X, surface.axes, Some((thigh, link)), caps)?;
         self.site(named("knee"), calf, knee);
         self.site(named("ankle"), calf, ankle);
         if model != HumanModel::Papers {
             let [heel, toe] = model.build().foot;
             let line = [Vec3::new(-HEEL, hip.y, heel), Vec3::new(TOE, hip.y, toe)];
-            let link = JointSpec {
-                name: named("ankle"),
-                center: ankle,
-                flexion: -Vec3::Y,
-                along: -Vec3::Z,
-                semi_axes: [0.012; 2],
-                limits: [[-0.8, 0.6], [-0.4, 0.4], [-0.4, 0.4]],
-                motion: 0.20,
-            };
-            let foot = self.limb(named("foot"), line, Vec3::Z, FOOT_AXES, Some((calf, link)), [true, true]);
+            let limits = [[-0.8, 0.6], [-0.4, 0.4], [-0.4, 0.4]];
+            let link = joint(named("ankle"), ankle, hanging(), [0.012; 2], limits, 0.20);
+            let foot = self.limb(named("foot"), line, Vec3::Z, FOOT_AXES, Some((calf, link)), [true, true])?;
             self.site(named("toe"), foot, Vec3::new(TOE, hip.y, 0.012));
         }
-    }
-
-    fn finish(self, name: &str) -> Result<Body, BodyError> {
-        let poses: Vec<Pose> = self.parts.iter().map(|part| part.standing_from_limb).collect();
-        let mut limbs = Vec::with_capacity(poses.len());
-        for (index, part) in self.parts.into_iter().enumerate() {
-            let [a0, b0, a1, b1] = part.axes;
-            let shape = TaperedEllipticCylinder::new(part.length, a0, b0, a1, b1)
-                .map_err(|source| BodyError::Shape { key: format!("limbs.{}", part.name), source })?;
-            let parent = part.parent.map(|(parent, link)| {
-                let axes = Mat3::from_cols(link.flexion, link.along.cross(link.flexion), link.along);
-                let standing_from_joint = Pose::from_parts(link.center, Quat::from_mat3(&axes));
-                let joint = Joint {
-                    name: link.name,
-                    parent_from_joint: poses[parent].inv_mul(&standing_from_joint),
-                    limb_from_joint: poses[index].inv_mul(&standing_from_joint),
-                    semi_axes: link.semi_axes,
-                    weight: 1.0,
-                    limits: Some(link.limits),
-                    motion: link.motion,
-                };
-                (parent, joint)
-            });
-            limbs.push(Limb { name: part.name, shape, parent, match_caps: part.match_caps });
-        }
-        let sites = self
-            .sites
-            .into_iter()
-            .map(|(name, limb, point)| Site { name, limb, position: poses[limb].inverse_transform_point(point) })
-            .collect();
-        Body::new(name, limbs, sites)
+        Ok(())
     }
 }
 
-/// A joint of a hanging arm.
-fn arm_link(name: String, center: Vec3, semi_axes: [f64; 2], limits: [[f64; 2]; 3], motion: f64) -> JointSpec {
-    JointSpec { name, center, flexion: -Vec3::Y, along: -Vec3::Z, semi_axes, limits, motion }
+/// A joint whose ellipses are given in the standing frame. Its frame has x along `flexion` and z along `along`; limits and motion in
+/// radians.
+fn joint(
+    name: impl Into<String>,
+    center: Vec3,
+    [flexion, along]: [Vec3; 2],
+    semi_axes: [f64; 2],
+    limits: [[f64; 2]; 3],
+    motion: f64,
+) -> Joint {
+    let axes = Mat3::from_cols(flexion, along.cross(flexion), along);
+    let pose = Pose::from_parts(center, Quat::from_mat3(&axes));
+    let (parent_from_joint, limb_from_joint) = (pose, pose);
+    let (weight, limits) = (1.0, Some(limits));
+    Joint { name: name.into(), parent_from_joint, limb_from_joint, semi_axes, weight, limits, motion }
+}
+
+/// Flexion and direction of the joints of a hanging limb.
+fn hanging() -> [Vec3; 2] {
+    [-Vec3::Y, -Vec3::Z]
 }
 
 /// A range for the left side (`side` = 1), mirrored for the right one.
@@ -417,18 +347,14 @@ impl Body {
     /// joint frame's x axis; a positive angle is flexion.
     pub fn human(stature: f64, model: HumanModel) -> Result<Self, BodyError> {
         if !(0.3..=3.0).contains(&stature) {
-            return Err(BodyError::Value {
-                key: "stature".into(),
-                expected: "meters from 0.3 to 3.0",
-                found: stature.to_string(),
-            });
+            return Err(BodyError::value("stature", "meters from 0.3 to 3.0", stature.to_string()));
         }
         let mut builder = Builder::default();
-        let (legs, arms) = builder.trunk(model);
+        let (legs, arms) = builder.trunk(model)?;
         for (prefix, side) in [("l", 1.0), ("r", -1.0)] {
-            builder.arm(model, prefix, side, arms);
-            builder.leg(model, prefix, side, legs);
+            builder.arm(model, prefix, side, arms)?;
+            builder.leg(model, prefix, side, legs)?;
         }
-        builder.finish("human")?.scaled(stature)
+        Body::new("human", builder.limbs, builder.sites)?.scaled(stature)
     }
 }

@@ -21,9 +21,9 @@ use crate::math::{Pose, Vec3};
 ///     limits: Some([[0.0, 2.5], [0.0, 0.0], [0.0, 0.0]]),
 ///     motion: 0.3,
 /// };
-/// assert_eq!((elbow.kind(), elbow.band_count()), (JointKind::Hinge, 2));
+/// assert_eq!((elbow.kind(), elbow.band_points().count()), (JointKind::Hinge, 2));
 /// let shoulder = Joint { semi_axes: [0.0, 0.0], limits: None, ..elbow };
-/// assert_eq!((shoulder.kind(), shoulder.band_count()), (JointKind::Universal, 1));
+/// assert_eq!((shoulder.kind(), shoulder.band_points().count()), (JointKind::Universal, 1));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
@@ -78,15 +78,6 @@ impl Joint {
             JointKind::Elliptic => ([Vec3::X * a, Vec3::X * -a, Vec3::Y * b, Vec3::Y * -b], 4),
         };
         points.into_iter().take(count)
-    }
-
-    /// Number of bands.
-    pub fn band_count(&self) -> usize {
-        match self.kind() {
-            JointKind::Universal => 1,
-            JointKind::Hinge => 2,
-            JointKind::Elliptic => 4,
-        }
     }
 
     /// Pose of the limb in its parent when the bands have length zero and the joint rotation is zero.

@@ -126,24 +126,26 @@ impl Body {
         find("site", name, self.sites.iter().map(|site| site.name.as_str()))
     }
 
+    /// The parent of a limb.
+    pub fn parent(&self, limb: usize) -> Option<usize> {
+        self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent)
+    }
+
     /// True when one of the two limbs is the parent of the other.
     pub(crate) fn adjacent(&self, first: usize, second: usize) -> bool {
-        let joins =
-            |child: usize, parent: usize| self.limbs[child].parent.as_ref().is_some_and(|(index, _)| *index == parent);
-        joins(first, second) || joins(second, first)
+        self.parent(first) == Some(second) || self.parent(second) == Some(first)
     }
 
     /// Whether two limbs are neither joined nor joined to the same parent. Limbs that are joined overlap near their joints in any
     /// pose.
     pub(crate) fn are_apart(&self, first: usize, second: usize) -> bool {
-        let parent = |limb: usize| self.limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
-        first != second && !self.adjacent(first, second) && (parent(first) != parent(second) || parent(first).is_none())
+        let (own, other) = (self.parent(first), self.parent(second));
+        first != second && !self.adjacent(first, second) && (own != other || own.is_none())
     }
 
     /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
-        let hangs = move |other: &usize| matches!(self.limbs[*other].parent, Some((parent, _)) if parent == limb);
-        (0..self.limbs.len()).filter(hangs)
+        (0..self.limbs.len()).filter(move |other| self.parent(*other) == Some(limb))
     }
 
     /// World poses of all limbs with every joint closed and at rest.
@@ -185,15 +187,13 @@ impl Body {
     }
 
     fn check(&self) -> Result<(), BodyError> {
+        let wrong = |key: &str, expected, found: &str| Err(BodyError::value(key, expected, found));
         if self.limbs.is_empty() {
             return Err(BodyError::Empty);
         }
         if self.limbs.len() > MOST_LIMBS || self.sites.len() > MOST_SITES {
-            return Err(BodyError::Value {
-                key: "body".into(),
-                expected: "at most 1,000 limbs and 10,000 sites",
-                found: format!("{} and {}", self.limbs.len(), self.sites.len()),
-            });
+            let found = format!("{} and {}", self.limbs.len(), self.sites.len());
+            return wrong("body", "at most 1,000 limbs and 10,000 sites", &found);
         }
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
@@ -209,18 +209,11 @@ impl Body {
                     check_joint(&format!("{key}.joint"), joint)?;
                 }
                 (None, _) => {
-                    return Err(BodyError::Value {
-                        key: format!("{key}.parent"),
-                        expected: "a parent (only the first limb is the root)",
-                        found: "none".into(),
-                    });
+                    return wrong(&format!("{key}.parent"), "a parent (only the first limb is the root)", "none");
                 }
                 (Some((parent, _)), _) => {
-                    return Err(BodyError::Value {
-                        key: format!("{key}.parent"),
-                        expected: "a limb that stands before this one",
-                        found: format!("limb {parent}"),
-                    });
+                    let found = format!("limb {parent}");
+                    return wrong(&format!("{key}.parent"), "a limb that stands before this one", &found);
                 }
             }
         }
@@ -231,18 +224,11 @@ impl Body {
                 return Err(BodyError::Duplicate { key, name: site.name.clone() });
             }
             if site.limb >= self.limbs.len() {
-                return Err(BodyError::Value {
-                    key: format!("{key}.limb"),
-                    expected: "the index of a limb",
-                    found: site.limb.to_string(),
-                });
+                return wrong(&format!("{key}.limb"), "the index of a limb", &site.limb.to_string());
             }
             if !is_place(site.position) {
-                return Err(BodyError::Value {
-                    key: format!("{key}.position"),
-                    expected: "finite meters, 1e9 at most",
-                    found: format!("{:?}", site.position.to_array()),
-                });
+                let found = format!("{:?}", site.position.to_array());
+                return wrong(&format!("{key}.position"), "finite meters, 1e9 at most", &found);
             }
         }
         Ok(())
@@ -251,7 +237,7 @@ impl Body {
 
 fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
     if name.is_empty() {
-        return Err(BodyError::Value { key: key.into(), expected: "a name", found: "an empty one".into() });
+        return Err(BodyError::value(key, "a name", "an empty one"));
     }
     check_letters(key, name)
 }
@@ -260,14 +246,13 @@ fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
 fn check_letters(key: &str, name: &str) -> Result<(), BodyError> {
     if name.chars().any(|letter| letter.is_control() || matches!(letter, '{' | '}' | '\u{2028}' | '\u{2029}')) {
         let expected = "a name without tabs, line breaks and braces";
-        return Err(BodyError::Value { key: key.into(), expected, found: format!("{name:?}") });
+        return Err(BodyError::value(key, expected, format!("{name:?}")));
     }
     Ok(())
 }
 
 fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
-    let wrong =
-        |field: &str, expected, found: String| Err(BodyError::Value { key: format!("{key}.{field}"), expected, found });
+    let wrong = |field: &str, expected, found: String| Err(BodyError::value(format!("{key}.{field}"), expected, found));
     if joint.semi_axes.iter().any(|axis| !axis.is_finite() || *axis < 0.0) {
         return wrong("semi_axes", "two finite lengths, zero or more", format!("{:?}", joint.semi_axes));
     }
@@ -294,7 +279,6 @@ fn check_joint(key: &str, joint: &Joint) -> Result<(), BodyError> {
 
 fn find<'a>(what: &'static str, name: &str, names: impl Iterator<Item = &'a str> + Clone) -> Result<usize, BodyError> {
     names.clone().position(|known| known == name).ok_or_else(|| BodyError::Unknown {
-        key: what.into(),
         what,
         name: name.into(),
         known: names.map(String::from).collect(),

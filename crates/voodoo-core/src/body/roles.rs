@@ -101,20 +101,6 @@ impl LimbRole {
             _ => return None,
         })
     }
-
-    /// The side of a limb that exists on both sides.
-    pub fn side(self) -> Option<Side> {
-        match self {
-            Self::Pelvis | Self::Thorax | Self::Neck | Self::Head => None,
-            Self::Clavicle(side)
-            | Self::UpperArm(side)
-            | Self::Forearm(side)
-            | Self::Hand(side)
-            | Self::Thigh(side)
-            | Self::Calf(side)
-            | Self::Foot(side) => Some(side),
-        }
-    }
 }
 
 impl JointRole {
@@ -136,21 +122,6 @@ impl JointRole {
             ("ankle", Some(side)) => Self::Ankle(side),
             _ => return None,
         })
-    }
-
-    /// The side of a joint that exists on both sides.
-    pub(crate) fn side(self) -> Option<Side> {
-        match self {
-            Self::Root | Self::Waist | Self::NeckBase | Self::SkullBase | Self::HeadCenter => None,
-            Self::Sternoclavicular(side)
-            | Self::Shoulder(side)
-            | Self::Elbow(side)
-            | Self::Wrist(side)
-            | Self::Hand(side)
-            | Self::Hip(side)
-            | Self::Knee(side)
-            | Self::Ankle(side) => Some(side),
-        }
     }
 
     /// The preceding joint of the same arm or leg, and the resulting requirement for the body as a message.
@@ -196,7 +167,7 @@ impl Roles {
     /// Resolves the names of a body in which parents precede their children.
     ///
     /// # Errors
-    /// [`BodyError::Role`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
+    /// [`BodyError::Value`] when a limb and its joint are named after different sides, or when a joint of an arm or leg does not
     /// follow the preceding one. Detections and statistics of human joints would otherwise be applied to the wrong limbs.
     pub(super) fn resolve<'a>(limbs: &'a [Limb], sites: &[Site]) -> Result<Self, BodyError> {
         let joint_name = |limb: &'a Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.as_str());
@@ -223,16 +194,15 @@ impl Roles {
 
     fn check(&self, limbs: &[Limb], sites: &[Site]) -> Result<(), BodyError> {
         let parent = |limb: usize| limbs[limb].parent.as_ref().map(|(parent, _)| *parent);
-        let opposite = |limb: usize, role: JointRole| {
-            let sides = self.limb(limb).and_then(LimbRole::side).zip(role.side());
+        let opposite = |limb: usize, name: &str| {
+            let sides = self.limb(limb).and(Side::of(&limbs[limb].name)).zip(Side::of(name));
             sides.is_some_and(|(own, other)| own != other)
         };
         for (index, limb) in limbs.iter().enumerate() {
             let (Some((hangs_on, joint)), Some(role)) = (&limb.parent, self.joints[index]) else { continue };
-            let wrong = |expected, found| {
-                Err(BodyError::Role { key: format!("limbs.{}.joint.name", limb.name), expected, found })
-            };
-            if opposite(index, role) {
+            let wrong =
+                |expected, found| Err(BodyError::value(format!("limbs.{}.joint.name", limb.name), expected, found));
+            if opposite(index, &joint.name) {
                 return wrong("a joint of the limb's own side", joint.name.clone());
             }
             // A second joint of the same name belongs to another limb that is attached there.
@@ -243,12 +213,12 @@ impl Roles {
             }
         }
         for (site, role) in sites.iter().zip(&self.sites) {
-            if role.is_some_and(|role| opposite(site.limb, role)) {
-                return Err(BodyError::Role {
-                    key: format!("sites.{}.limb", site.name),
-                    expected: "a limb of the site's own side",
-                    found: limbs[site.limb].name.clone(),
-                });
+            if role.is_some() && opposite(site.limb, &site.name) {
+                return Err(BodyError::value(
+                    format!("sites.{}.limb", site.name),
+                    "a limb of the site's own side",
+                    limbs[site.limb].name.clone(),
+                ));
             }
         }
         Ok(())
@@ -446,7 +416,7 @@ mod tests {
     fn a_body_that_is_named_wrongly_is_refused() {
         let refused = |names: &[[&str; 2]]| {
             let error = chain(names).unwrap_err();
-            assert!(matches!(error, BodyError::Role { .. }));
+            assert!(matches!(error, BodyError::Value { .. }));
             error.to_string()
         };
         assert_eq!(

@@ -40,9 +40,7 @@ impl TwoBone {
             if hinge.kind() != JointKind::Hinge || ball.kind() == JointKind::Hinge {
                 continue;
             }
-            let ends: Vec<usize> = (0..limbs.len())
-                .filter(|end| limbs[*end].parent.as_ref().is_some_and(|(parent, _)| *parent == lower))
-                .collect();
+            let ends: Vec<usize> = body.children(lower).collect();
             let first = (hinge.parent_from_joint.translation - ball.limb_from_joint.translation).length();
             let reach = |end: &usize| {
                 let shape = &limbs[*end].shape;

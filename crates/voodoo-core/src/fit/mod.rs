@@ -21,7 +21,7 @@ use crate::detect::{Detected, MeasuredJoint};
 use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 use crate::regions;
-use crate::solver::{Gate, Problem, Reassociation, Schedule, Solver, WarmStartInput, solver};
+use crate::solver::{Gate, Problem, Schedule, Solver, solver};
 use crate::threads::Threads;
 
 /// First step of a frame that uses the depth contour: in earlier steps, it would push thin limbs off their points (method section
@@ -121,7 +121,7 @@ impl Fit {
             before = distance;
         }
         // The last steps hardly moved anything, so points stay assigned to their limbs where they are assigned.
-        self.match_end(context, poses, steps == 0 || schedule.reassociation == Reassociation::EveryStep);
+        self.match_end(context, poses, steps == 0 || !schedule.whole_body);
         steps
     }
 
@@ -199,7 +199,7 @@ impl Fit {
     fn warm_start(&mut self, context: Context, poses: &mut [Pose]) {
         let frame = context.observation.frame();
         let named = !frame.positions.is_empty() || !frame.rays.is_empty();
-        let points = self.schedule(context.config).warm_start == WarmStartInput::SitesAndPoints;
+        let points = !self.schedule(context.config).whole_body;
         let mut round = 0;
         loop {
             if named && points {
@@ -275,7 +275,7 @@ impl Fit {
 
     /// Steps 6 and 7: fits the body to the correspondences.
     pub(crate) fn solve(&mut self, context: Context, predicted: &[Pose], poses: &mut [Pose], step: usize) {
-        let bands = self.schedule(context.config).bands;
+        let bands = !self.schedule(context.config).whole_body;
         let Self { solver, correspondences, band_weights, .. } = self;
         // 6 Elastic bands on both limbs.
         if bands {

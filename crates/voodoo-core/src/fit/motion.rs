@@ -4,7 +4,7 @@
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
 use crate::body::shoulders::raise_shoulders;
-use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
+use crate::math::{Pose, Quat, Vec3, rotation_vector, shifted};
 
 /// Longest extrapolation of a motion, in multiples of the interval over which it was measured.
 const LONGEST_PREDICTION: f64 = 2.0;
@@ -145,7 +145,7 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
 }
 
 fn extrapolate(before: Quat, now: Quat, factor: f64) -> Quat {
-    let motion = (now * before.inverse()).to_scaled_axis_shortest();
+    let motion = rotation_vector(now * before.inverse());
     Quat::from_scaled_axis(factor * motion) * now
 }
 

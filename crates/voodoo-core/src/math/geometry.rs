@@ -6,11 +6,12 @@
 //! * a transform is named `a_from_b` and maps coordinates in `b` to coordinates in `a`;
 //! * a twist is `(omega, v)`, radians and meters, and perturbs on the left: `T' = exp(xi) T`.
 
-pub use glam::{DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
+pub use glam::{DAffine3 as Affine3, DMat3 as Mat3, DQuat as Quat, DVec3 as Vec3};
 use std::ops::Mul;
 
 /// A rigid transform: a rotation, then a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// A unit quaternion.
     pub rotation: Quat,
@@ -76,16 +77,6 @@ impl Pose {
     #[inline]
     pub(crate) fn inverse_transform_vector(&self, vector: Vec3) -> Vec3 {
         self.rotation.inverse() * vector
-    }
-
-    /// The pose at the fraction `t` of the way to another one: spherical interpolation for the rotation, linear for the
-    /// translation.
-    #[inline]
-    pub fn lerp(&self, other: &Self, t: f64) -> Self {
-        Self {
-            rotation: self.rotation.slerp(other.rotation, t),
-            translation: self.translation.lerp(other.translation, t),
-        }
     }
 
     /// Whether all numbers are finite.
@@ -260,19 +251,12 @@ impl Points {
     }
 }
 
-/// Rotation vector of the shorter rotation.
-pub trait ShortestAxis {
-    /// The rotation vector, at most pi long.
-    fn to_scaled_axis_shortest(self) -> Vec3;
-}
-
-impl ShortestAxis for Quat {
-    fn to_scaled_axis_shortest(self) -> Vec3 {
-        let q = if self.w < 0.0 { -self } else { self };
-        let v = Vec3::new(q.x, q.y, q.z);
-        let sine = v.length();
-        if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
-    }
+/// Rotation vector of the shorter rotation, at most pi long; exact to rounding at 0 and at pi.
+pub fn rotation_vector(rotation: Quat) -> Vec3 {
+    let q = if rotation.w < 0.0 { -rotation } else { rotation };
+    let v = Vec3::new(q.x, q.y, q.z);
+    let sine = v.length();
+    if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
 }
 
 /// The transform into the working frame, whose origin is `origin` in the world.

@@ -1,62 +1,36 @@
 //! The linear assignment problem.
 
-/// A table of costs, row by row.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CostTable {
-    columns: usize,
-    values: Vec<f64>,
-}
-
-impl CostTable {
-    /// The costs by row and column.
-    pub fn from_fn(rows: usize, columns: usize, cost: impl Fn(usize, usize) -> f64) -> Self {
-        let cost = &cost;
-        let values = (0..rows).flat_map(|row| (0..columns).map(move |column| cost(row, column))).collect();
-        Self { columns, values }
-    }
-
-    /// Number of rows; 0 without columns.
-    pub fn rows(&self) -> usize {
-        self.values.len() / self.columns.max(1)
-    }
-
-    /// Number of columns.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Cost of a pair.
-    pub fn at(&self, row: usize, column: usize) -> f64 {
-        self.values[row * self.columns + column]
-    }
-
-    fn transposed(&self) -> Self {
-        Self::from_fn(self.columns, self.rows(), |row, column| self.at(column, row))
-    }
-}
-
 /// The pairs (row, column) with the least sum of finite costs, sorted by row. Every row or every column occurs once, whichever
 /// are fewer.
 ///
 /// Shortest augmenting paths (Crouse, "On implementing 2D rectangular assignment algorithms", 2016). Among assignments of equal
 /// cost it returns the one of SciPy's `linear_sum_assignment`.
-pub fn linear_sum_assignment(cost: &CostTable) -> Vec<(usize, usize)> {
-    if cost.columns < cost.rows() {
-        let mut pairs: Vec<_> =
-            linear_sum_assignment(&cost.transposed()).into_iter().map(|(column, row)| (row, column)).collect();
+pub fn linear_sum_assignment(rows: usize, columns: usize, cost: &dyn Fn(usize, usize) -> f64) -> Vec<(usize, usize)> {
+    if columns < rows {
+        let transposed = linear_sum_assignment(columns, rows, &|column, row| cost(row, column));
+        let mut pairs: Vec<_> = transposed.into_iter().map(|(column, row)| (row, column)).collect();
         pairs.sort_unstable();
         return pairs;
     }
-    let mut search = Search::new(cost);
-    for row in 0..cost.rows() {
+    let mut search = Search {
+        costs: (0..rows).flat_map(|row| (0..columns).map(move |column| cost(row, column))).collect(),
+        row_price: vec![0.0; rows],
+        column_price: vec![0.0; columns],
+        column_of: vec![None; rows],
+        row_of: vec![None; columns],
+        shortest: vec![0.0; columns],
+        from: vec![0; columns],
+    };
+    for row in 0..rows {
         search.add(row);
     }
     search.column_of.iter().enumerate().filter_map(|(row, column)| column.map(|column| (row, column))).collect()
 }
 
 /// The partial assignment, and the dual prices that prove it optimal.
-struct Search<'a> {
-    cost: &'a CostTable,
+struct Search {
+    /// By row and column.
+    costs: Vec<f64>,
     row_price: Vec<f64>,
     column_price: Vec<f64>,
     column_of: Vec<Option<usize>>,
@@ -65,20 +39,7 @@ struct Search<'a> {
     from: Vec<usize>,
 }
 
-impl<'a> Search<'a> {
-    fn new(cost: &'a CostTable) -> Self {
-        let (rows, columns) = (cost.rows(), cost.columns);
-        Self {
-            cost,
-            row_price: vec![0.0; rows],
-            column_price: vec![0.0; columns],
-            column_of: vec![None; rows],
-            row_of: vec![None; columns],
-            shortest: vec![0.0; columns],
-            from: vec![0; columns],
-        }
-    }
-
+impl Search {
     /// Assigns a column to one more row, reassigning other rows as needed.
     fn add(&mut self, row: usize) {
         let (mut rows, mut columns) = (vec![false; self.row_price.len()], vec![false; self.column_price.len()]);
@@ -112,7 +73,8 @@ impl<'a> Search<'a> {
             rows[row] = true;
             let (mut lowest, mut index) = (f64::INFINITY, None);
             for (place, &column) in remaining.iter().enumerate() {
-                let through = least + self.cost.at(row, column) - self.row_price[row] - self.column_price[column];
+                let cost = self.costs[row * columns.len() + column];
+                let through = least + cost - self.row_price[row] - self.column_price[column];
                 if through < self.shortest[column] {
                     self.from[column] = row;
                     self.shortest[column] = through;
@@ -139,15 +101,15 @@ mod tests {
     use super::*;
 
     /// The least sum by exhaustive search; there are at most as many rows as columns.
-    fn least(cost: &CostTable, row: usize, taken: &mut Vec<bool>) -> f64 {
-        if row == cost.rows() {
+    fn least(cost: &dyn Fn(usize, usize) -> f64, row: usize, rows: usize, taken: &mut Vec<bool>) -> f64 {
+        if row == rows {
             return 0.0;
         }
         let mut found = f64::INFINITY;
-        for column in 0..cost.columns() {
+        for column in 0..taken.len() {
             if !taken[column] {
                 taken[column] = true;
-                found = found.min(cost.at(row, column) + least(cost, row + 1, taken));
+                found = found.min(cost(row, column) + least(cost, row + 1, rows, taken));
                 taken[column] = false;
             }
         }
@@ -164,16 +126,17 @@ mod tests {
         for _ in 0..200 {
             let (rows, extra) = (1 + (chance() * 4.0) as usize, (chance() * 3.0) as usize);
             let values: Vec<f64> = (0..rows * (rows + extra)).map(|_| chance() - 0.5).collect();
-            let wide = CostTable::from_fn(rows, rows + extra, |row, column| values[row * (rows + extra) + column]);
-            let pairs = linear_sum_assignment(&wide);
-            let sum: f64 = pairs.iter().map(|(row, column)| wide.at(*row, *column)).sum();
+            let columns = rows + extra;
+            let wide = |row: usize, column: usize| values[row * columns + column];
+            let pairs = linear_sum_assignment(rows, columns, &wide);
+            let sum: f64 = pairs.iter().map(|(row, column)| wide(*row, *column)).sum();
             assert!(pairs.iter().map(|(row, _)| *row).eq(0..rows));
-            assert!((sum - least(&wide, 0, &mut vec![false; rows + extra])).abs() < 1e-12);
-            let mut turned: Vec<_> =
-                linear_sum_assignment(&wide.transposed()).into_iter().map(|(row, column)| (column, row)).collect();
+            assert!((sum - least(&wide, 0, rows, &mut vec![false; columns])).abs() < 1e-12);
+            let turned = linear_sum_assignment(columns, rows, &|column, row| wide(row, column));
+            let mut turned: Vec<_> = turned.into_iter().map(|(row, column)| (column, row)).collect();
             turned.sort_unstable();
             assert_eq!(turned, pairs);
         }
-        assert!(linear_sum_assignment(&CostTable::from_fn(3, 0, |_, _| 0.0)).is_empty());
+        assert!(linear_sum_assignment(3, 0, &|_, _| 0.0).is_empty());
     }
 }

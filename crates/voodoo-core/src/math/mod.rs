@@ -12,9 +12,9 @@ pub(crate) use absolute_orientation::Moments;
 pub use cholesky::solve_in_place;
 pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
-pub use linear_sum_assignment::{CostTable, linear_sum_assignment};
+pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
-pub use simd::{LANES, has_avx512, widest};
+pub use simd::{LANES, has_avx512, load, store, widest};
 pub(crate) use weighted_points::WeightedPoints;
 
 /// The cubic that rises smoothly from 0 at `at = 0` to 1 at `at = 1`, and is constant outside.

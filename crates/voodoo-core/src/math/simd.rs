@@ -3,6 +3,24 @@
 /// Number of single-precision values in one AVX2 register.
 pub const LANES: usize = 8;
 
+/// Copies into the first values of an array. Mostly it is filled, and its size is then known to the compiler.
+#[inline(always)]
+pub fn load<T: Copy, const N: usize>(to: &mut [T; N], from: &[T]) {
+    match from.first_chunk() {
+        Some(from) => *to = *from,
+        None => to[..from.len()].copy_from_slice(from),
+    }
+}
+
+/// Copies the first values of an array. Mostly they are all copied, and their number is then known to the compiler.
+#[inline(always)]
+pub fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
+    match to.first_chunk_mut() {
+        Some(to) => *to = *from,
+        None => to.copy_from_slice(&from[..to.len()]),
+    }
+}
+
 /// Runs `work`, compiled for AVX-512 or AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`.
 ///
 /// Fused multiply-add is disabled on purpose: without it the result is bit-identical on every processor.

@@ -1,6 +1,7 @@
 //! Carries a learned scene over to a new camera pose: its surfaces are static in the world.
 
 use super::background::{Background, Backgrounds, pose_difference};
+use super::candidates::columns_f32;
 use super::frame::{DepthImage, Frame};
 use crate::math::{Pose, Vec3};
 
@@ -59,7 +60,7 @@ impl Background {
     /// accumulate.
     fn move_to(&mut self, image: &DepthImage, before: &Pose) {
         let moved = image.world_from_sensor.inverse() * *before;
-        let turn = glam_columns(&moved);
+        let turn = columns_f32(&moved);
         let camera = image.camera;
         let width = camera.width();
         let center = |index: usize| camera.pixel_ray(index % width, index / width).map(|value| value as f32);
@@ -98,12 +99,6 @@ impl Background {
 
 /// Stands for the ray through the pixel center.
 pub(super) const NO_RAY: [f32; 2] = [f32::INFINITY; 2];
-
-/// Columns of the rotation, then the translation.
-fn glam_columns(pose: &Pose) -> [[f32; 3]; 4] {
-    let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| pose.rotation * axis);
-    [axes[0], axes[1], axes[2], pose.translation].map(|column| column.to_array().map(|value| value as f32))
-}
 
 #[cfg(test)]
 mod tests {

@@ -241,7 +241,7 @@ pub(crate) fn image_window(
 }
 
 /// Columns of the rotation, then the translation.
-fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
+pub(super) fn columns_f32(pose: &Pose) -> [[f32; 3]; 4] {
     [pose.rotation * Vec3::X, pose.rotation * Vec3::Y, pose.rotation * Vec3::Z, pose.translation]
         .map(|column| column.to_array().map(|value| value as f32))
 }

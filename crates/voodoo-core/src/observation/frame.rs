@@ -383,7 +383,7 @@ impl<'a> Frame<'a> {
     /// return"; in a cloud it is an error (drop such rows before).
     pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
         if !self.stamp.is_finite() {
-            return Err(TrackError::Stamp(self.stamp));
+            return Err(TrackError::measurement("stamp", "a finite time in seconds", self.stamp.to_string()));
         }
         if let Some(previous) = previous_stamp.filter(|previous| *previous >= self.stamp) {
             return Err(TrackError::TimeBackwards { previous, found: self.stamp });
@@ -432,13 +432,9 @@ impl<'a> Frame<'a> {
             check_bias(|| what("bias"), relation.bias)?;
             check_vector(|| what("origin"), relation.origin)?;
             check_vector(|| what("direction"), relation.direction)?;
-            if relation.direction.length() < 1e-9 {
-                return Err(TrackError::measurement(
-                    what("direction"),
-                    "a vector that is not zero",
-                    format!("{:?}", relation.direction.to_array()),
-                ));
-            }
+            let (known, found) =
+                (relation.direction.length() >= 1e-9, || format!("{:?}", relation.direction.to_array()));
+            require(known, || what("direction"), "a vector that is not zero", found)?;
         }
         self.check_scene()
     }
@@ -485,37 +481,30 @@ fn check_position(what: impl Fn() -> String, relation: &PositionRelation, body: 
 }
 
 fn check_site(what: impl FnOnce() -> String, site: usize, body: &Body) -> Result<(), TrackError> {
-    if site < body.sites().len() {
-        Ok(())
-    } else {
-        Err(TrackError::measurement(what(), "the index of a site", site.to_string()))
-    }
+    require(site < body.sites().len(), what, "the index of a site", || site.to_string())
 }
 
 fn check_weight(what: impl FnOnce() -> String, weight: f64) -> Result<(), TrackError> {
-    if weight.is_finite() && weight > 0.0 {
-        Ok(())
-    } else {
-        Err(TrackError::measurement(what(), "a finite weight above zero", weight.to_string()))
-    }
+    require(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", || weight.to_string())
 }
 
 fn check_bias(what: impl FnOnce() -> String, bias: f64) -> Result<(), TrackError> {
-    if bias.is_finite() && bias >= 0.0 {
-        Ok(())
-    } else {
-        Err(TrackError::measurement(what(), "a finite length, zero or above", bias.to_string()))
-    }
+    require(bias.is_finite() && bias >= 0.0, what, "a finite length, zero or above", || bias.to_string())
 }
 
 fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), TrackError> {
-    if is_place(vector) {
-        Ok(())
-    } else {
-        Err(TrackError::measurement(what(), "finite meters, 1e9 at most", format!("{:?}", vector.to_array())))
-    }
+    require(is_place(vector), what, "finite meters, 1e9 at most", || format!("{:?}", vector.to_array()))
 }
 
 fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
-    if is_rigid(pose) { Ok(()) } else { Err(TrackError::measurement(what(), "a rigid transform", format!("{pose:?}"))) }
+    require(is_rigid(pose), what, "a rigid transform", || format!("{pose:?}"))
+}
+
+fn require(
+    valid: bool,
+    what: impl FnOnce() -> String,
+    expected: &'static str,
+    found: impl FnOnce() -> String,
+) -> Result<(), TrackError> {
+    if valid { Ok(()) } else { Err(TrackError::measurement(what(), expected, found())) }
 }

@@ -4,7 +4,7 @@ use crate::config::Config;
 use crate::math::Vec3;
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::frame::{DepthPixels, Frame};
+use crate::observation::frame::Frame;
 
 /// Approximate number of samples per source: a search runs while the body is lost, and must keep up with the frame rate.
 const SAMPLES_PER_SOURCE: usize = 5000;
@@ -110,10 +110,7 @@ impl Segments {
             let spread = (step * step) as f64 / (fx * fy * REFERENCE_PATCH);
             for row in (0..image.camera.height()).step_by(step) {
                 for pixel in (row * image.camera.width()..(row + 1) * image.camera.width()).step_by(step) {
-                    let z = match image.pixels {
-                        DepthPixels::U16(pixels) => f32::from(pixels[pixel]),
-                        DepthPixels::F32(pixels) => pixels[pixel],
-                    } * image.meters_per_unit as f32;
+                    let z = image.pixels.get(pixel) * image.meters_per_unit as f32;
                     let returned = z > 0.0 && z.is_finite();
                     if !returned || background.get(pixel).is_some_and(|depth| Background::contains(*depth, z)) {
                         continue;

@@ -1,17 +1,15 @@
 //! Joint assignment of all confirmed tentative tracks to lost or absent persons, or to new ones.
 
-use crate::math::{CostTable, linear_sum_assignment};
+use crate::math::linear_sum_assignment;
 
 /// Returns for every row its column in the assignment of least total cost, or `None` where the row is left alone at the cost
 /// `alone`. No column is used twice.
 pub(super) fn assign(costs: &[Vec<f64>], alone: f64) -> Vec<Option<usize>> {
     let (rows, columns) = (costs.len(), costs.first().map_or(0, Vec::len));
     // Each row has an additional column for staying alone. Impossible pairs get a large finite cost.
-    let table = CostTable::from_fn(rows, columns + rows, |row, column| {
-        costs[row].get(column).map_or(alone, |cost| cost.min(10.0 * alone))
-    });
+    let cost = |row: usize, column: usize| costs[row].get(column).map_or(alone, |cost| cost.min(10.0 * alone));
     let mut given = vec![None; rows];
-    for (row, column) in linear_sum_assignment(&table) {
+    for (row, column) in linear_sum_assignment(rows, columns + rows, &cost) {
         given[row] = (column < columns && costs[row][column] < alone).then_some(column);
     }
     given

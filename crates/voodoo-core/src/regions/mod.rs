@@ -20,7 +20,7 @@ use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{Pose, Quat, ShortestAxis, Vec3, shifted};
+use crate::math::{Pose, Quat, Vec3, rotation_vector, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
@@ -30,7 +30,7 @@ use labels::LimbLabels;
 use lines::{Line, OcclusionDepth, Viewer};
 use models::ColorModel;
 pub(crate) use pixel_gain::{Backdrop, PixelGain};
-use scan::{EdgeSearch, Scanner};
+use scan::EdgeSearch;
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
 const SEARCHES: [EdgeSearch; STEPS] = [
@@ -83,7 +83,6 @@ pub(crate) struct ColorRegions {
     stamp: Option<f64>,
     /// Offset of the cameras that learn in the next frame.
     turn: usize,
-    scanner: Scanner,
     evidence: Vec<Evidence>,
     backdrop: Backdrop,
 }
@@ -231,7 +230,7 @@ impl ColorRegions {
         pairs.clear();
         for picture in frame.colors {
             self.place_lines(frame, picture, posed);
-            let Self { cameras, groups, scanner, evidence, .. } = self;
+            let Self { cameras, groups, evidence, .. } = self;
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
             };
@@ -244,7 +243,7 @@ impl ColorRegions {
             pairs.reserve(lines.capacity());
             for line in &*lines {
                 let searched = is_requested.is_none_or(|is_requested| is_requested(usize::from(line.limb)));
-                let found = if searched { scanner.edge(&view, line, search, together) } else { None };
+                let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
                 edges.push(found);
                 if together {
                     let length = posed.body.limbs()[usize::from(line.limb)].shape.length();
@@ -346,7 +345,7 @@ fn unit_of(camera: &Camera) -> f32 {
 
 /// Extrapolates a limb's pose by a fraction of the last motion.
 fn moved_on(before: &Pose, now: &Pose, fraction: f64) -> Pose {
-    let turn = (now.rotation * before.rotation.inverse()).to_scaled_axis_shortest();
+    let turn = rotation_vector(now.rotation * before.rotation.inverse());
     let shift = now.translation - before.translation;
     Pose::from_parts(now.translation + fraction * shift, Quat::from_scaled_axis(fraction * turn) * now.rotation)
 }

@@ -14,9 +14,9 @@ use crate::math::{Pose, Vec3, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
 use crate::shape::TaperedEllipticCylinder;
+use crate::visibility::ALONG_LIMB;
 
-/// Sample positions on a limb: fractions of its length, and of its projected radius.
-const ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+/// Sample positions across a limb, as fractions of its projected radius.
 const OVER: [f64; 5] = [-0.7, -0.35, 0.0, 0.35, 0.7];
 /// Backdrops are drawn in cells of two to this power pixels.
 const BACKDROP_BITS: u32 = 2;
@@ -73,12 +73,39 @@ impl ColorRegions {
     /// that show it, and nothing is known to be behind it.
     pub(crate) fn pixel_gain(&self, frame: &Frame, posed: Posed, limb: usize, backdrop: &Backdrop) -> PixelGain {
         let is_drawn = backdrop.drawn.get(limb).is_some_and(|drawn| *drawn);
-        self.sum_over_limb(frame, posed, limb, backdrop, |(label, behind), depth| {
+        // What would be visible at a cell without the limb, which has this depth there; `None` where the limb is occluded.
+        let behind = |(label, behind): (u16, f32), depth: f64| {
             if is_drawn {
                 return (usize::from(label) == limb).then_some(NOTHING);
             }
-            (label == NOTHING || behind > depth - f64::from(NEARER_BY)).then_some(label)
-        })
+            (label == NOTHING || f64::from(behind) > depth - f64::from(NEARER_BY)).then_some(label)
+        };
+        let mut gain = PixelGain::default();
+        let shape = &posed.body.limbs()[limb].shape;
+        let group = usize::from(self.groups[limb]);
+        for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
+            let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
+            let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
+            let (model, scene) = (&camera.model, camera.scene.as_ref());
+            let unit = camera.unit;
+            let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
+            let camera_from_limb = self.viewpoint(frame, picture, posed).limb_pose(limb);
+            places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
+                gain.area += area;
+                let [width, height] = [picture.camera.width(), picture.camera.height()];
+                if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
+                    return;
+                }
+                let (column, row) = (u as usize, v as usize);
+                if let Some(other) = behind(labels.at(column, row), depth) {
+                    let pixel = row * width + column;
+                    let bin = bin_of(&picture.pixels, pixel);
+                    gain.gained += area * f64::from(view.certainty(group, other, pixel, bin));
+                }
+            });
+        }
+        let cameras = frame.colors.len().max(1) as f64;
+        PixelGain { gained: gain.gained / cameras, area: gain.area / cameras }
     }
 
     /// Writes to `supports` what every limb of the arms and legs explains that no limb outside its own arm or leg does.
@@ -101,49 +128,6 @@ impl ColorRegions {
         }
         self.backdrop = backdrop;
     }
-
-    /// Sums over the sample positions of a limb. `behind` returns what would be visible there without the limb, given the label
-    /// and depth of the backdrop, and the depth of the limb; `None` where the limb is occluded.
-    fn sum_over_limb(
-        &self,
-        frame: &Frame,
-        posed: Posed,
-        limb: usize,
-        backdrop: &Backdrop,
-        behind: impl Fn((u16, f64), f64) -> Option<u16>,
-    ) -> PixelGain {
-        let mut gain = PixelGain::default();
-        let shape = &posed.body.limbs()[limb].shape;
-        let group = usize::from(self.groups[limb]);
-        for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
-            let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
-            let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
-            let (model, scene) = (&camera.model, camera.scene.as_ref());
-            let unit = camera.unit;
-            let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
-            places(
-                shape,
-                &self.viewpoint(frame, picture, posed).limb_pose(limb),
-                picture.camera,
-                |[u, v], depth, area| {
-                    gain.area += area;
-                    let [width, height] = [picture.camera.width(), picture.camera.height()];
-                    if !(u >= 0.0 && v >= 0.0 && u < width as f64 && v < height as f64) {
-                        return;
-                    }
-                    let (column, row) = (u as usize, v as usize);
-                    let (label, before) = labels.at(column, row);
-                    if let Some(other) = behind((label, f64::from(before)), depth) {
-                        let pixel = row * picture.camera.width() + column;
-                        let bin = bin_of(&picture.pixels, pixel);
-                        gain.gained += area * f64::from(view.certainty(group, other, pixel, bin));
-                    }
-                },
-            );
-        }
-        let cameras = frame.colors.len().max(1) as f64;
-        PixelGain { gained: gain.gained / cameras, area: gain.area / cameras }
-    }
 }
 
 /// Sample positions on a limb in a camera's image: pixels (the corner of the first pixel is the origin), depth in meters, and
@@ -165,13 +149,13 @@ fn places(
     let radii = shape.ends().map(|end| 0.5 * (end.a + end.b));
     let [fx, fy] = camera.focal();
     let focal = 0.5 * (fx + fy);
-    for along in ALONG {
+    for along in ALONG_LIMB {
         let center = ends[0] + (ends[1] - ends[0]) * along;
         let radius = radii[0] + (radii[1] - radii[0]) * along;
         let meter = focal / center.z;
         let Some(observed) = camera.project(center) else { continue };
         let [u, v] = observed.map(|value| value + 0.5);
-        let patch = length / meter * 2.0 * radius / (ALONG.len() * OVER.len()) as f64 / REFERENCE_PATCH;
+        let patch = length / meter * 2.0 * radius / (ALONG_LIMB.len() * OVER.len()) as f64 / REFERENCE_PATCH;
         for across in OVER {
             let off = across * radius * meter;
             each([u + off * aside[0], v + off * aside[1]], center.z - radius, patch);

@@ -1,7 +1,5 @@
 //! Samples images along lines: log ratios of limb and surroundings, and colors to learn.
 
-use std::ops::Range;
-
 use super::empty_scene::EmptyScene;
 use super::histogram::{MOST_RATIO, bin_of, clamped, color_bin};
 use super::labels::{LimbLabels, NOTHING};
@@ -43,18 +41,6 @@ pub(super) struct ScanView<'a> {
     pub unit: f32,
 }
 
-/// Working memory.
-#[derive(Debug)]
-pub(super) struct Scanner {
-    ratios: [f32; 4 * MOST_REACH],
-}
-
-impl Default for Scanner {
-    fn default() -> Self {
-        Self { ratios: [0.0; 4 * MOST_REACH] }
-    }
-}
-
 /// Result of the search on a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineEdge {
@@ -63,52 +49,42 @@ pub(super) struct LineEdge {
     pub beside: [f32; 2],
 }
 
-impl Scanner {
-    /// Finds the edge on a line; `None` where there is no evidence.
-    pub(super) fn edge(
-        &mut self,
-        view: &ScanView,
-        line: &Line,
-        search: EdgeSearch,
-        together: bool,
-    ) -> Option<LineEdge> {
-        let group = view.group(line.limb);
-        if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
-            return None;
-        }
-        let EdgeSearch { reach, every } = search;
-        let width = if together && line.both && line.width < WIDEST { (line.width / every + 0.5) as usize } else { 0 };
-        // The samples around this edge and those around the opposite one may overlap.
-        let span = 2 * reach;
-        let far = width.min(span);
-        let start = 0.5 - reach as f32;
-        if far == width {
-            self.fill_ratios(view, line, [start - far as f32, every], 0..far + span);
-        } else {
-            self.fill_ratios(view, line, [start - width as f32, every], 0..far);
-            self.fill_ratios(view, line, [start, every], far..far + span);
-        }
-        let ratios = &self.ratios[..far + span];
-        let (inside, outside) = ratios.split_at(far + reach);
-        let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
-        let next = NEXT_TO.min(reach);
-        let beside = [mean(&inside[inside.len() - next..]), mean(&outside[..next])];
-        let found = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
-        Some(LineEdge {
-            edge: ColorEdge { mean: every * found.mean, information: found.information / (every * every) },
-            beside,
-        })
+/// Finds the edge on a line; `None` where there is no evidence.
+pub(super) fn edge_on(view: &ScanView, line: &Line, search: EdgeSearch, together: bool) -> Option<LineEdge> {
+    let group = view.group(line.limb);
+    if !line.clear || !view.model.knows(group) || view.outside_is(line, group) {
+        return None;
     }
+    let EdgeSearch { reach, every } = search;
+    let width = if together && line.both && line.width < WIDEST { (line.width / every + 0.5) as usize } else { 0 };
+    // The samples around this edge and those around the opposite one may overlap.
+    let span = 2 * reach;
+    let far = width.min(span);
+    let start = 0.5 - reach as f32;
+    let mut ratios = [0.0; 4 * MOST_REACH];
+    let ratios = &mut ratios[..far + span];
+    if far == width {
+        fill_ratios(view, line, [start - far as f32, every], ratios);
+    } else {
+        fill_ratios(view, line, [start - width as f32, every], &mut ratios[..far]);
+        fill_ratios(view, line, [start, every], &mut ratios[far..]);
+    }
+    let (inside, outside) = ratios.split_at(far + reach);
+    let mean = |ratios: &[f32]| ratios.iter().sum::<f32>() / ratios.len() as f32;
+    let next = NEXT_TO.min(reach);
+    let beside = [mean(&inside[inside.len() - next..]), mean(&outside[..next])];
+    let found = edge(&ratios[far..], (width > 0).then(|| &ratios[..span]), reach, every);
+    let edge = ColorEdge { mean: every * found.mean, information: found.information / (every * every) };
+    Some(LineEdge { edge, beside })
+}
 
-    /// Fills a range of ratios with log ratios at samples outward, `every` units apart, the first at `start` samples.
-    fn fill_ratios(&mut self, view: &ScanView, line: &Line, [start, every]: [f32; 2], range: Range<usize>) {
-        let ratios = &mut self.ratios[range];
-        match view.picture.pixels {
-            ColorPixels::Color(pixels) => view.fill(line, [start, every], ratios, |pixel| color_bin(pixels[pixel])),
-            ColorPixels::Gray(pixels) => {
-                view.fill(line, [start, every], ratios, |pixel| usize::from(pixels[pixel]));
-                compare_locally(view, line, [start, every], ratios);
-            }
+/// Fills `ratios` with log ratios at samples outward, `every` units apart, the first at `start` samples.
+fn fill_ratios(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratios: &mut [f32]) {
+    match view.picture.pixels {
+        ColorPixels::Color(pixels) => view.fill(line, [start, every], ratios, |pixel| color_bin(pixels[pixel])),
+        ColorPixels::Gray(pixels) => {
+            view.fill(line, [start, every], ratios, |pixel| usize::from(pixels[pixel]));
+            compare_locally(view, line, [start, every], ratios);
         }
     }
 }

@@ -1,11 +1,10 @@
 //! Closest points of batches of queries.
 
-use super::closest::ONE_BASIN;
+use super::TaperedEllipticCylinder;
 use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
-use super::{SurfacePoint, TaperedEllipticCylinder};
 #[cfg(target_arch = "x86_64")]
 use crate::math::has_avx512;
-use crate::math::{LANES, Points, Pose, Vec3};
+use crate::math::{Points, Pose, Vec3, load, store};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which results that the f32 kernel marks as settled are accepted: at 0.4
@@ -66,7 +65,10 @@ impl SurfaceBatch {
         self.region.resize(len, 0);
     }
 
-    fn set(&mut self, index: usize, found: &SurfacePoint, world_from_limb: &Pose) {
+    /// Computes the result of one query in double precision.
+    fn set_exactly(&mut self, index: usize, query: [f32; 3], shape: &TaperedEllipticCylinder, world_from_limb: &Pose) {
+        let query = world_from_limb.inverse_transform_point(Vec3::from_array(query.map(f64::from)));
+        let found = shape.closest_point(query);
         let point = world_from_limb.transform_point(found.point);
         let normal = world_from_limb.rotation * found.normal;
         self.points.set(index, point.as_vec3().to_array());
@@ -85,46 +87,24 @@ impl TaperedEllipticCylinder {
     /// computed again in double precision. A result depends on its query, shape and pose only, not on its position in the batch.
     /// `out` is resized; nothing is allocated once it is large enough.
     pub fn closest_points(&self, world_from_limb: &Pose, queries: &Points, out: &mut SurfaceBatch) {
-        self.closest_points_range(world_from_limb, queries, 0..queries.len(), out);
-    }
-
-    /// [`Self::closest_points`] of the queries in `range` only; result 0 belongs to query `range.start`.
-    ///
-    /// # Panics
-    /// If the range does not lie within the queries.
-    pub fn closest_points_range(
-        &self,
-        world_from_limb: &Pose,
-        queries: &Points,
-        range: Range<usize>,
-        out: &mut SurfaceBatch,
-    ) {
-        let xs = &queries.x[range.clone()];
-        let ys = &queries.y[range.clone()];
-        let zs = &queries.z[range];
-        out.resize(xs.len());
+        let count = queries.len();
+        out.resize(count);
         if self.aspect_change() > SETTLED || !self.is_blunt() {
-            for i in 0..xs.len() {
-                let query = in_limb(world_from_limb, [xs[i], ys[i], zs[i]]);
-                out.set(i, &self.closest_point(query), world_from_limb);
+            for i in 0..count {
+                out.set_exactly(i, [queries.x[i], queries.y[i], queries.z[i]], self, world_from_limb);
             }
             return;
         }
         let constants = Constants::new(self, world_from_limb);
         // More than half a block takes less time as a whole block than as short ones.
-        let rest = xs.len() % BLOCK;
-        let whole = if 2 * rest > BLOCK { xs.len() } else { xs.len() - rest };
-        let queries = [xs, ys, zs];
-        let mut batch = Batch { shape: self, world_from_limb, constants, out, unsettled: Few::new(), open: Few::new() };
+        let rest = count % BLOCK;
+        let whole = if 2 * rest > BLOCK { count } else { count - rest };
+        let mut batch = Batch { shape: self, world_from_limb, constants, out, unsettled: Few::new() };
         batch.closest_blocks(kernel::<BLOCK, FEW>(), queries, 0..whole);
-        batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..xs.len());
+        batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..count);
         batch.refine_unsettled();
-        batch.finish_exactly();
     }
 }
-
-// This many queries are processed side by side in double precision.
-const _: () = assert!(SHORT <= LANES);
 
 /// Queries, with their indices, that wait until there are enough to be processed side by side.
 struct Few {
@@ -153,24 +133,23 @@ struct Batch<'a> {
     world_from_limb: &'a Pose,
     constants: Constants,
     out: &'a mut SurfaceBatch,
-    /// Queries not settled by few single-precision steps; those not settled by more steps.
+    /// Queries not settled by few single-precision steps.
     unsettled: Few,
-    open: Few,
 }
 
 impl Batch<'_> {
     /// Closest points of the queries in `range`, block by block. Unsettled queries are processed whenever there are enough of
     /// them; the last ones wait.
-    fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: [&[f32]; 3], range: Range<usize>) {
+    fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: &Points, range: Range<usize>) {
         let mut block = Block::ZERO;
         let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
             let count = N.min(range.end - start);
             let span = start..start + count;
             // The tail is padded with the block's previous contents, so that every point goes through the same instructions.
-            load(&mut block.x, &queries[0][span.clone()]);
-            load(&mut block.y, &queries[1][span.clone()]);
-            load(&mut block.z, &queries[2][span.clone()]);
+            load(&mut block.x, &queries.x[span.clone()]);
+            load(&mut block.y, &queries.y[span.clone()]);
+            load(&mut block.z, &queries.z[span.clone()]);
             run(&self.constants, &block, &mut found);
             let out = &mut *self.out;
             store(&mut out.points.x[span.clone()], &found.points.x);
@@ -192,7 +171,8 @@ impl Batch<'_> {
         }
     }
 
-    /// Takes more single-precision steps for the queries that few steps did not settle.
+    /// Takes more single-precision steps for the queries that few steps did not settle, and computes those exactly that these do
+    /// not settle either.
     fn refine_unsettled(&mut self) {
         let mut found = BlockResult::ZERO;
         if self.unsettled.count > 0 {
@@ -204,50 +184,11 @@ impl Batch<'_> {
                 self.out.points.set(index, found.points.get(i));
                 self.out.normals.set(index, found.normals.get(i));
                 (self.out.signed_distance[index], self.out.region[index]) = (found.signed_distance[i], found.region[i]);
-            } else if self.open.push(index, query) {
-                self.finish_exactly();
+            } else {
+                self.out.set_exactly(index, query, self.shape, self.world_from_limb);
             }
         }
         self.unsettled.count = 0;
-    }
-
-    /// Computes the remaining queries in double precision.
-    fn finish_exactly(&mut self) {
-        let Self { shape, world_from_limb, out, open, .. } = self;
-        let mut queries = [Vec3::ZERO; SHORT];
-        for (at, query) in queries.iter_mut().enumerate().take(open.count) {
-            *query = in_limb(world_from_limb, open.queries.get(at));
-        }
-        let queries = &queries[..open.count];
-        let mut decide = |at: usize, found: SurfacePoint| out.set(open.indices[at], &found, world_from_limb);
-        // One query takes as long on the lanes as a full set; so a few queries are faster one by one.
-        if 2 * open.count <= SHORT || shape.aspect_change() > ONE_BASIN {
-            queries.iter().enumerate().for_each(|(at, query)| decide(at, shape.closest_point(*query)));
-        } else {
-            shape.closest_points_in_one_basin(queries, decide);
-        }
-        open.count = 0;
-    }
-}
-
-fn in_limb(world_from_limb: &Pose, query: [f32; 3]) -> Vec3 {
-    world_from_limb.inverse_transform_point(Vec3::from_array(query.map(f64::from)))
-}
-
-/// Copies a block. Mostly it is a full one, whose size is then known to the compiler.
-#[inline(always)]
-fn load<const N: usize>(to: &mut [f32; N], from: &[f32]) {
-    match from.first_chunk() {
-        Some(from) => *to = *from,
-        None => to[..from.len()].copy_from_slice(from),
-    }
-}
-
-#[inline(always)]
-fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
-    match to.first_chunk_mut() {
-        Some(to) => *to = *from,
-        None => to.copy_from_slice(&from[..to.len()]),
     }
 }
 
@@ -350,7 +291,10 @@ mod tests {
                 unsettled += found.unsettled.iter().filter(|&&flag| flag != 0).count();
             }
             let fraction = unsettled as f64 / (200 * BLOCK) as f64;
-            assert!(shape.aspect_change() <= ONE_BASIN && fraction < 0.01, "{fraction} of {shape:?}");
+            assert!(
+                shape.aspect_change() <= super::super::closest::ONE_BASIN && fraction < 0.01,
+                "{fraction} of {shape:?}"
+            );
         }
         Ok(())
     }

@@ -34,10 +34,6 @@ pub(super) const DISTINCT: f64 = 0.3;
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which a distinct minimum is the only one.
 pub(super) const ONE_BASIN: f64 = 0.05;
 
-pub(super) fn folded(q: Vec3) -> Vec3 {
-    Vec3::new(q.x.abs(), q.y.abs(), q.z)
-}
-
 impl TaperedEllipticCylinder {
     /// The closest point of the closed surface to `q`, limb frame, meters.
     ///
@@ -52,17 +48,7 @@ impl TaperedEllipticCylinder {
         if !q.is_finite() {
             return SurfacePoint { point: Vec3::NAN, normal: Vec3::Z, signed_distance: f64::NAN, region: Region::Side };
         }
-        let folded = folded(q);
-        self.nearest_face(q, self.closest_on_side(folded, self.guessed(folded)))
-    }
-
-    /// [`Self::closest_point`] with a known first minimum, for shapes whose end ellipses differ little: if that minimum is
-    /// distinct, the side has no other basin, and no scan is done.
-    pub(super) fn settled(&self, q: Vec3, guessed: Foot) -> SurfacePoint {
-        if !q.is_finite() {
-            return self.closest_point(q);
-        }
-        self.nearest_face(q, self.closest_on_side(folded(q), guessed))
+        self.nearest_face(q, self.closest_on_side(Vec3::new(q.x.abs(), q.y.abs(), q.z)))
     }
 
     /// Whether a minimum is so distinct that the side of a shape whose end ellipses differ little has no other basin.
@@ -129,13 +115,9 @@ impl TaperedEllipticCylinder {
         first.min(last) > 0.2 * first.max(last)
     }
 
-    /// The minimum found from the first guess, for a query with `x, y >= 0`.
-    fn guessed(&self, q: Vec3) -> Foot {
-        self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q)
-    }
-
-    /// The closest point of the side with its rims, for a query with `x, y >= 0` and the minimum from its first guess.
-    fn closest_on_side(&self, q: Vec3, guessed: Foot) -> Foot {
+    /// The closest point of the side with its rims, for a query with `x, y >= 0`.
+    fn closest_on_side(&self, q: Vec3) -> Foot {
+        let guessed = self.refine(Angle::ZERO, self.guess(q), Angle::RIGHT, q);
         let one_basin = self.aspect_change() <= ONE_BASIN && self.is_blunt();
         if one_basin && (self.aspect_change() < 1e-12 || self.is_distinct(&guessed)) {
             return guessed;
@@ -186,8 +168,7 @@ impl TaperedEllipticCylinder {
     }
 
     /// A starting angle: the direction `(x/a, y/b)` of the slice, then one step over the evolute of its ellipse.
-    #[inline(always)]
-    pub(super) fn guess(&self, q: Vec3) -> Angle {
+    fn guess(&self, q: Vec3) -> Angle {
         // Excludes the ends, because a tip has no ellipse.
         let (a, b) = self.semi_axes(q.z.clamp(0.1 * self.length, 0.9 * self.length));
         let near = Angle::from_vector(q.x * b, q.y * a).unwrap_or(Angle { c: 0.8, s: 0.6 });

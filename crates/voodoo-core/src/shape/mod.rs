@@ -22,7 +22,6 @@ mod bounds;
 mod closest;
 mod contour;
 mod kernel;
-mod lanes;
 pub(crate) mod ray;
 mod ruling;
 mod section;
@@ -75,12 +74,6 @@ pub enum ShapeError {
         first_value: f64,
         /// Its value, meters.
         second_value: f64,
-    },
-    /// A scale factor is not a positive number.
-    #[error("the scale factor must be positive and finite, found {value}")]
-    Scale {
-        /// The value found.
-        value: f64,
     },
 }
 
@@ -194,17 +187,6 @@ impl TaperedEllipticCylinder {
     /// Semi-axis along y at the distal end, meters.
     pub fn b1(&self) -> f64 {
         self.b1
-    }
-
-    /// The shape with all five sizes multiplied by `factor`.
-    ///
-    /// # Errors
-    /// [`ShapeError::Scale`] when the factor is not positive and finite; the errors of [`Self::new`] for the result.
-    pub fn scaled(&self, factor: f64) -> Result<Self, ShapeError> {
-        if !(factor > 0.0 && factor.is_finite()) {
-            return Err(ShapeError::Scale { value: factor });
-        }
-        Self::new(self.length * factor, self.a0 * factor, self.b0 * factor, self.a1 * factor, self.b1 * factor)
     }
 
     /// The semi-axes `(a, b)` of the slice at height `z`, clamped to the ends, meters.

@@ -1,6 +1,6 @@
 //! The published solver: weighted absolute orientation of each limb separately (K06 IV-B.7, K07 3.2).
 
-use super::{Gate, Problem, Reassociation, Schedule, Solver, WarmStart, WarmStartInput};
+use super::{Gate, Problem, Schedule, Solver, WarmStart};
 use crate::association::correspondence::LimbMatches;
 use crate::config::Config;
 use crate::math::{Mat3, Moments, Pose, Vec3};
@@ -54,14 +54,7 @@ impl Solver for Limbwise {
 
     fn schedule(&self, config: &Config) -> Schedule {
         let gate = Gate { box_margin: config.limb_box_margin, distance: config.max_distance };
-        Schedule {
-            gates: [gate; 2],
-            reassociation: Reassociation::EveryStep,
-            warm_start: WarmStartInput::SitesAndPoints,
-            bands: true,
-            visible_side: false,
-            whole_body: false,
-        }
+        Schedule { gates: [gate; 2], visible_side: false, whole_body: false }
     }
 }
 

@@ -12,7 +12,7 @@ mod whole_body;
 pub(crate) use chain::ChainSolver;
 pub(crate) use lengths::Lengths;
 pub(crate) use limbwise::Limbwise;
-pub(crate) use schedule::{Gate, Reassociation, Schedule, WarmStartInput};
+pub(crate) use schedule::{Gate, Schedule};
 pub(crate) use spread::Spread;
 pub(crate) use tree::TreeSolver;
 pub(crate) use warm_start::WarmStart;

@@ -19,39 +19,16 @@ pub(crate) struct Gate {
     pub distance: f64,
 }
 
-/// In which steps points are reassigned to limbs and contours get new edges; other steps keep those of the step before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Reassociation {
-    /// In every step, as published (K06 IV-B).
-    EveryStep,
-    /// In the first steps, and then in every second one.
-    EverySecondStep,
-}
-
-/// What is matched before the warm start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum WarmStartInput {
-    /// Named sites with positions and rays.
-    Sites,
-    /// Sites, and in frames with sites also the points.
-    SitesAndPoints,
-}
-
 /// What a solver requires of the loop: constant for one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Schedule {
     /// Gate of the first step, and the one it narrows to.
     pub gates: [Gate; 2],
-    /// When points are reassigned.
-    pub reassociation: Reassociation,
-    /// Measurements that the warm start uses.
-    pub warm_start: WarmStartInput,
-    /// Whether the solver uses the elastic bands (K07 4.3).
-    pub bands: bool,
     /// Whether depth pixels match only surfaces that face their camera; the published method takes the closest point anywhere.
     pub visible_side: bool,
-    /// Whether steps start from the predicted pose, and the stages that evaluate whole bodies (hypotheses, girths,
-    /// relocalization) run after them.
+    /// Whether all limbs are solved at once. Then steps start from the predicted pose, and the stages that evaluate whole bodies
+    /// (hypotheses, girths, relocalization) run after them. Otherwise, as published (K06 IV-B, K07 4.3), elastic bands hold the
+    /// limbs together, every step reassigns the points, and the warm start uses them in frames with sites.
     pub whole_body: bool,
 }
 
@@ -67,10 +44,7 @@ impl Schedule {
 
     /// Whether points are reassigned in a step of a frame.
     pub(crate) fn reassociates(&self, step: usize) -> bool {
-        match self.reassociation {
-            Reassociation::EveryStep => true,
-            Reassociation::EverySecondStep => step < EVERY_SECOND_FROM || (step - EVERY_SECOND_FROM).is_multiple_of(2),
-        }
+        !self.whole_body || step < EVERY_SECOND_FROM || (step - EVERY_SECOND_FROM).is_multiple_of(2)
     }
 }
 
@@ -84,7 +58,7 @@ mod tests {
     fn the_published_solver_asks_for_the_published_loop() {
         let config = Config::default();
         let schedule = solver(SolverKind::Limbwise).schedule(&config);
-        assert!(schedule.bands && !schedule.visible_side && !schedule.whole_body);
+        assert!(!schedule.visible_side && !schedule.whole_body);
         for step in 0..20 {
             let gate = schedule.gate(step);
             assert_eq!([gate.box_margin, gate.distance], [config.limb_box_margin, config.max_distance]);
@@ -97,7 +71,7 @@ mod tests {
         let config = Config::default();
         for kind in [SolverKind::Chain, SolverKind::Tree] {
             let schedule = solver(kind).schedule(&config);
-            assert!(schedule.whole_body && !schedule.bands);
+            assert!(schedule.whole_body);
             assert_eq!(schedule.gate(0).distance, config.gate_start);
             assert!((1..40).all(|step| schedule.gate(step).distance <= schedule.gate(step - 1).distance));
             assert_eq!(schedule.gate(40).distance, config.gate_end);

@@ -52,7 +52,7 @@ impl TreeSolver {
 
     fn assemble(&mut self, body: &Body, normal: &NormalEquations, damping: f64, strength: f64, poses: &[Pose]) {
         self.parent.clear();
-        self.parent.extend(body.limbs().iter().map(|limb| limb.parent.as_ref().map_or(0, |(parent, _)| *parent)));
+        self.parent.extend((0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
         self.own.clone_from(&normal.limbs);
         for block in &mut self.own {
             for i in 0..6 {

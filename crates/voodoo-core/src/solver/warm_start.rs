@@ -152,9 +152,8 @@ fn close(body: &Body, poses: &mut [Pose]) {
 fn drive_from(body: &Body, limb: usize, driven: &mut [bool]) {
     let mut next = Some(limb);
     while let Some(limb) = next {
-        let Some((parent, _)) = &body.limbs()[limb].parent else { break };
+        let Some(parent) = body.parent(limb) else { break };
         driven[limb] = true;
-        let carried = body.limbs().iter().filter(|other| other.parent.as_ref().is_some_and(|(limb, _)| limb == parent));
-        next = (carried.count() == 1).then_some(*parent);
+        next = (body.children(parent).count() == 1).then_some(parent);
     }
 }

@@ -2,10 +2,7 @@
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
-use super::{
-    ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Reassociation, Schedule, Solver, TreeSolver, WarmStart,
-    WarmStartInput,
-};
+use super::{ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3};
@@ -104,9 +101,6 @@ impl Solver for WholeBody {
         let gate = |distance: f64| Gate { box_margin: distance, distance };
         Schedule {
             gates: [gate(config.gate_start), gate(config.gate_end)],
-            reassociation: Reassociation::EverySecondStep,
-            warm_start: WarmStartInput::Sites,
-            bands: false,
             visible_side: config.facing,
             whole_body: true,
         }

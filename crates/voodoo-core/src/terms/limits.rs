@@ -2,7 +2,7 @@
 
 use super::Term;
 use crate::body::{Body, Joint};
-use crate::math::{Pose, Quat, ShortestAxis, Vec3};
+use crate::math::{Pose, Quat, Vec3, rotation_vector};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Greatest cost of a joint, nats: limits differ between persons.
@@ -52,7 +52,7 @@ impl Term for Limits {
 pub(super) fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat, Vec3) {
     let world_from_joint = parent.rotation * joint.parent_from_joint.rotation;
     let turned = world_from_joint.inverse() * limb.rotation * joint.limb_from_joint.rotation;
-    (world_from_joint, turned.to_scaled_axis_shortest())
+    (world_from_joint, rotation_vector(turned))
 }
 
 /// Row `axis` of the inverse left Jacobian of the rotation vector `v`: `J^-1 = I - [v]/2 + k [v]^2` with

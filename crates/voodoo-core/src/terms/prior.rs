@@ -10,7 +10,7 @@
 use super::Term;
 use super::surface::geman_mcclure;
 use crate::body::{Body, Joint};
-use crate::math::{Pose, ShortestAxis, Vec3};
+use crate::math::{Pose, Vec3, rotation_vector};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Deviation, in standard deviations of the expected motion, at which the stillness is a quarter: smaller ones count as noise.
@@ -49,7 +49,7 @@ impl Prior<'_> {
 
     /// Rotation and translation of the root as separate terms, so that the lever to the working origin does not matter.
     fn root_deviation(&self, poses: &[Pose]) -> (Vec3, Vec3) {
-        let turn = (poses[0].rotation * self.predicted[0].rotation.inverse()).to_scaled_axis_shortest();
+        let turn = rotation_vector(poses[0].rotation * self.predicted[0].rotation.inverse());
         (turn, poses[0].translation - self.predicted[0].translation)
     }
 
@@ -62,7 +62,7 @@ impl Prior<'_> {
             }
             _ => relative(self.predicted),
         };
-        (relative(poses) * expected.inverse()).to_scaled_axis_shortest()
+        rotation_vector(relative(poses) * expected.inverse())
     }
 }
 

@@ -7,6 +7,7 @@ use crate::uncertainty::Covariances;
 ///
 /// [`Estimate`] has an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Status {
     /// Measurements support the pose.
@@ -40,6 +41,7 @@ impl Status {
 ///
 /// [`Estimate`] has an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum LimbStatus {
     /// Measurements support it.
@@ -70,6 +72,7 @@ impl LimbStatus {
 ///
 /// [`Estimate`] has an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SourceReport {
     /// Number of measurements of the source that were candidates.
@@ -108,6 +111,7 @@ pub struct SourceReport {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Estimate {
     /// Time of the frame; NaN after a reset and before the first one.

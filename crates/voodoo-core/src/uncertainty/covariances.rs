@@ -9,6 +9,7 @@ use crate::math::{Mat3, Vec3};
 ///
 /// [`Estimate`](crate::Estimate) has an example.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Covariances {
     /// Covariance of the position of every site.
     pub sites: Vec<Mat3>,

@@ -10,14 +10,12 @@ pub(crate) mod render;
 pub(crate) mod roundness;
 pub(crate) mod surface;
 
-/// Number of sections along and of points across a limb at which its surface is compared with images.
-const SECTIONS: usize = 5;
 /// Offset of the outermost points across a limb, as a fraction of its radius; nearer to the rim, a pixel may show the background.
 pub(crate) const LIMB_RIM: f64 = 0.6;
 /// Sections along a limb, as fractions of its length: evenly spaced, without the ends, where limbs overlap with their neighbors.
-pub(crate) const ALONG_LIMB: [f64; SECTIONS] = middles();
+pub(crate) const ALONG_LIMB: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Points across a limb, as fractions of its radius from the middle: evenly spaced.
-pub(crate) const ACROSS_LIMB: [f64; SECTIONS] = evenly();
+pub(crate) const ACROSS_LIMB: [f64; 5] = [-LIMB_RIM, -0.3, 0.0, 0.3, LIMB_RIM];
 /// Fractions below this count as small: of the expected visible surface, of free-space violations, of the hidden part of a body,
 /// and of roundness.
 pub(crate) const LITTLE: f64 = 0.3;
@@ -30,26 +28,3 @@ pub(crate) const EXPLAINED: f64 = 0.04;
 /// Tolerance for the overlap of limb surfaces, meters: they overlap by this much at joints and where they touch. Only greater
 /// depths count as occlusion or as intersection.
 pub(crate) const OVERLAP: f64 = 0.01;
-
-/// Returns the midpoints of `SECTIONS` equal parts of the unit interval.
-const fn middles() -> [f64; SECTIONS] {
-    let mut places = [0.0; SECTIONS];
-    let mut index = 0;
-    while index < SECTIONS {
-        places[index] = (2 * index + 1) as f64 / (2 * SECTIONS) as f64;
-        index += 1;
-    }
-    places
-}
-
-/// Returns `SECTIONS` evenly spaced values from one rim to the other.
-const fn evenly() -> [f64; SECTIONS] {
-    let mut places = [0.0; SECTIONS];
-    let (step, middle) = (2.0 * LIMB_RIM / (SECTIONS - 1) as f64, (SECTIONS - 1) as f64 / 2.0);
-    let mut index = 0;
-    while index < SECTIONS {
-        places[index] = (index as f64 - middle) * step;
-        index += 1;
-    }
-    places
-}

@@ -42,14 +42,6 @@ pub struct Viewpoint<'a> {
 }
 
 impl Viewpoint<'_> {
-    fn check(&self) -> Result<(), TrackError> {
-        let pose = &self.world_from_sensor;
-        if !is_rigid(pose) {
-            return Err(TrackError::measurement("world_from_sensor", "a rigid transform", format!("{pose:?}")));
-        }
-        Ok(())
-    }
-
     /// `x / z` and `y / z` of some pixels of a row, from `start`; NaN beyond the last column.
     #[inline(always)]
     fn lanes(&self, row: usize, start: usize) -> ([f64; LANES], [f64; LANES]) {
@@ -119,7 +111,10 @@ impl Rendering {
         view: &Viewpoint,
         pool: Option<&rayon::ThreadPool>,
     ) -> Result<(), TrackError> {
-        view.check()?;
+        if !is_rigid(&view.world_from_sensor) {
+            let found = format!("{:?}", view.world_from_sensor);
+            return Err(TrackError::measurement("world_from_sensor", "a rigid transform", found));
+        }
         let limbs = body.limbs();
         if world_from_limb.len() != limbs.len() || !world_from_limb.iter().all(is_rigid) {
             let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
