@@ -55,7 +55,7 @@ def main() -> None:
     goals = np.array([chain.forward(row)[1]["wrist"] for row in rng.uniform(-0.8, 0.8, (count, 6))])[:, None]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {count} postures, 15 steps a phase")
     print(
-        "| images | postures a second | us a posture | steps | tried | looked | us a step | reached within 0.1 mm |\n"
+        "| images | postures a second | us a posture | steps | tried | compared | us a step | reached within 0.1 mm |\n"
         "|---|---|---|---|---|---|---|---|"
     )
     took, looks = [], []
@@ -80,7 +80,7 @@ def main() -> None:
                 fastest[index] = min(fastest[index], time.perf_counter() - began)
         best, steps = fastest.sum(), sum(some.steps.sum() for some in found)
         took.append(1e6 * best / count)
-        tried, checked = (sum(getattr(some, name).sum() for some in found) / count for name in ("tried", "looked"))
+        tried, checked = (sum(getattr(some, name).sum() for some in found) / count for name in ("tried", "compared"))
         looks.append(checked)
         reached = np.linalg.norm(np.concatenate([some.joints[:, 0] for some in found]) - goals[:, 0], axis=1) < 1e-4
         print(

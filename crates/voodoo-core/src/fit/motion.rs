@@ -95,8 +95,8 @@ impl Motion {
         }
     }
 
-    /// Writes the poses predicted for a future time to `expected`, world frame, without changing the state.
-    pub(crate) fn expect(&self, body: &Body, stamp: f64, damping: f64, expected: &mut Vec<Pose>) {
+    /// Predicts the poses at a future time and returns them.
+    pub(crate) fn expect(&mut self, body: &Body, stamp: f64, damping: f64) -> &[Pose] {
         let ratio = match (self.stamp, self.interval) {
             (Some(last), Some(interval)) if self.previous.len() == self.poses.len() => {
                 ((stamp - last) / interval).min(LONGEST_PREDICTION)
@@ -104,8 +104,8 @@ impl Motion {
             _ => 0.0,
         };
         let before = if ratio > 0.0 { &self.previous } else { &self.poses };
-        predict(body, before, &self.poses, ratio * damping, expected);
-        expected.iter_mut().for_each(|pose| *pose = shifted(pose, -self.origin));
+        predict(body, before, &self.poses, ratio * damping, &mut self.predicted);
+        &self.predicted
     }
 
     /// Completes the frame.

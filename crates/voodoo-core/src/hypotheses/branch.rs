@@ -50,8 +50,7 @@ impl Branch {
         }
         let (frame, origin) = (context.observation.frame(), context.observation.origin());
         let config = Config { motion_scale: LOOSER * context.config.motion_scale, ..context.config.clone() };
-        motion.expect(&context.model.body, frame.stamp, config.prediction, predicted);
-        predicted.iter_mut().for_each(|pose| *pose = shifted(pose, origin));
+        set_shifted(predicted, motion.expect(&context.model.body, frame.stamp, config.prediction), origin);
         set_shifted(previous, &motion.poses, origin);
         poses.clone_from(predicted);
         let steps = fit.run(Context { config: &config, previous, ..context }, predicted, poses);

@@ -57,9 +57,9 @@ impl Refined {
     ) -> (usize, bool) {
         // With color images alone, the cost of intermediate steps is not informative.
         let most = if context.pictures_alone() { f64::INFINITY } else { current };
-        let (steps, cost) = self.refine_up_to(context, fit, hypothesis, most);
+        let (steps, cost) = self.refine_against(context, fit, hypothesis, Some((most, poses)));
         fit.swap_matches(&mut self.matched);
-        if steps < REFINE || cost >= current - MARGIN || !is_another(context, &self.poses, poses) {
+        if steps < REFINE || cost >= current - MARGIN {
             return (steps, false);
         }
         std::mem::swap(&mut self.poses, &mut self.tried);
@@ -82,15 +82,26 @@ impl Refined {
     /// Refines a hypothesis together with the whole body and returns its cost. Afterwards, `fit` holds its correspondences and
     /// `matched` the previous ones.
     pub(super) fn refine(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose]) -> f64 {
-        self.refine_up_to(context, fit, hypothesis, f64::INFINITY).1
+        self.refine_against(context, fit, hypothesis, None).1
     }
 
-    /// Like [`Self::refine`], but stops early when the cost exceeds `most`. Returns the number of ICP steps and the cost.
-    fn refine_up_to(&mut self, context: Context, fit: &mut Fit, hypothesis: &[Pose], most: f64) -> (usize, f64) {
+    /// Like [`Self::refine`], but stops early at the other pose of `rival`, and where the cost exceeds that of the other. Returns
+    /// the number of ICP steps and the cost.
+    fn refine_against(
+        &mut self,
+        context: Context,
+        fit: &mut Fit,
+        hypothesis: &[Pose],
+        rival: Option<(f64, &[Pose])>,
+    ) -> (usize, f64) {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
+        let most = rival.map_or(f64::INFINITY, |(most, _)| most);
         for step in 0..REFINE {
+            if rival.is_some_and(|(_, other)| !is_another(context, &self.poses, other)) {
+                return (step, f64::INFINITY);
+            }
             // The last step is as at the end of a frame.
             let at = (context.config.max_steps + 1 + step).saturating_sub(REFINE);
             let here = if step < ROUGH_STEPS { context.subsampled() } else { context };

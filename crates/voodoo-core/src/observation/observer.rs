@@ -86,10 +86,6 @@ impl Observer {
         self.masked.release(frame, own);
     }
 
-    fn scene<'a>(&'a self, ownership: OwnershipMask<'a>) -> &'a Backgrounds {
-        if self.is_masked { &self.masked } else { ownership.scene }
-    }
-
     /// Step 1 (K06 IV-B.1): keeps the points in the enlarged box of the whole body, without the scene and the pixels that other
     /// persons explain.
     pub(crate) fn gather(
@@ -111,7 +107,8 @@ impl Observer {
         origin: Vec3,
         ownership: OwnershipMask<'a>,
     ) -> Observation<'a> {
-        let views = DepthViews { frame, backgrounds: self.scene(ownership), segmented: &self.segmented, origin };
+        let backgrounds = if self.is_masked { &self.masked } else { ownership.scene };
+        let views = DepthViews { frame, backgrounds, segmented: &self.segmented, origin };
         Observation { candidates: &self.candidates, views }
     }
 

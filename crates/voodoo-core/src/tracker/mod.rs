@@ -59,8 +59,6 @@ pub struct BodyTracker {
     assessor: Assessor,
     estimate: Estimate,
     before: Before,
-    /// Poses expected in this frame, world frame.
-    expected: Vec<Pose>,
     /// Index of the image and pixels of the detection to which the body was moved in this frame.
     moved_to: Option<(usize, Vec<usize>)>,
 }
@@ -79,7 +77,6 @@ impl BodyTracker {
             assessor: Assessor::default(),
             estimate: Estimate::default(),
             before: Before::default(),
-            expected: Vec::new(),
             moved_to: None,
             config,
         })
@@ -236,7 +233,7 @@ impl BodyTracker {
     /// Runs the detector where it is due, and moves the body where it is elsewhere: to its detection, or, where a lost body cannot
     /// be detected, to a segment.
     fn relocate(&mut self, frame: &Frame, ownership: OwnershipMask) {
-        let Self { config, model, motion, fit, hypotheses, relocalizer, sizes, assessor, expected, .. } = self;
+        let Self { config, model, motion, fit, hypotheses, relocalizer, sizes, assessor, .. } = self;
         if !fit.schedule(config).whole_body {
             return;
         }
@@ -245,9 +242,8 @@ impl BodyTracker {
             assessor.moved();
             relocalizer.interrupt(frame.stamp);
         }
-        motion.expect(&model.body, frame.stamp, config.prediction, expected);
-        motion.predicted.clear();
-        motion.predicted.extend(expected.iter().map(|pose| shifted(pose, motion.origin)));
+        let origin = motion.origin;
+        let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
         let reasons = Reasons {
             limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
             pose_uncertain: assessor.is_uncertain(),
@@ -259,7 +255,7 @@ impl BodyTracker {
         if assessor.status() == Status::Lost {
             relocalizer.forget();
         } else {
-            relocalizer.detect(&model.body, frame, ownership, expected[0].translation, reasons);
+            relocalizer.detect(&model.body, frame, ownership, root, reasons);
         }
         if config.relocalization {
             match relocalizer.compare(&model.body, &motion.predicted, motion.origin) {
@@ -270,6 +266,8 @@ impl BodyTracker {
                         self.restart_at_detection();
                     }
                     self.relocalizer.forget();
+                    // The frame is assessed once, after it is tracked.
+                    self.assessor.moved();
                 }
                 Some(DetectionVerdict::Consistent) => self.update_sizes(),
                 Some(_) => {}
@@ -379,6 +377,7 @@ impl BodyTracker {
         let setting = Setting { config, observation, previous: &[], time_scale: 1.0 };
         if relocalizer.search(setting.with_model(model), fit, &motion.predicted) {
             self.move_to_found(frame, ownership);
+            self.assessor.moved();
         }
     }
 

@@ -5,7 +5,7 @@ use super::estimate::Estimate;
 use crate::body::Body;
 use crate::config::Config;
 use crate::error::TrackError;
-use crate::math::{Points, Pose, Vec3};
+use crate::math::{Points, Pose, Vec3, shifted};
 use crate::observation::frame::{Frame, PointSlice};
 use crate::regions::{ColorRegions, Posed, RegionLine};
 use crate::shape::{SurfaceBatch, TaperedEllipticCylinder};
@@ -77,10 +77,12 @@ impl BodyTracker {
     }
 
     /// Predicts the poses at a future time, world frame. `expected` is empty without a pose.
-    pub(crate) fn predict(&self, stamp: f64, expected: &mut Vec<Pose>) {
+    pub(crate) fn predict(&mut self, stamp: f64, expected: &mut Vec<Pose>) {
         expected.clear();
         if self.is_started() {
-            self.motion.expect(&self.model.body, stamp, self.config.prediction, expected);
+            let origin = self.motion.origin;
+            let poses = self.motion.expect(&self.model.body, stamp, self.config.prediction);
+            expected.extend(poses.iter().map(|pose| shifted(pose, -origin)));
         }
     }
 
