@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -30,26 +31,29 @@ def joint_angles(posed: Skeleton) -> tuple[tuple[str, ...], FloatArray]:
 @lru_cache(maxsize=16)
 def _plan(limbs: tuple[str, ...]) -> tuple[tuple[str, ...], npt.NDArray[np.int64]]:
     """Names of joints, and how their angles are found."""
-    numbers = {limb: number for number, limb in enumerate(limbs)}
+    numbers, rows = {limb: number for number, limb in enumerate(limbs)}, turns_of(limbs)
+    # On the right they are the other of the two solutions, so that abduction is positive on both sides.
+    other = {"r_y_shoulder": 1, "r_p_shoulder": -1, "r_r_shoulder": 1}
+    plan = [
+        (numbers[above], numbers[limb], *axes, which, sign * other.get(name, 1), other.get(name, -1) > 0)
+        for name, above, limb, axes, which, sign in rows
+    ]
+    return tuple(row[0] for row in rows), np.array(plan)
+
+
+def turns_of(limbs: Sequence[str]) -> list[tuple[str, str, str, tuple[int, int, int], int, int]]:
+    """The joints that limbs have: name, limb above, limb, its axes, which of their angles, and sign."""
     root = limbs[0]
-    trunk = "thorax" if "thorax" in numbers else root
-    # Name, limbs, axes, which of the angles, sign.
+    trunk = "thorax" if "thorax" in limbs else root
     rows = [("waist", root, trunk, _TWIST, 0, 1)]
     for axis, which, sign in (("r", 0, 1), ("y", 1, 1), ("p", 2, -1)):
         rows.append((f"{axis}_head", trunk, "head", _HEAD, which, sign))
     for side, s in (("l", 1), ("r", -1)):
         upperarm, forearm, thigh, calf = (f"{side}_{limb}" for limb in ("upperarm", "forearm", "thigh", "calf"))
-        for axis, which, sign in (("y", 0, -s), ("p", 1, 1), ("r", 2, s)):
+        for axis, which, sign in (("y", 0, -s), ("p", 1, s), ("r", 2, s)):
             rows.append((f"{side}_{axis}_shoulder", trunk, upperarm, _SHOULDER, which, sign))
         rows.append((f"{side}_elbow", upperarm, forearm, _TWIST, 0, -1))
         for axis, which, sign in (("y", 0, -1), ("p", 1, s), ("r", 2, -1)):
             rows.append((f"{side}_{axis}_hip", root, thigh, _HIP, which, sign))
         rows.append((f"{side}_knee", thigh, calf, _TWIST, 0, -1))
-    rows = [row for row in rows if numbers.keys() >= {*row[1:3]}]
-    # On the right they are the other of the two solutions, so that abduction is positive on both sides.
-    other = ("r_y_shoulder", "r_r_shoulder")
-    plan = [
-        (numbers[above], numbers[limb], *axes, which, sign, name in other)
-        for name, above, limb, axes, which, sign in rows
-    ]
-    return tuple(row[0] for row in rows), np.array(plan)
+    return [row for row in rows if {*limbs} >= {*row[1:3]}]
