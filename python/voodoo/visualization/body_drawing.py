@@ -104,7 +104,7 @@ def _draw_solid(
 ) -> None:
     """Fill the triangles of a limb that face the viewer; the brightness grows with the cosine of the angle to the view."""
     vertices, triangles, normals = limb_mesh(shape)
-    places = transform(root_from_limb, vertices)
+    places = transform(root_from_limb, vertices.astype(np.float64))
     pixels, depths = view.project(places)
     # The light is at the viewer: the cosine is the decrease of the depth for a small step along the normal.
     towards = (depths - view.project(places + _NORMAL_M * normals @ root_from_limb[:3, :3].T)[1]) / _NORMAL_M
