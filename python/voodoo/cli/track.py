@@ -112,7 +112,6 @@ def track_command(
     from dataclasses import replace
 
     from voodoo.cli.running import ParsedTracking, opened, refuse_unused, run, spool_of, turn_of
-    from voodoo.cli.track import closing_doubts, closing_lines
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
