@@ -218,7 +218,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
     Raises:
         NoPoseError: nobody was found.
     """
-    from voodoo.recordings.first_images import depth_range
+    from voodoo.recordings.first_images import depths_of, first_images
 
     if left_out is not None:
         for reason, count in left_out.counts.items():
@@ -227,7 +227,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
         for note in left_out.notes:
             print_message(f"{source.name}: {note}")
     if not {"tracking", "degraded"} & spool.states.keys():
-        depth = depth_range(source)
+        depth = depths_of(first_images(source)[0])
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
     if not spool.found:
