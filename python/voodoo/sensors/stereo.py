@@ -15,8 +15,6 @@ from voodoo.model.camera import Camera
 from voodoo.model.transforms import pose_of, rigid
 from voodoo.sensors.model import RangeNoise, stereo_noise
 
-_BLOCK_PX = 7
-"""Side of the matched squares."""
 _FRACTIONS = 16  # StereoSGBM gives sixteenths of a pixel
 
 
@@ -44,7 +42,10 @@ class StereoPair:
         left, right: calibrations, of the same size.
         left_from_right: (4, 4) pose of the right camera in the left one's optical frame; its x is the baseline.
         nearest, farthest: range of depths to search [m].
+        block: side of the matched squares [px], odd.
         disparity_sigma: standard deviation of a disparity [px].
+        max_difference: greatest difference between the disparities of left and right [px]; where it is exceeded, the point is
+            not visible to one of the cameras.
 
     Raises:
         MeasurementError: sizes differ, the right camera is not to the right, an empty range, or a fish-eye lens.
@@ -58,7 +59,9 @@ class StereoPair:
         *,
         nearest: float = 0.7,
         farthest: float = 7.5,
+        block: int = 7,
         disparity_sigma: float = 0.5,
+        max_difference: int = 1,
     ) -> None:
         """Rectify once; see the class."""
         pose = rigid(left_from_right, name="left_from_right")
@@ -76,8 +79,10 @@ class StereoPair:
             raise MeasurementError(
                 f"stereo: expected the right camera to the right, found it at {pose[:3, 3].tolist()} m"
             )
-        if not 0.0 < nearest < farthest:
-            raise MeasurementError(f"stereo: expected 0 < nearest < farthest, found {nearest!r} and {farthest!r}")
+        if not 0.0 < nearest < farthest or block < 1 or block % 2 == 0:
+            raise MeasurementError(
+                f"stereo: expected 0 < nearest < farthest and an odd block, found {nearest!r}, {farthest!r}, {block!r}"
+            )
         size = (left.width, left.height)
         right_from_left = np.linalg.inv(pose)
         turn_left, turn_right, project_left, project_right, _, _, _ = cv2.stereoRectify(
@@ -109,10 +114,10 @@ class StereoPair:
         self._matcher = cv2.StereoSGBM.create(
             minDisparity=least,
             numDisparities=count,
-            blockSize=_BLOCK_PX,
-            P1=8 * _BLOCK_PX**2,
-            P2=32 * _BLOCK_PX**2,
-            disp12MaxDiff=1,  # beyond, one of the cameras does not see the point
+            blockSize=block,
+            P1=8 * block * block,
+            P2=32 * block * block,
+            disp12MaxDiff=max_difference,
             uniquenessRatio=10,
             speckleWindowSize=80,
             speckleRange=2,
