@@ -52,6 +52,7 @@ def add_markers(
     *,
     sites: Mapping[str, str],
     weight: float,
+    world_from_markers: npt.ArrayLike | None = None,
     source: str = "markers",
 ) -> tuple[str, ...]:
     """Add the markers of one instant to a frame; missing ones are left out.
@@ -62,6 +63,7 @@ def add_markers(
         index: index of the instant.
         sites: marker name -> site name; other markers are not used.
         weight: weight of each marker, e.g. SensorModel().weight(0.01).
+        world_from_markers: rigid (4, 4); identity by default.
         source: name for `Estimate.sources`.
 
     Returns:
@@ -73,9 +75,10 @@ def add_markers(
     if not 0 <= index < len(trajectories.stamps):
         raise MeasurementError(f"markers: expected an instant from 0 to {len(trajectories.stamps) - 1}, found {index}")
     names, positions = trajectories.of(sites)
+    pose = np.eye(4) if world_from_markers is None else np.asarray(world_from_markers, dtype=np.float64)
     added = []
     for site, position in zip(names, positions[index], strict=True):
         if np.isfinite(position).all():
-            frame.add_position(site, position, weight=weight, source=source)
+            frame.add_position(site, pose[:3, :3] @ position + pose[:3, 3], weight=weight, source=source)
             added.append(site)
     return tuple(added)
