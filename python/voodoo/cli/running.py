@@ -189,8 +189,8 @@ def spool_of(
     *,
     suffix: str = ".csv",
     upright: bool = False,
-) -> tuple[Sequence[Path], Spool]:
-    """The outputs of a command, by default one with the name of the recording, and where their poses are kept until the end.
+) -> Spool:
+    """Where poses are kept until the outputs of a command are written, by default one with the name of the recording.
 
     What killed commands left in their folders is completed before.
 
@@ -204,7 +204,7 @@ def spool_of(
         check_paths(context, targets)
     recover_before(targets)
     how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright}
-    return targets, Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
+    return Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
 
 
 def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path], *, upright: bool = False) -> Turn:
