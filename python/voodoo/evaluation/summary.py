@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -12,7 +13,7 @@ import numpy as np
 
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -86,12 +87,13 @@ def _together(scores: Sequence[Score], name: str, count: str) -> float:
     return sum(fraction * number for fraction, number in counts) / total if total else math.nan
 
 
-def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write rows of values; unknown ones are empty cells."""
-    with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(map(cell, row) for row in rows)
+def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """Rows of values as CSV; unknown ones are empty cells."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(map(cell, row) for row in rows)
+    return text.getvalue()
 
 
 def cell(value: object) -> str:
@@ -111,7 +113,7 @@ def write_sequences(path: Path, scores: Sequence[Score]) -> None:
         + [score.selection, " ".join(score.lost_joints), score.path]
         for score in scores
     )
-    write_table(path, header, rows)
+    write_whole(path, table_text(header, rows))
 
 
 def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
@@ -128,7 +130,7 @@ def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
         ]
         for one in summaries
     )
-    write_table(path, [*own, *ALL_ROWS], rows)
+    write_whole(path, table_text([*own, *ALL_ROWS], rows))
 
 
 def write_frames(path: Path, table: FrameTable) -> None:
@@ -149,4 +151,4 @@ def write_frames(path: Path, table: FrameTable) -> None:
         [repr(float(stamp)), status, metrics.mean_or_nan(errors), *errors, *last]
         for stamp, status, errors, *last in zip(*columns, strict=True)
     )
-    write_table(path, header, rows)
+    write_whole(path, table_text(header, rows))
