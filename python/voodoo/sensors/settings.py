@@ -103,7 +103,7 @@ class FrontEndSettings:
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
         """
-        has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+        has = inputs_in(recording)
         settings = cls(use=inputs_for(recording) if use is None else tuple(use))
         if has and not has & set(settings.use):
             raise MeasurementError(
@@ -116,9 +116,14 @@ class FrontEndSettings:
         )
 
 
+def inputs_in(recording: Recording) -> set[str]:
+    """The inputs that the sensors of a recording provide."""
+    return {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+
+
 def inputs_for(recording: Recording) -> tuple[str, ...]:
     """Returns the default inputs for tracking a recording, see `FrontEndSettings.of`."""
-    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+    has = inputs_in(recording)
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
     return tuple(kind for kind in inputs() if kind != "skin")
