@@ -21,8 +21,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.human_frames import human_frames, placed_names
-from voodoo.export.joint_angles import joint_angles
+from voodoo.export.human_frames import human_frames, joint_angles, placed_names
 from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright

@@ -7,8 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.export.human_frames import FRAMES, human_frames
-from voodoo.export.joint_angles import turns_of
+from voodoo.export.human_frames import FRAMES, human_frames, turns_of
 from voodoo.export.skeleton import bones, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
