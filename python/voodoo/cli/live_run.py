@@ -25,7 +25,7 @@ from voodoo.live.assembly import LiveFrame
 from voodoo.live.follow import Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
-from voodoo.live.sinks.registry import sink_of
+from voodoo.live.sinks import sink_of
 from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
 from voodoo.measurements import FloatArray, RecordedFrame
