@@ -104,8 +104,7 @@ _ALL_NEW = 0.25
 
 
 class FreeSpace:
-    """A grid map in the plane of one laser, in a static frame: returns from cells that were free before come from new objects, not
-    from furniture."""
+    """A grid map in the plane of one laser, in a static frame: returns from cells that were free before come from new objects."""
 
     def __init__(self) -> None:
         """Start with an empty map."""
