@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError
-from voodoo.live.faults import Fault, Faults
-from voodoo.live.source import Arrival
+from voodoo.live.source import Arrival, Fault, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.pipeline.frozen import unchanged

@@ -16,8 +16,7 @@ import numpy.typing as npt
 
 from voodoo.errors import CameraError, VoodooError, naming
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Faults
-from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import pose_of

@@ -10,10 +10,9 @@ from typing import Any
 
 from voodoo.errors import VoodooError
 from voodoo.live.clock import Clock, HostClock
-from voodoo.live.faults import Faults
 from voodoo.live.ros2.dds import Node, Offer, Subscription
 from voodoo.live.ros2.feed import TF, RosFeed
-from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.measurements import FloatArray
 from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, info_topic
