@@ -22,7 +22,7 @@ from voodoo.evaluation.people import (
     together,
 )
 from voodoo.evaluation.score import RATIO, written
-from voodoo.evaluation.summary import table_text
+from voodoo.evaluation.summary import write_table
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
 from voodoo.model.body import Body
@@ -168,7 +168,7 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     table, text = folder / "people.csv", folder / "people.md"
     names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
-    write_whole(table, table_text(names, ([getattr(score, name) for name in names] for score in scores)))
+    write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
     write_whole(text, people_markdown(scores))
     return [table, text]
 

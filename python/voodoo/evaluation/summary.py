@@ -13,7 +13,7 @@ import numpy as np
 
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
-from voodoo.whole import write_whole
+from voodoo.whole import appearing_whole
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -96,6 +96,12 @@ def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     return text.getvalue()
 
 
+def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write `table_text`, which appears when it is complete."""
+    with appearing_whole(path) as part:
+        part.write_text(table_text(header, rows), encoding="utf-8")
+
+
 def cell(value: object) -> str:
     """A value as text; "" if it is not known."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
@@ -113,7 +119,7 @@ def write_sequences(path: Path, scores: Sequence[Score]) -> None:
         + [score.selection, " ".join(score.lost_joints), score.path]
         for score in scores
     )
-    write_whole(path, table_text(header, rows))
+    write_table(path, header, rows)
 
 
 def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
@@ -130,7 +136,7 @@ def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
         ]
         for one in summaries
     )
-    write_whole(path, table_text([*own, *ALL_ROWS], rows))
+    write_table(path, [*own, *ALL_ROWS], rows)
 
 
 def write_frames(path: Path, table: FrameTable) -> None:
@@ -151,4 +157,4 @@ def write_frames(path: Path, table: FrameTable) -> None:
         [repr(float(stamp)), status, metrics.mean_or_nan(errors), *errors, *last]
         for stamp, status, errors, *last in zip(*columns, strict=True)
     )
-    write_whole(path, table_text(header, rows))
+    write_table(path, header, rows)
