@@ -8,8 +8,7 @@ from typing import Any
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
-from voodoo.drawing.canvas import Canvas
-from voodoo.drawing.rerun_log import Log
+from voodoo.drawing.surfaces import Canvas, Log
 from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.skin.tracker import SkinTracker
