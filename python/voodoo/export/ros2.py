@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -39,7 +40,8 @@ STORE = get_typestore(Stores.ROS2_HUMBLE)
 STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
 TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
-_SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
+_MARKER = "visualization_msgs/msg/Marker"
+_SPHERE, _CYLINDER, _SPHERES, _DELETE_ALL = 2, 3, 7, 3
 
 
 def person_id(number: int) -> str:
@@ -189,7 +191,11 @@ class _Human:
                 messages[f"{self.topic}/pose"] = pose_message(at, self.root, rows[0].tolist(), sure)
         if markers:
             header = header_at(at, self.root)
-            drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
+            drawn = (
+                _markers(self.track, self.body, index, header)
+                if self._displayed[index]
+                else [new(_MARKER, header=header, action=_DELETE_ALL)]
+            )
             messages[f"{self.topic}/markers"] = new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
 
@@ -220,8 +226,6 @@ def joint_message(nanoseconds: int, person: str, joints: Sequence[str], angles: 
         header=header_at(nanoseconds, f"body_{person}"),
         name=[f"{name}_{person}" for name in joints],
         position=np.ascontiguousarray(angles, dtype=np.float64),
-        velocity=np.empty(0),
-        effort=np.empty(0),
     )
 
 
@@ -265,14 +269,6 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
     return result
 
 
-def _no_markers(header: Any) -> Any:  # noqa: ANN401
-    """Message that removes all markers."""
-    still = np.array([0.0, 0.0, 0.0, 1.0])
-    marker = _marker(header, "", 0, _CYLINDER, np.zeros(3), still, (0.0,) * 3, (0.0,) * 3, [])
-    marker.action = _DELETE_ALL
-    return marker
-
-
 def _marker(
     header: Any,  # noqa: ANN401
     namespace: str,
@@ -286,14 +282,12 @@ def _marker(
     opacity: float = 0.6,
 ) -> Any:  # noqa: ANN401
     x, y, z, w = turn.tolist()
-    no_image, for_ever, no_file = _nothing()
     return new(
-        "visualization_msgs/msg/Marker",
+        _MARKER,
         header=header,
         ns=namespace,
         id=number,
         type=kind,
-        action=_ADD,
         pose=new(
             "geometry_msgs/msg/Pose",
             position=_point(place.tolist()),
@@ -301,32 +295,30 @@ def _marker(
         ),
         scale=new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
         color=new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
-        lifetime=for_ever,
-        frame_locked=False,
         points=points,
-        colors=[],
-        texture_resource="",
-        texture=no_image,
-        uv_coordinates=[],
-        text="",
-        mesh_resource="",
-        mesh_file=no_file,
-        mesh_use_embedded_materials=False,
     )
 
 
-@cache
-def _nothing() -> tuple[Any, Any, Any]:
-    """Fields of markers that are not used: an image, a lifetime and a mesh."""
-    no_bytes = np.empty(0, dtype=np.uint8)
-    image = new("sensor_msgs/msg/CompressedImage", header=header_at(0, ""), format="", data=no_bytes)
-    for_ever = new("builtin_interfaces/msg/Duration", sec=0, nanosec=0)
-    return image, for_ever, new("visualization_msgs/msg/MeshFile", filename="", data=no_bytes)
-
-
 def new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
-    """A message of a type, by its fields."""
-    return STORE.types[kind](**fields)
+    """A message of a type, by its fields; others are zero, empty or false."""
+    return STORE.types[kind](**{**_unset(kind), **fields})
+
+
+@cache
+def _unset(kind: str) -> dict[str, Any]:
+    """Fields of a message that says nothing."""
+    return {name: _nothing(*node) for name, node in STORE.fielddefs[kind][1]}
+
+
+def _nothing(form: Nodetype, content: Any) -> Any:  # noqa: ANN401 - of rosbags
+    if form == Nodetype.NAME:
+        return new(content)
+    if form == Nodetype.BASE:
+        return "" if content[0] == "string" else np.zeros((), content[0]).item()
+    (of, inner), count = content
+    if of == Nodetype.BASE and inner[0] != "string":
+        return np.zeros(count if form == Nodetype.ARRAY else 0, inner[0])
+    return []
 
 
 def header_at(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401

@@ -128,9 +128,6 @@ def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
         k=camera.matrix.ravel(),
         r=np.eye(3).ravel(),
         p=np.pad(camera.matrix, ((0, 0), (0, 1))).ravel(),
-        binning_x=0,
-        binning_y=0,
-        roi=ros2.new("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
     )
 
 
@@ -146,7 +143,6 @@ def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
         height=image.shape[0],
         width=image.shape[1],
         encoding="16UC1" if image.dtype.kind == "u" else "32FC1",
-        is_bigendian=0,
         step=image.shape[1] * image.dtype.itemsize,
         data=np.ascontiguousarray(image).view(np.uint8).ravel(),
     )
@@ -169,7 +165,6 @@ def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
         height=1,
         width=len(points),
         fields=fields,
-        is_bigendian=False,
         point_step=12,
         row_step=12 * len(points),
         data=points.view(np.uint8).ravel(),
@@ -184,12 +179,9 @@ def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
         angle_min=item.angle_min,
         angle_max=item.angle_min + item.angle_increment * (len(item.ranges) - 1),
         angle_increment=item.angle_increment,
-        time_increment=0.0,
-        scan_time=0.0,
         range_min=item.range_min,
         range_max=item.range_max,
         ranges=item.ranges.astype(np.float32),
-        intensities=np.empty(0, dtype=np.float32),
     )
 
 
