@@ -231,20 +231,9 @@ def joint_message(nanoseconds: int, person: str, joints: Sequence[str], angles: 
 
 def pose_message(nanoseconds: int, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
     """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers)."""
-    x, y, z, w = row[3:]
-    return new(
-        POSE,
-        header=header_at(nanoseconds, root),
-        pose=new(
-            "geometry_msgs/msg/PoseWithCovariance",
-            pose=new(
-                "geometry_msgs/msg/Pose",
-                position=_point(row[:3]),
-                orientation=new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-            ),
-            covariance=np.asarray(covariance, dtype=np.float64).ravel(),
-        ),
-    )
+    uncertain = np.asarray(covariance, dtype=np.float64).ravel()
+    pose = new("geometry_msgs/msg/PoseWithCovariance", pose=_pose(row), covariance=uncertain)
+    return new(POSE, header=header_at(nanoseconds, root), pose=pose)
 
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
@@ -281,18 +270,13 @@ def _marker(
     points: list[Any],
     opacity: float = 0.6,
 ) -> Any:  # noqa: ANN401
-    x, y, z, w = turn.tolist()
     return new(
         _MARKER,
         header=header,
         ns=namespace,
         id=number,
         type=kind,
-        pose=new(
-            "geometry_msgs/msg/Pose",
-            position=_point(place.tolist()),
-            orientation=new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-        ),
+        pose=_pose([*place.tolist(), *turn.tolist()]),
         scale=new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
         color=new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
         points=points,
@@ -329,6 +313,12 @@ def header_at(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
         stamp=new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest),
         frame_id=frame,
     )
+
+
+def _pose(row: Sequence[float]) -> Any:  # noqa: ANN401
+    x, y, z, w = row[3:]
+    turn = new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
+    return new("geometry_msgs/msg/Pose", position=_point(row[:3]), orientation=turn)
 
 
 def _point(position: Sequence[float]) -> Any:  # noqa: ANN401
