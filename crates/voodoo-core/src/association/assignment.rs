@@ -21,7 +21,7 @@ pub(crate) struct Assignment {
 }
 
 impl Assignment {
-    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy.
+    /// Step 2: assigns the candidates to limbs by the limbs' enlarged boxes and the overlap policy; `buried` limbs get none.
     pub(crate) fn assign(
         &mut self,
         body: &Body,
@@ -29,6 +29,7 @@ impl Assignment {
         candidates: &Candidates,
         overlap: Overlap,
         box_margin: f64,
+        buried: &[bool],
     ) {
         let Self { members, search, nearest, inside } = self;
         // One more list for the candidates outside all boxes.
@@ -40,7 +41,7 @@ impl Assignment {
         }
         nearest.resize(candidates.len(), NONE);
         inside.resize(if overlap == Overlap::Exclusive { 0 } else { candidates.len() * poses.len() }, false);
-        search.place(body, poses, box_margin);
+        search.place(body, poses, box_margin, buried);
         search.find(&candidates.clusters, nearest, inside);
         if overlap == Overlap::Exclusive {
             let count = candidates.len();
@@ -189,7 +190,7 @@ mod tests {
     fn holders(overlap: Overlap) -> (Body, Vec<Pose>, Candidates, Vec<Vec<usize>>) {
         let (body, poses, candidates) = scene();
         let mut assignment = Assignment::default();
-        assignment.assign(&body, &poses, &candidates, overlap, MARGIN);
+        assignment.assign(&body, &poses, &candidates, overlap, MARGIN, &[]);
         let mut holders = vec![Vec::new(); candidates.len()];
         for (limb, members) in assignment.members[..poses.len()].iter().enumerate() {
             assert!(members.is_sorted_by(|a, b| a < b), "ascending, none twice");

@@ -34,10 +34,18 @@ pub(crate) struct NearestLimb {
 }
 
 impl NearestLimb {
-    /// Sets the limb poses, with the boxes enlarged by `margin`.
-    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64) {
+    /// Sets the limb poses, with the boxes enlarged by `margin`. `buried` limbs contain no point; an empty slice means that none
+    /// is buried.
+    pub(crate) fn place(&mut self, body: &Body, poses: &[Pose], margin: f64, buried: &[bool]) {
         self.limbs.clear();
-        self.limbs.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| LimbBox::new(limb, pose, margin)));
+        self.limbs.extend(body.limbs().iter().zip(poses).enumerate().map(|(index, (limb, pose))| {
+            let open = LimbBox::new(limb, pose, margin);
+            if buried.get(index) == Some(&true) {
+                LimbBox { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], ..open }
+            } else {
+                open
+            }
+        }));
         self.groups.clear();
         self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
     }
@@ -319,7 +327,7 @@ mod tests {
             let points = around(seed);
             clusters.arrange(&points);
             let (mut quick, mut thorough) = (vec![NONE; points.len()], vec![NONE; points.len()]);
-            search.place(&body, &poses, margin);
+            search.place(&body, &poses, margin, &[]);
             search.find(&clusters, &mut quick, &mut []);
             let mut inside = vec![false; points.len() * poses.len()];
             search.find(&clusters, &mut thorough, &mut inside);

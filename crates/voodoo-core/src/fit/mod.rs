@@ -11,6 +11,7 @@ pub(crate) use motion::{Motion, UNKNOWN_MOTION};
 use rayon::prelude::*;
 
 use crate::association::assignment::{Assignment, match_limb};
+use crate::association::buried::Buried;
 use crate::association::contour::Contours;
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::association::visible_side::match_visible_side;
@@ -32,6 +33,7 @@ pub(crate) const CONTOUR_FROM: usize = 2;
 pub(crate) struct Fit {
     solver: Box<dyn Solver>,
     assignment: Assignment,
+    buried: Buried,
     correspondences: Correspondences,
     contours: Contours,
     regions: regions::ColorRegions,
@@ -47,6 +49,7 @@ impl Fit {
         Ok(Self {
             solver: solver(config.solver),
             assignment: Assignment::default(),
+            buried: Buried::default(),
             correspondences: Correspondences::default(),
             contours: Contours::default(),
             regions: regions::ColorRegions::default(),
@@ -235,7 +238,9 @@ impl Fit {
 
     fn assign(&mut self, context: Context, poses: &[Pose], gate: &Gate) {
         let Context { config, model, observation, .. } = context;
-        self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin);
+        // The published solver uses points anywhere on its limbs.
+        let buried = if self.schedule(config).whole_body { self.buried.find(&model.body, poses) } else { &[] };
+        self.assignment.assign(&model.body, poses, observation.candidates, config.overlap, gate.box_margin, buried);
     }
 
     fn find_contour(&mut self, context: Context, poses: &[Pose]) {
