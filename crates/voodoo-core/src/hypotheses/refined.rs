@@ -1,6 +1,6 @@
 //! Refinement of hypotheses by ICP, and comparison of their cost with that of the current pose.
 
-use super::objective::{MARGIN, Objective, REVERSAL_MARGIN, colors};
+use super::objective::{MARGIN, Objective, colors};
 use crate::association::correspondence::Correspondences;
 use crate::body::two_bone::TwoBone;
 use crate::fit::{Context, Fit};
@@ -111,15 +111,9 @@ impl Refined {
             } else {
                 fit.match_again(here, &self.poses, at);
             }
-            // Halfway, only a much higher cost stops the refinement.
-            let worst = match step {
-                GIVE_UP_AFTER => most,
-                _ if 2 * step == REFINE => most + REVERSAL_MARGIN,
-                _ => f64::INFINITY,
-            };
-            if worst.is_finite() {
+            if step == GIVE_UP_AFTER && most.is_finite() {
                 let cost = self.own_cost(context, fit);
-                if cost > worst {
+                if cost > most {
                     return (step, cost);
                 }
             }
