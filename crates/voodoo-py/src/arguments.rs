@@ -4,7 +4,7 @@
 
 use pyo3::prelude::*;
 
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{BodyError, wrong_argument};
 
 /// Functions for `from_py_with`, each named like its argument.
 macro_rules! arguments {
@@ -20,16 +20,16 @@ arguments!(dimension, f64: length a0 b0 a1 b1);
 arguments!(word, String: site);
 
 fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    value.extract().map_err(|_| wrong_argument(value.py(), name, "a number", value))
+    value.extract().map_err(|_| wrong_argument(name, "a number", value))
 }
 
 fn dimension(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     value.extract().map_err(|_| {
-        let text = wrong_argument(value.py(), name, "meters", value).value(value.py()).to_string();
-        exception(value.py(), "BodyError", text)
+        let text = wrong_argument(name, "meters", value).value(value.py()).to_string();
+        BodyError::new_err(text)
     })
 }
 
 fn word(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
-    value.extract().map_err(|_| wrong_argument(value.py(), name, "a name", value))
+    value.extract().map_err(|_| wrong_argument(name, "a name", value))
 }

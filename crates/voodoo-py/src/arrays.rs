@@ -10,7 +10,7 @@ use pyo3::type_object::PyTypeInfo;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3, matrix};
 use voodoo_core::{Body, ColorPixels, DepthPixels, Limb, PointSlice};
 
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{MeasurementError, wrong_argument};
 
 /// An array of the caller that may have either of two types, contiguous and aligned.
 pub(crate) enum EitherArray<T, D, U, E> {
@@ -105,14 +105,14 @@ pub(crate) fn wrong_array(name: &str, expected: &str, value: &Bound<'_, PyAny>) 
         Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
         Err(_) => value.get_type().to_string(),
     };
-    exception(value.py(), "MeasurementError", format!("{name}: expected an array of {expected}, found {found}"))
+    MeasurementError::new_err(format!("{name}: expected an array of {expected}, found {found}"))
 }
 
 /// Rejects NumPy's masked arrays: masked entries are ordinary numbers and would count as measured.
 pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
     if value.hasattr("mask")? {
         let text = format!("{name}: expected an array without a mask, found a masked one; {instead}");
-        return Err(exception(value.py(), "MeasurementError", text));
+        return Err(MeasurementError::new_err(text));
     }
     Ok(())
 }
@@ -133,7 +133,7 @@ pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'
         return Ok(array.as_slice()?.as_chunks().0);
     }
     let text = format!("{name}: expected shape (N, {N}), found {:?}", array.shape());
-    Err(exception(array.py(), "MeasurementError", text))
+    Err(MeasurementError::new_err(text))
 }
 
 /// The entries of a C-contiguous array of double precision with the given shape; `None` for anything else, including masked
@@ -152,16 +152,13 @@ pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
     if let Some(numbers) = entries(value, &[3]) {
         return Ok(Vec3::from_array(numbers));
     }
-    value
-        .extract::<[f64; 3]>()
-        .map(Vec3::from_array)
-        .map_err(|_| wrong_argument(value.py(), name, "three numbers", value))
+    value.extract::<[f64; 3]>().map(Vec3::from_array).map_err(|_| wrong_argument(name, "three numbers", value))
 }
 
 /// A pose from a rigid 4x4 matrix; the identity without one.
 pub(crate) fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
     let Some(value) = value else { return Ok(Pose::IDENTITY) };
-    let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
+    let wrong = || wrong_argument(name, "a rigid 4x4 transform", value);
     let rows: [[f64; 4]; 4] = match entries::<16>(value, &[4, 4]) {
         Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),
         None => value.extract().map_err(|_| wrong())?,

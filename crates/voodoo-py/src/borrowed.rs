@@ -8,7 +8,7 @@ use voodoo_core::{Body, Camera};
 use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
 
 use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, PointView};
-use crate::errors::IntoPy;
+use crate::errors::Raise;
 use crate::frame::PyFrame;
 
 /// Index of a name in a list, which it joins if it is new.
@@ -98,14 +98,14 @@ impl<'py, 'a> Borrowed<'py, 'a> {
     pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body) -> PyResult<Self> {
         let cloud = |cloud: &'a CloudData| {
             let scope = match &cloud.limb {
-                Some(name) => Scope::Limb(body.limb_index(name).map_err(|error| error.into_py(py))?),
+                Some(name) => Scope::Limb(body.limb_index(name).map_err(Raise::raise)?),
                 None if cloud.on_body => Scope::Body,
                 None => Scope::Free,
             };
             Ok((cloud.points.view(py), scope, cloud))
         };
         let (mut positions, mut rays) = (Vec::new(), Vec::new());
-        let index = |data: &SiteData| body.site_index(&data.site).map_err(|error| error.into_py(py));
+        let index = |data: &SiteData| body.site_index(&data.site).map_err(Raise::raise);
         for data in &frame.sites {
             let site = index(data)?;
             let SiteData { position: origin, weight, bias, source, .. } = *data;

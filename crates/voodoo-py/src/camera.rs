@@ -9,7 +9,7 @@ use voodoo_core::Lens;
 use voodoo_core::math::{Affine3, Vec3};
 
 use crate::arrays::rows;
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 
 type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
@@ -20,17 +20,10 @@ pub struct PyCamera(Arc<Camera>);
 #[pymethods]
 impl PyCamera {
     #[new]
-    fn new(
-        py: Python<'_>,
-        width: usize,
-        height: usize,
-        intrinsics: [f64; 4],
-        model: String,
-        coefficients: Vec<f64>,
-    ) -> PyResult<Self> {
+    fn new(width: usize, height: usize, intrinsics: [f64; 4], model: String, coefficients: Vec<f64>) -> PyResult<Self> {
         let camera = Lens::from_model(&model, &coefficients)
             .and_then(|lens| Camera::new(width, height, intrinsics, lens))
-            .map_err(|error| error.into_py(py))?;
+            .map_err(Raise::raise)?;
         Ok(Self(Arc::new(camera)))
     }
 
@@ -73,14 +66,14 @@ pub(crate) fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
     core.map(|core| Arc::clone(&core.get().0)).ok_or_else(|| {
         let found = camera.get_type().name().map_or_else(|_| "something else".into(), |name| name.to_string());
         let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
-        exception(camera.py(), "MeasurementError", text)
+        MeasurementError::new_err(text)
     })
 }
 
 /// The transform of a 4x4 array.
 pub(crate) fn affine(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Affine3> {
     if value.dims() != numpy::Ix2(4, 4) {
-        return Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any()));
+        return Err(wrong_argument(name, "an array of shape (4, 4)", value.as_any()));
     }
     let entries = value.as_array();
     let column = |column: usize| Vec3::new(entries[[0, column]], entries[[1, column]], entries[[2, column]]);

@@ -17,7 +17,7 @@ use voodoo_detect::{Detector, JOINTS, LENGTHS};
 use crate::arrays::{contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
@@ -28,8 +28,8 @@ pub struct PyDetector(pub Detector);
 impl PyDetector {
     #[new]
     #[pyo3(signature = (*, weights=None))]
-    fn new(py: Python<'_>, weights: Option<PathBuf>) -> PyResult<Self> {
-        let refused = |message: String| exception(py, "MeasurementError", message);
+    fn new(weights: Option<PathBuf>) -> PyResult<Self> {
+        let refused = |message: String| MeasurementError::new_err(message);
         let detector = match weights {
             None => Ok(Detector::new()),
             Some(path) => std::fs::read(&path)
@@ -44,14 +44,14 @@ impl PyDetector {
     #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
-        let any = Body::human(1.75, HumanModel::Full).map_err(|error| error.into_py(py))?;
+        let any = Body::human(1.75, HumanModel::Full).map_err(Raise::raise)?;
         let views = frame.depth_views(py);
         let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
-        input.check(&any, None).map_err(|error| error.into_py(py))?;
+        input.check(&any, None).map_err(Raise::raise)?;
         let direction = |up: &Bound<'_, PyAny>| {
-            let wrong = || wrong_argument(py, "up", "a vector that is not zero", up);
+            let wrong = || wrong_argument("up", "a vector that is not zero", up);
             vector("up", up)?.try_normalize().ok_or_else(wrong)
         };
         let up = up.map(direction).transpose()?;
@@ -66,7 +66,7 @@ impl PyDetector {
             }
             Ok::<_, DetectError>(found)
         });
-        let mut found = found.map_err(|error| exception(py, "MeasurementError", error.to_string()))?;
+        let mut found = found.map_err(|error| MeasurementError::new_err(error.to_string()))?;
         found.sort_by(|(a, _), (b, _)| b.person.total_cmp(&a.person));
         let source = |image: &DepthImage| frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
         found.iter().map(|(detection, image)| PyDetection::new(py, detection, image, source(image))).collect()
@@ -192,13 +192,13 @@ pub(crate) fn person_candidates<'py>(
     floor: Option<([f64; 3], f64)>,
     most: usize,
 ) -> PyResult<Vec<PyCandidate>> {
-    let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype float32", depth);
+    let wrong = || wrong_argument("depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
     let camera = camera_of(camera)?;
     let [height, width] = [camera.height(), camera.width()];
     if view.as_array().dim() != (height, width) {
-        return Err(wrong_argument(py, "depth", &format!("shape ({height}, {width}), as its camera has"), depth));
+        return Err(wrong_argument("depth", &format!("shape ({height}, {width}), as its camera has"), depth));
     }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),

@@ -13,7 +13,7 @@ use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
 use crate::arrays::{contiguous, vector};
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
@@ -22,7 +22,6 @@ const LEAST: f64 = 1e-7;
 
 /// The `detector` argument of a caller: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
 pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
-    let py = given.py();
     if given.is_none() {
         return Ok(None);
     }
@@ -40,7 +39,7 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
         "detector: expected \"shipped\", None, a voodoo.Detector, or an object with joints and detect(image), found {}",
         given.repr()?
     );
-    Err(exception(py, "ConfigError", text))
+    Err(ConfigError::new_err(text))
 }
 
 /// The detector that ships with the library, if this build contains it.
@@ -81,7 +80,7 @@ impl PythonDetector {
             found.extract().map_err(|_| {
                 let found = found.repr().map_or_else(|_| "something else".into(), |text| text.to_string());
                 let text = format!("detector.{attribute}: expected a sequence of names, found {found}");
-                exception(object.py(), "ConfigError", text)
+                ConfigError::new_err(text)
             })
         };
         Ok(Self { joints: names("joints")?, lengths: names("lengths")?, object: Arc::new(object.clone().unbind()) })
@@ -104,14 +103,13 @@ impl PythonDetector {
 
     /// Converts an object with the attributes of `voodoo.detectors.DetectedPerson`.
     fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
-        let py = person.py();
         if person.getattr("joints")?.is_none() {
-            return Err(wrong_argument(py, "joints", "a mapping from names", &person.getattr("joints")?));
+            return Err(wrong_argument("joints", "a mapping from names", &person.getattr("joints")?));
         }
         let positions: HashMap<String, Bound<'_, PyAny>> = mapping(person, "joints")?;
         if let Some(name) = positions.keys().find(|name| !self.joints.contains(name)) {
             let text = format!("joints: expected some of {}, found {name:?}", self.joints.join(", "));
-            return Err(exception(py, "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         let (sigma, visible) = (of_each(person, "joint_sigma", SIGMA)?, of_each(person, "visible", 1.0)?);
         let joint = |name: &String| {
@@ -144,7 +142,7 @@ impl PythonDetector {
                     "lengths and length_sigma: expected all of {}, found none of {name}",
                     self.lengths.join(", ")
                 );
-                Err(exception(person.py(), "MeasurementError", text))
+                Err(MeasurementError::new_err(text))
             }
         };
         self.lengths.iter().map(length).collect()
@@ -222,7 +220,7 @@ where
     let Some(found) = given(person, attribute)? else { return Ok(HashMap::new()) };
     let pairs = found.py().get_type::<PyDict>().call1((&found,));
     let found_pairs = pairs.and_then(|pairs| pairs.extract());
-    found_pairs.map_err(|_| wrong_argument(person.py(), attribute, "a mapping from names", &found))
+    found_pairs.map_err(|_| wrong_argument(attribute, "a mapping from names", &found))
 }
 
 /// An attribute; none where it is missing or None.
@@ -243,7 +241,7 @@ fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>>
     let Some(found) = given(person, attribute)? else { return Ok(None) };
     let probability = found.extract::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
     let probability = probability
-        .ok_or_else(|| wrong_argument(person.py(), attribute, "a probability, from 0 to 1", &found))?
+        .ok_or_else(|| wrong_argument(attribute, "a probability, from 0 to 1", &found))?
         .clamp(LEAST, 1.0 - LEAST);
     Ok(Some((probability / (1.0 - probability)).ln()))
 }
@@ -251,7 +249,7 @@ fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>>
 /// The attribute `floor`: normal and offset, or None.
 fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
     let Some(found) = given(person, "floor")? else { return Ok(None) };
-    let wrong = |_| wrong_argument(person.py(), "floor", "a unit normal and an offset in meters", &found);
+    let wrong = |_| wrong_argument("floor", "a unit normal and an offset in meters", &found);
     let (normal, offset): (Bound<'_, PyAny>, f64) = found.extract().map_err(wrong)?;
     let normal: Vec3 = vector("floor[0]", &normal)?;
     Ok(normal.try_normalize().map(|normal| Ground { normal, offset }))
@@ -264,7 +262,7 @@ fn pixels(person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Vec<usize>>
     let [height, width] = [image.camera.height(), image.camera.width()];
     let array = array.filter(|array| array.shape() == [height, width]).ok_or_else(|| {
         let expected = format!("an array of shape ({height}, {width}) and dtype bool");
-        wrong_argument(person.py(), "mask", &expected, &found)
+        wrong_argument("mask", &expected, &found)
     })?;
     let view = array.readonly();
     Ok(view.as_slice()?.iter().enumerate().filter(|(_, visible)| **visible).map(|(index, _)| index).collect())

@@ -12,7 +12,7 @@ use voodoo_core::Estimate;
 use voodoo_core::math::{Mat3, Vec3};
 
 use crate::arrays::{frozen, matrices};
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 
 /// The names for the numbers of an estimate; shared by all estimates of one body.
 pub struct Names {
@@ -83,9 +83,8 @@ pub(crate) fn _estimate(
     joints: Vec<Option<String>>,
     sources: Vec<String>,
 ) -> PyResult<PyEstimate> {
-    let estimate = depythonize(found).map_err(|error| {
-        exception(found.py(), "MeasurementError", format!("estimate: expected a pickled one, {error}"))
-    })?;
+    let estimate = depythonize(found)
+        .map_err(|error| MeasurementError::new_err(format!("estimate: expected a pickled one, {error}")))?;
     Ok(PyEstimate { estimate, names: Arc::new(Names::new(limbs, sites, joints)), sources })
 }
 

@@ -10,7 +10,7 @@ use crate::arguments;
 use crate::arrays::{ColorArray, DepthArray, PointArray, pose, unmasked, vector, wrong_array};
 use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, SiteData, number};
 use crate::camera::camera_of;
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{MeasurementError, wrong_argument};
 use crate::sites::PySiteRay;
 
 #[doc = stub!("Frame")]
@@ -100,7 +100,7 @@ impl PyFrame {
                 "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",
                 array.shape()
             );
-            return Err(exception(image.py(), "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         let data = ImageData {
             pixels,
@@ -130,7 +130,7 @@ impl PyFrame {
         unmasked("image", image, "fill it: image.filled(0)")?;
         let (pixels, _) = ColorArray::new(image)
             .filter(|(_, found)| *found == [height, width])
-            .ok_or_else(|| wrong_argument(image.py(), "image", &expected, image))?;
+            .ok_or_else(|| wrong_argument("image", &expected, image))?;
         let data = ColorData {
             pixels,
             camera,
@@ -212,7 +212,6 @@ impl PyFrame {
     #[pyo3(signature = (rays, *, reference_sigma, max_weight, min_trust))]
     fn _add_site_rays(
         &mut self,
-        py: Python<'_>,
         rays: Vec<PyRef<'_, PySiteRay>>,
         reference_sigma: f64,
         max_weight: f64,
@@ -222,7 +221,7 @@ impl PyFrame {
             if sigma > 0.0 && sigma.is_finite() {
                 return Ok((reference_sigma / sigma).powi(2).min(max_weight));
             }
-            Err(exception(py, "MeasurementError", format!("sigma: expected finite meters > 0, found {sigma}")))
+            Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
         };
         let trusted = rays.iter().map(|ray| &ray.0).filter(|ray| ray.trust >= min_trust);
         let mut count = 0;

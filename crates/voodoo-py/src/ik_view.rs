@@ -7,7 +7,7 @@ use voodoo_ik::SilhouetteView;
 
 use crate::arrays::pose;
 use crate::camera::camera_of;
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 
 #[doc = stub!("View")]
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
@@ -27,12 +27,12 @@ impl PyView {
         let [height, width] = [distance.shape()[0], distance.shape()[1]];
         if width < 2 || height < 2 {
             let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
-            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+            return Err(MeasurementError::new_err(message));
         }
         let camera = camera_of(camera)?;
         if [camera.height(), camera.width()] != [height, width] || camera.distorts() {
             let message = format!("camera: expected a pinhole camera of {width} x {height} pixels, found {camera:?}");
-            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+            return Err(MeasurementError::new_err(message));
         }
         Ok(Self(SilhouetteView {
             pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),

@@ -8,7 +8,7 @@ use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObse
 
 use crate::arrays::{PointArray, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::IntoPy;
+use crate::errors::Raise;
 use crate::people::TrackedBody;
 use crate::sites::{PySiteGate, PySiteRay, places_of};
 
@@ -141,7 +141,7 @@ pub(crate) fn carried<'py>(
     let array = PointArray::new("points", points)?;
     let view = array.view(py);
     let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
-    let moved = moved.map_err(|error| error.into_py(py))?;
+    let moved = moved.map_err(Raise::raise)?;
     let array =
         |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);
     moved.map(array).transpose()

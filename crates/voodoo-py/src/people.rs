@@ -12,7 +12,7 @@ use crate::body::PyBody;
 use crate::borrowed::{Borrowed, Parts, color_image};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{IntoPy, exception};
+use crate::errors::{BodyError, Raise};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::tracker::{PyTracker, site_positions};
@@ -42,7 +42,7 @@ impl TrackedBody<'_> {
                 let found = people.people.present().find(|(there, _)| there == id);
                 let missing = || {
                     let text = format!("person: expected one of those who are there, found {id}");
-                    exception(people.py(), "BodyError", text)
+                    BodyError::new_err(text)
                 };
                 found.map(|(_, tracker)| tracker).ok_or_else(missing)
             }
@@ -66,8 +66,7 @@ impl PyPeople {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let mut options = PeopleOptions::default();
         (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
-        let mut people =
-            People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
+        let mut people = People::new(body.0.clone(), config(values)?, options).map_err(Raise::raise)?;
         if let Some(found) = self::detector(detector)? {
             people = people.with_detector(found);
         }
@@ -100,7 +99,7 @@ impl PyPeople {
         let frames: Vec<(usize, Frame)> =
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
-        py.detach(|| people.step(&input, &frames)).map_err(|error| error.into_py(py))?;
+        py.detach(|| people.step(&input, &frames)).map_err(Raise::raise)?;
         self.detector_failures += usize::from(people.detector_error().is_some());
         warn_of_detector(py, self.people.detector_error())?;
         let found = self.people.present().map(|(id, tracker)| {
@@ -120,7 +119,7 @@ impl PyPeople {
     /// Adds a person at these positions; returns their id.
     fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
         let positions = site_positions(self.people.prototype(), joints)?;
-        self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
+        self.people.add(&positions, fit_sizes).map_err(Raise::raise)
     }
 
     /// Why a detected person is not tracked.

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use voodoo_sensors::registration;
 
 use crate::arrays::rows;
-use crate::errors::IntoPy;
+use crate::errors::Raise;
 
 #[doc = stub!("nearest_surface")]
 #[pyfunction]
@@ -17,5 +17,5 @@ pub(crate) fn nearest_surface(
     radius: f64,
 ) -> PyResult<Option<f64>> {
     let found = registration::nearest_surface(rows("pixels", &pixels)?, depths.as_slice()?, pixel, radius);
-    found.map_err(|error| error.into_py(pixels.py()))
+    found.map_err(Raise::raise)
 }

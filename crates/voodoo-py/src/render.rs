@@ -7,7 +7,7 @@ use voodoo_core::{Rendering, Viewpoint};
 use crate::arrays::{limb_poses, pose};
 use crate::body::PyBody;
 use crate::camera::camera_of;
-use crate::errors::IntoPy;
+use crate::errors::Raise;
 
 type Images<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i16>>);
 
@@ -26,7 +26,7 @@ pub(crate) fn render_depth<'py>(
     let camera = camera_of(camera)?;
     let view = Viewpoint { camera: &camera, world_from_sensor };
     let mut image = Rendering::default();
-    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(|error| error.into_py(py))?;
+    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(Raise::raise)?;
     let size = [camera.height(), camera.width()];
     let depth = PyArray1::from_slice(py, image.depth()).reshape(size)?;
     // The mark of no limb, all ones, becomes -1; no body has 32768 limbs.

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedA
 use pyo3::prelude::*;
 use voodoo_core::math::{self, Mat3};
 
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
@@ -12,7 +12,7 @@ type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 fn leading<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, last: &[usize]) -> PyResult<&'a [usize]> {
     array.shape().strip_suffix(last).ok_or_else(|| {
         let text = format!("rotations: expected shape (..., {last:?}), found {:?}", array.shape());
-        exception(array.py(), "MeasurementError", text)
+        MeasurementError::new_err(text)
     })
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn euler_angles<'py>(
 ) -> PyResult<Array<'py>> {
     let shape = [leading(&quaternions, &[4])?, &[3]].concat();
     if !are_axes(order) {
-        return Err(exception(py, "MeasurementError", format!("order: expected axes that differ, found {order:?}")));
+        return Err(MeasurementError::new_err(format!("order: expected axes that differ, found {order:?}")));
     }
     let rows = quaternions.as_slice()?.as_chunks::<4>().0;
     let found = rows.iter().flat_map(|row| math::euler_angles(row, order)).collect();

@@ -7,7 +7,7 @@ use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
 use crate::arrays::{PointArray, vector};
-use crate::errors::IntoPy;
+use crate::errors::{MeasurementError, Raise};
 
 #[doc = stub!("TaperedEllipticCylinder")]
 #[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
@@ -30,14 +30,13 @@ impl PyShape {
     #[new]
     #[pyo3(signature = (length, a0, b0, a1, b1))]
     fn new(
-        py: Python<'_>,
         #[pyo3(from_py_with = arguments::length)] length: f64,
         #[pyo3(from_py_with = arguments::a0)] a0: f64,
         #[pyo3(from_py_with = arguments::b0)] b0: f64,
         #[pyo3(from_py_with = arguments::a1)] a1: f64,
         #[pyo3(from_py_with = arguments::b1)] b1: f64,
     ) -> PyResult<Self> {
-        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(|error| error.into_py(py))
+        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(Raise::raise)
     }
 
     #[doc = stub!("TaperedEllipticCylinder.length")]
@@ -78,7 +77,7 @@ impl PyShape {
     ) -> PyResult<(Vector<'py>, Vector<'py>, f64)> {
         let query = vector("point", point)?;
         if !query.is_finite() {
-            return Err(crate::errors::wrong_argument(py, "point", "finite meters", point));
+            return Err(crate::errors::wrong_argument("point", "finite meters", point));
         }
         let found = self.0.closest_point(query);
         let array = |v: [f64; 3]| PyArray1::from_slice(py, &v);
@@ -92,7 +91,7 @@ impl PyShape {
         let slice = view.points()?;
         if let Some(row) = (0..slice.len()).rfind(|row| !slice.get(*row).is_finite()) {
             let found = format!("points: expected finite meters, found {:?} in row {row}", slice.get(row).to_array());
-            return Err(crate::errors::exception(py, "MeasurementError", found));
+            return Err(MeasurementError::new_err(found));
         }
         let batch = py.detach(|| {
             let (mut queries, mut batch) = (Points::default(), SurfaceBatch::default());

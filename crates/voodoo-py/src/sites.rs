@@ -7,7 +7,7 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::sites::{SiteGate, SiteRay};
 
 use crate::arrays::vector;
-use crate::errors::{IntoPy, exception};
+use crate::errors::{MeasurementError, Raise};
 use crate::people::TrackedBody;
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
@@ -41,7 +41,7 @@ pub(crate) fn expected_sites<'py>(
     stamp: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let tracker = tracker.tracker()?;
-    let places = tracker.expected_sites(stamp).map_err(|error| error.into_py(py))?;
+    let places = tracker.expected_sites(stamp).map_err(Raise::raise)?;
     let dict = PyDict::new(py);
     for (site, place) in tracker.body().sites().iter().zip(places) {
         dict.set_item(&site.name, row(py, place))?;
@@ -57,11 +57,11 @@ pub struct PySiteGate(pub SiteGate);
 impl PySiteGate {
     #[new]
     #[pyo3(signature = (radius=0.15, growth=0.5, widest=0.40))]
-    fn new(py: Python<'_>, radius: f64, growth: f64, widest: f64) -> PyResult<Self> {
+    fn new(radius: f64, growth: f64, widest: f64) -> PyResult<Self> {
         if !(radius > 0.0 && growth >= 0.0 && widest >= radius) {
             let found = format!("found radius {radius:?}, growth {growth:?}, widest {widest:?}");
             let text = format!("gate: expected 0 < radius <= widest and growth >= 0, {found}");
-            return Err(exception(py, "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         Ok(Self(SiteGate::new(radius, growth, widest)))
     }

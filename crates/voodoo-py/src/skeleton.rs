@@ -7,7 +7,7 @@ use voodoo_core::math::{self, Mat3, Vec3};
 use voodoo_core::{Body, Limb};
 
 use crate::body::{PyBody, at_rest};
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 use crate::rotations::are_axes;
 
 type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -20,7 +20,7 @@ fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>
     let shape = array.shape();
     if shape.len() < 2 || shape[2..].iter().product::<usize>() != N || !array.is_c_contiguous() {
         let text = format!("contiguous frames of rows of {N} numbers, found shape {shape:?}");
-        return Err(wrong(array.py(), name, &text));
+        return Err(wrong(name, &text));
     }
     let rows = array.as_slice()?.as_chunks::<N>().0;
     Ok((0..shape[0]).map(|frame| rows.get(frame * shape[1]..(frame + 1) * shape[1]).unwrap_or_default()).collect())
@@ -30,7 +30,7 @@ fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>
 fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
     match plan.shape()[1] {
         columns if columns == N && plan.is_c_contiguous() => Ok(plan.as_slice()?.as_chunks().0),
-        columns => Err(wrong(plan.py(), "plan", &format!("{N} columns, found {columns}"))),
+        columns => Err(wrong("plan", &format!("{N} columns, found {columns}"))),
     }
 }
 
@@ -39,12 +39,12 @@ fn entry<T>(entries: &[T], number: i64) -> Option<&T> {
     entries.get(usize::try_from(number).ok()?)
 }
 
-fn wrong(py: Python<'_>, name: &str, expected: &str) -> PyErr {
-    exception(py, "MeasurementError", format!("{name}: expected {expected}"))
+fn wrong(name: &str, expected: &str) -> PyErr {
+    MeasurementError::new_err(format!("{name}: expected {expected}"))
 }
 
-fn unplanned(py: Python<'_>) -> PyErr {
-    wrong(py, "plan", "numbers of limbs, joints and frames that are there, and axes that differ")
+fn unplanned() -> PyErr {
+    wrong("plan", "numbers of limbs, joints and frames that are there, and axes that differ")
 }
 
 fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
@@ -143,7 +143,7 @@ pub(crate) fn skeleton<'py>(
     let (poses, joints, own) = (frames("poses", &poses)?, frames("joints", &joints)?, plan(&own)?);
     let (mut turns, mut heads) = (Vec::new(), Vec::new());
     for ((poses, joints), body) in poses.iter().zip(&joints).zip(each(&bodies)) {
-        let found = bones(body, poses, joints, own).ok_or_else(|| unplanned(py))?;
+        let found = bones(body, poses, joints, own).ok_or_else(unplanned)?;
         turns.extend(found.0.iter().flat_map(rows_of));
         heads.extend(found.1.iter().flat_map(Vec3::to_array));
     }
@@ -165,7 +165,7 @@ pub(crate) fn placed<'py>(
     for (rotations, points) in rotations.iter().zip(&points) {
         let turns: Vec<_> = rotations.iter().map(rotation).collect();
         let points: Vec<_> = points.iter().copied().map(Vec3::from_array).collect();
-        let found = placed_frames(&turns, &points, plan).ok_or_else(|| unplanned(py))?;
+        let found = placed_frames(&turns, &points, plan).ok_or_else(unplanned)?;
         places.extend(found.0.iter().flat_map(Vec3::to_array));
         rows.extend(found.1.into_iter().flatten());
     }
@@ -180,7 +180,7 @@ pub(crate) fn joint_angles<'py>(py: Python<'py>, rotations: Given<'py>, plan: Pl
     let mut all = Vec::new();
     for rotations in &rotations {
         let turns: Vec<_> = rotations.iter().map(rotation).collect();
-        all.extend(angles(&turns, plan).ok_or_else(|| unplanned(py))?);
+        all.extend(angles(&turns, plan).ok_or_else(unplanned)?);
     }
     array(py, all, &[rotations.len(), plan.len()])
 }
@@ -196,7 +196,7 @@ pub(crate) fn moved_covariances<'py>(
     let mut moved = Vec::new();
     for (covariance, across) in covariances.iter().zip(across.as_array().rows()) {
         let (Ok(covariance), &[x, y, z]) = ((*covariance).try_into(), &across.to_vec()[..]) else {
-            return Err(wrong(py, "covariances", "shapes (F, 6, 6) and (F, 3)"));
+            return Err(wrong("covariances", "shapes (F, 6, 6) and (F, 3)"));
         };
         moved.extend(moved_covariance(covariance, Vec3::new(x, y, z)).into_iter().flatten());
     }

@@ -12,7 +12,7 @@ use voodoo_sensors::skin::depth::DepthBeside;
 
 use crate::arrays::{DepthArray, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
@@ -26,7 +26,7 @@ type DepthArguments<'py> = (Bound<'py, PyAny>, f64, Bound<'py, PyAny>, PyReadonl
 fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]> {
     if image.dims()[2] != 3 {
         let text = format!("image: expected shape (height, width, 3), found {:?}", image.shape());
-        return Err(exception(image.py(), "MeasurementError", text));
+        return Err(MeasurementError::new_err(text));
     }
     Ok(image.as_slice()?.as_chunks().0)
 }
@@ -123,14 +123,14 @@ impl PySkinCue {
         let mut view = None;
         if let Some((image, ..)) = &depth {
             let expected = "an array of shape (height, width) and dtype uint16 or float32";
-            let array = DepthArray::cast(image).ok_or_else(|| wrong_argument(py, "depth", expected, image))?;
+            let array = DepthArray::cast(image).ok_or_else(|| wrong_argument("depth", expected, image))?;
             view = Some(array.view(py));
         }
         let mut beside = None;
         if let (Some((_, per_unit, _, pose)), Some(camera), Some(view)) = (&depth, &depth_camera, &view) {
             let depth = Eye { world_from_sensor: affine("world_from_depth", pose)?, camera };
             let found = DepthBeside::new(view.pixels()?, *per_unit, depth, eye);
-            beside = Some(found.map_err(|error| error.into_py(py))?);
+            beside = Some(found.map_err(Raise::raise)?);
         }
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
@@ -145,7 +145,7 @@ impl PySkinCue {
         };
         self.size = [camera.height(), camera.width()];
         let cue = &mut self.cue;
-        let found = py.detach(|| cue.observe(&input)).map_err(|error| error.into_py(py))?;
+        let found = py.detach(|| cue.observe(&input)).map_err(Raise::raise)?;
         let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
         Ok(found.iter().map(|site| (site.site, row(site.direction), site.place.map(row), site.depth)).collect())
     }
@@ -168,6 +168,6 @@ impl PySkinCue {
         let sites: Vec<Option<Vec3>> =
             sites.into_iter().map(|place| Some(place).filter(|place| !place.is_nan())).collect();
         let cue = &mut self.cue;
-        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(|error| error.into_py(py))
+        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(Raise::raise)
     }
 }

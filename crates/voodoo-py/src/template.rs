@@ -4,7 +4,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 
 #[doc = stub!("Template")]
 #[pyclass(module = "voodoo._core", frozen)]
@@ -41,7 +41,6 @@ fn put_number(messages: &mut [u8], at: usize, number: f64, single: bool) {
 impl Template {
     #[new]
     fn new(
-        py: Python<'_>,
         messages: Vec<Bound<'_, PyBytes>>,
         numbers: PyReadonlyArray1<'_, f64>,
         single: bool,
@@ -63,9 +62,8 @@ impl Template {
             Some(last)
         };
         let places: Option<Vec<usize>> = numbers.as_slice()?.iter().map(place).collect();
-        let places = places.ok_or_else(|| {
-            exception(py, "MeasurementError", "numbers: expected those in the messages, found another".into())
-        })?;
+        let places = places
+            .ok_or_else(|| MeasurementError::new_err("numbers: expected those in the messages, found another"))?;
         let stamps = found(&messages, stamp).collect();
         Ok(Self { messages, ends, places, stamps, single })
     }
@@ -81,7 +79,7 @@ impl Template {
         let given: usize = numbers.iter().map(|part| part.len()).sum();
         if given != self.places.len() {
             let text = format!("numbers: expected {}, found {given}", self.places.len());
-            return Err(exception(py, "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         // In their order, however they are stored.
         for (place, number) in self.places.iter().zip(numbers.iter().flat_map(|part| part.as_array().into_iter())) {
@@ -98,11 +96,11 @@ impl Template {
 
 #[doc = stub!("with_numbers")]
 #[pyfunction]
-pub(crate) fn with_numbers(py: Python<'_>, text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
+pub(crate) fn with_numbers(text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
     let places = text.matches('\0').count();
     let given: usize = numbers.iter().map(|part| part.len()).sum();
     if places != given {
-        return Err(exception(py, "MeasurementError", format!("numbers: expected {places}, found {given}")));
+        return Err(MeasurementError::new_err(format!("numbers: expected {places}, found {given}")));
     }
     let all = numbers.iter().flat_map(|part| part.as_array().into_iter());
     let whole = all.map(|number| (number.round_ties_even() as i64).to_string());

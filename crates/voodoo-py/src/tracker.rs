@@ -15,7 +15,7 @@ use crate::body::{JointParts, PyBody, joint};
 use crate::borrowed::{Borrowed, ColorViews, color_image, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::people::TrackedBody;
@@ -37,7 +37,7 @@ pub struct PyTracker {
 pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
     let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let name: String = name.extract()?;
-        let site = body.site_index(&name).map_err(|error| error.into_py(joints.py()))?;
+        let site = body.site_index(&name).map_err(Raise::raise)?;
         Ok((site, vector(&format!("joints[{name}]"), &position)?))
     };
     joints.iter().map(place).collect()
@@ -53,23 +53,18 @@ pub(crate) fn body_before<'py>(
     let py = sites.py();
     let places: Vec<Vec3> = rows("sites", &sites)?.iter().map(|place| Vec3::from_array(*place)).collect();
     let found = tracker.tracker()?.body_before(&places, Vec3::from_array(camera));
-    Ok(PyArray1::from_vec(py, found.map_err(|error| error.into_py(py))?))
+    Ok(PyArray1::from_vec(py, found.map_err(Raise::raise)?))
 }
 
 impl PyTracker {
     /// The color images of a frame, whose cameras are identified by name.
-    fn pictures<'a>(
-        &mut self,
-        py: Python<'_>,
-        frame: &PyFrame,
-        views: &'a ColorViews,
-    ) -> PyResult<Vec<ColorImage<'a>>> {
+    fn pictures<'a>(&mut self, frame: &PyFrame, views: &'a ColorViews) -> PyResult<Vec<ColorImage<'a>>> {
         let mut colors = Vec::with_capacity(views.len());
         for view in views {
             let name = &frame.sources[usize::from(view.1.source)];
             if view.1.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
-                return Err(exception(py, "MeasurementError", text));
+                return Err(MeasurementError::new_err(text));
             }
             colors.push(color_image(view, number(&mut self.cameras, name))?);
         }
@@ -85,7 +80,7 @@ impl PyTracker {
 impl PyTracker {
     #[new]
     fn new(body: &PyBody, values: &Bound<'_, PyDict>, detector: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(Raise::raise)?;
         if let Some(found) = self::detector(detector)? {
             tracker = tracker.with_detector(found);
         }
@@ -108,17 +103,16 @@ impl PyTracker {
 
     #[pyo3(signature = (joints, *, fit_sizes=true))]
     fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
-        let py = joints.py();
         let positions = site_positions(self.tracker.body(), joints)?;
-        self.tracker.reset(&positions, fit_sizes).map_err(|error| error.into_py(py))?;
+        self.tracker.reset(&positions, fit_sizes).map_err(Raise::raise)?;
         self.body_changed();
         self.sources.clear();
         Ok(self.estimate())
     }
 
-    fn _reset_pose(&mut self, py: Python<'_>, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
+    fn _reset_pose(&mut self, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
         let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
-        self.tracker.reset_pose(&poses).map_err(|error| error.into_py(py))?;
+        self.tracker.reset_pose(&poses).map_err(Raise::raise)?;
         self.sources.clear();
         Ok(self.estimate())
     }
@@ -145,11 +139,11 @@ impl PyTracker {
         let borrowed = Borrowed::new(py, frame, self.tracker.body())?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
-        let colors = self.pictures(py, frame, &views)?;
+        let colors = self.pictures(frame, &views)?;
         let detections = borrowed.detections();
         let input = borrowed.frame(frame, &clouds, &images, &colors, &detections);
         let tracker = &mut self.tracker;
-        py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
+        py.detach(|| tracker.step(&input).map(|_| ())).map_err(Raise::raise)?;
         self.sources.clone_from(&frame.sources);
         self.detector_failures += usize::from(self.tracker.detector_error().is_some());
         warn_of_detector(py, self.tracker.detector_error())?;
@@ -161,13 +155,13 @@ impl PyTracker {
         let mut pictures = Vec::with_capacity(images.len());
         for (index, image) in images.iter().enumerate() {
             let expected = "an array of shape (height, width, 3) or (height, width) and dtype uint8";
-            let wrong = || wrong_argument(py, &format!("images[{index}]"), expected, image);
+            let wrong = || wrong_argument(&format!("images[{index}]"), expected, image);
             pictures.push(ColorArray::new(image).ok_or_else(wrong)?);
         }
         let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
         let camera = number(&mut self.cameras, source);
-        self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
+        self.tracker.set_background(camera, &pixels).map_err(Raise::raise)
     }
 
     /// Probability of each pixel of a frame's images to show the body at given poses: name of the camera -> (height, width).
@@ -180,10 +174,10 @@ impl PyTracker {
     ) -> PyResult<Bound<'py, PyDict>> {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
         let views = frame.color_views(py);
-        let colors = self.pictures(py, frame, &views)?;
+        let colors = self.pictures(frame, &views)?;
         let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
-        let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(|error| error.into_py(py))?;
+        let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(Raise::raise)?;
         let likely = PyDict::new(py);
         for ((pixels, picture), (_, data)) in found.into_iter().zip(&colors).zip(&views) {
             let name = &frame.sources[usize::from(data.source)];
@@ -205,10 +199,10 @@ impl PyTracker {
     ) -> PyResult<()> {
         let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
         let views = frame.color_views(py);
-        let colors = self.pictures(py, frame, &views)?;
+        let colors = self.pictures(frame, &views)?;
         let input = Frame::empty(frame.stamp).with_colors(&colors);
         let tracker = &mut self.tracker;
-        py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(|error| error.into_py(py))
+        py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(Raise::raise)
     }
 
     /// The contour lines of the last step in the images of a camera: limb, pixel (2), outward normal (2), offset, sigma, row by
@@ -229,7 +223,7 @@ impl PyTracker {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
+        let distances = py.detach(|| self.tracker.distance(slice)).map_err(Raise::raise)?;
         Ok(PyArray1::from_vec(py, distances))
     }
 
@@ -238,21 +232,20 @@ impl PyTracker {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(|error| error.into_py(py))?;
+        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(Raise::raise)?;
         PyArray2::from_vec2(py, &distances).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    fn scale(&mut self, py: Python<'_>, factor: f64) -> PyResult<()> {
-        self.tracker.scale(factor).map_err(|error| error.into_py(py))
+    fn scale(&mut self, factor: f64) -> PyResult<()> {
+        self.tracker.scale(factor).map_err(Raise::raise)
     }
 
-    fn set_shape(&mut self, py: Python<'_>, limb: &str, shape: &PyShape) -> PyResult<()> {
-        self.tracker.set_shape(limb, shape.0).map_err(|error| error.into_py(py))
+    fn set_shape(&mut self, limb: &str, shape: &PyShape) -> PyResult<()> {
+        self.tracker.set_shape(limb, shape.0).map_err(Raise::raise)
     }
 
     fn _add_limb(
         &mut self,
-        py: Python<'_>,
         name: &str,
         parent: &str,
         shape: &PyShape,
@@ -260,13 +253,13 @@ impl PyTracker {
         sites: Vec<(String, [f64; 3])>,
     ) -> PyResult<()> {
         let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
-        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(|error| error.into_py(py))?;
+        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(Raise::raise)?;
         self.body_changed();
         Ok(())
     }
 
-    fn remove_limb(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.tracker.remove_limb(name).map_err(|error| error.into_py(py))?;
+    fn remove_limb(&mut self, name: &str) -> PyResult<()> {
+        self.tracker.remove_limb(name).map_err(Raise::raise)?;
         self.body_changed();
         Ok(())
     }
