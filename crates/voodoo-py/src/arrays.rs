@@ -1,5 +1,7 @@
 //! Conversion from and to NumPy arrays.
 
+use std::convert::Infallible;
+
 use numpy::ndarray::Dimension;
 use numpy::{
     Element, Ix2, Ix3, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
@@ -96,6 +98,20 @@ impl ColorView<'_> {
             Self::First(view) => ColorPixels::Color(view.as_slice()?.as_chunks().0),
             Self::Second(view) => ColorPixels::Gray(view.as_slice()?),
         })
+    }
+}
+
+/// A vector that becomes an array (3,).
+#[derive(Clone, Copy)]
+pub(crate) struct Row(pub(crate) Vec3);
+
+impl<'py> IntoPyObject<'py> for Row {
+    type Target = PyArray1<f64>;
+    type Output = Bound<'py, PyArray1<f64>>;
+    type Error = Infallible;
+
+    fn into_pyobject(self, py: Python<'py>) -> Result<Self::Output, Infallible> {
+        Ok(PyArray1::from_slice(py, &self.0.to_array()))
     }
 }
 

@@ -14,7 +14,7 @@ use voodoo_detect::crop::SIZE;
 use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
-use crate::arrays::{contiguous, vector};
+use crate::arrays::{Row, contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
 use crate::errors::{MeasurementError, Raise, wrong_argument};
@@ -78,40 +78,29 @@ impl PyDetector {
 }
 
 #[doc = stub!("Detection")]
-#[pyclass(name = "Detection", module = "voodoo", frozen)]
+#[pyclass(name = "Detection", module = "voodoo", frozen, get_all)]
 pub(crate) struct PyDetection {
     #[doc = stub!("Detection.joints")]
-    #[pyo3(get)]
     joints: Py<PyDict>,
     #[doc = stub!("Detection.joint_sigma")]
-    #[pyo3(get)]
     joint_sigma: Py<PyDict>,
     #[doc = stub!("Detection.visible")]
-    #[pyo3(get)]
     visible: Py<PyDict>,
     #[doc = stub!("Detection.lengths")]
-    #[pyo3(get)]
     lengths: Py<PyDict>,
     #[doc = stub!("Detection.length_sigma")]
-    #[pyo3(get)]
     length_sigma: Py<PyDict>,
     #[doc = stub!("Detection.stature")]
-    #[pyo3(get)]
     stature: f64,
     #[doc = stub!("Detection.facing")]
-    #[pyo3(get)]
     facing: f64,
     #[doc = stub!("Detection.confidence")]
-    #[pyo3(get)]
     confidence: f64,
     #[doc = stub!("Detection.source")]
-    #[pyo3(get)]
     source: String,
     #[doc = stub!("Detection.mask")]
-    #[pyo3(get)]
     mask: Py<PyArray2<bool>>,
     #[doc = stub!("Detection.floor")]
-    #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
 }
 
@@ -131,9 +120,8 @@ impl PyDetection {
     fn new(py: Python<'_>, found: &Detection, image: &DepthImage, source: String) -> PyResult<Self> {
         let joints = || JOINTS.iter().zip(found.joints.iter().flatten());
         let lengths = || LENGTHS.iter().zip(&found.lengths);
-        let positions = joints().map(|(name, joint)| (name, PyArray1::from_slice(py, &joint.position.to_array())));
         Ok(Self {
-            joints: positions.into_py_dict(py)?.unbind(),
+            joints: joints().map(|(name, joint)| (name, Row(joint.position))).into_py_dict(py)?.unbind(),
             joint_sigma: joints().map(|(name, joint)| (name, joint.sigma)).into_py_dict(py)?.unbind(),
             visible: joints().map(|(name, joint)| (name, joint.visible)).into_py_dict(py)?.unbind(),
             lengths: lengths().map(|(name, [length, _])| (name, *length)).into_py_dict(py)?.unbind(),
@@ -159,25 +147,19 @@ impl PyDetection {
 }
 
 #[doc = stub!("PersonCandidate")]
-#[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen)]
+#[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen, get_all)]
 pub(crate) struct PyCandidate {
     #[doc = stub!("PersonCandidate.crop")]
-    #[pyo3(get)]
     crop: Py<PyArray3<f32>>,
     #[doc = stub!("PersonCandidate.mask")]
-    #[pyo3(get)]
     mask: Py<PyArray2<bool>>,
     #[doc = stub!("PersonCandidate.middle")]
-    #[pyo3(get)]
     middle: [f64; 3],
     #[doc = stub!("PersonCandidate.roll")]
-    #[pyo3(get)]
     roll: f64,
     #[doc = stub!("PersonCandidate.area")]
-    #[pyo3(get)]
     area: f64,
     #[doc = stub!("PersonCandidate.floor")]
-    #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
 }
 

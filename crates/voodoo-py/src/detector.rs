@@ -12,7 +12,7 @@ use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
 
-use crate::arrays::{contiguous, vector};
+use crate::arrays::{Row, contiguous, vector};
 use crate::errors::{ConfigError, MeasurementError, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
@@ -197,7 +197,7 @@ fn input<'py>(
         DetectionQuery::All => ("all", None),
         DetectionQuery::Any => ("any", None),
         DetectionQuery::New => ("new", None),
-        DetectionQuery::Near(place) => ("near", Some(PyArray1::from_slice(py, &place.to_array()))),
+        DetectionQuery::Near(place) => ("near", Some(Row(place))),
     };
     let fields = PyDict::new(py);
     fields.set_item("depth", PyArray1::from_vec(py, depth).reshape([height, width])?)?;

@@ -6,16 +6,16 @@ use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
-use crate::arrays::{PointArray, rows};
+use crate::arrays::{PointArray, Row, rows};
 use crate::camera::{affine, camera_of};
 use crate::errors::Raise;
 use crate::people::TrackedBody;
-use crate::sites::{PySiteGate, PySiteRay, places_of};
+use crate::sites::{ALONG_SIGMA, PySiteGate, PySiteRay, places_of};
 
 type PixelRow = ((f64, f64), f64);
 /// Site, indices and weights of its keypoints, spread, and distance behind the surface.
 type KeypointRow = (String, Vec<(usize, f64)>, f64, f64);
-type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
+type Observed = (Vec<PySiteRay>, Vec<(String, Row, f64)>, Vec<String>, Vec<String>);
 
 #[doc = stub!("KeypointLayout")]
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
@@ -59,7 +59,6 @@ impl PyKeypointLayout {
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
         &self,
-        py: Python<'py>,
         keypoints: PyReadonlyArray2<'py, f64>,
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
@@ -73,7 +72,7 @@ impl PyKeypointLayout {
         gate: Option<PyRefMut<'py, PySiteGate>>,
         surface: Option<&Bound<'py, PyAny>>,
         before: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Observed<'py>> {
+    ) -> PyResult<Observed> {
         let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
@@ -102,10 +101,18 @@ impl PyKeypointLayout {
             };
             let observation = SiteObservation { pixel: found, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
-                SiteMeasurement::Ray(ray) => rays.push(PySiteRay(ray)),
-                SiteMeasurement::Place(place, sigma) => {
-                    points.push((part.site.clone(), PyArray1::from_slice(py, &place.to_array()), sigma));
-                }
+                SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {
+                    site: part.site.clone(),
+                    origin: Row(eye.origin()),
+                    direction: Row(direction),
+                    sigma,
+                    source: source.to_owned(),
+                    trust: 1.0,
+                    bias: 0.0,
+                    place: None,
+                    place_sigma: ALONG_SIGMA,
+                }),
+                SiteMeasurement::Place(place, sigma) => points.push((part.site.clone(), Row(place), sigma)),
                 SiteMeasurement::Dropped => dropped.push(part.site.clone()),
             }
         }

@@ -6,8 +6,8 @@ use voodoo_core::math::{Points, Pose};
 use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
-use crate::arrays::{PointArray, vector};
-use crate::errors::{MeasurementError, Raise};
+use crate::arrays::{PointArray, Row, vector};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 
 #[doc = stub!("TaperedEllipticCylinder")]
 #[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
@@ -22,8 +22,6 @@ pub(crate) struct PyClosestPoints {
     signed_distance: Py<PyAny>,
     region: Py<PyAny>,
 }
-
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 #[pymethods]
 impl PyShape {
@@ -70,18 +68,13 @@ impl PyShape {
     }
 
     #[doc = stub!("TaperedEllipticCylinder.closest_point")]
-    fn closest_point<'py>(
-        &self,
-        py: Python<'py>,
-        point: &Bound<'py, PyAny>,
-    ) -> PyResult<(Vector<'py>, Vector<'py>, f64)> {
+    fn closest_point(&self, point: &Bound<'_, PyAny>) -> PyResult<(Row, Row, f64)> {
         let query = vector("point", point)?;
         if !query.is_finite() {
-            return Err(crate::errors::wrong_argument("point", "finite meters", point));
+            return Err(wrong_argument("point", "finite meters", point));
         }
         let found = self.0.closest_point(query);
-        let array = |v: [f64; 3]| PyArray1::from_slice(py, &v);
-        Ok((array(found.point.to_array()), array(found.normal.to_array()), found.signed_distance))
+        Ok((Row(found.point), Row(found.normal), found.signed_distance))
     }
 
     #[doc = stub!("TaperedEllipticCylinder.closest_points")]

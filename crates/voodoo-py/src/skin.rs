@@ -10,16 +10,15 @@ use voodoo_sensors::skin::colors::CHROMA_BINS;
 use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
-use crate::arrays::{DepthArray, rows};
+use crate::arrays::{DepthArray, Row, rows};
 use crate::camera::{affine, camera_of};
 use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
-type Row<'py> = Bound<'py, PyArray1<f64>>;
 type CandidatePlace = ((f64, f64), usize, usize);
 /// Index of a site, direction of its ray, its position, and its predicted depth.
-type Ray<'py> = (usize, Row<'py>, Option<Row<'py>>, f64);
+type Ray = (usize, Row, Option<Row>, f64);
 /// Image, meters per unit, camera and pose of a depth camera.
 type DepthArguments<'py> = (Bound<'py, PyAny>, f64, Bound<'py, PyAny>, PyReadonlyArray2<'py, f64>);
 
@@ -107,7 +106,7 @@ impl PySkinCue {
         depth: Option<DepthArguments<'py>>,
         tracker: Option<TrackedBody<'py>>,
         others: Vec<TrackedBody<'py>>,
-    ) -> PyResult<Vec<Ray<'py>>> {
+    ) -> PyResult<Vec<Ray>> {
         let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
@@ -146,8 +145,7 @@ impl PySkinCue {
         self.size = [camera.height(), camera.width()];
         let cue = &mut self.cue;
         let found = py.detach(|| cue.observe(&input)).map_err(Raise::raise)?;
-        let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
-        Ok(found.iter().map(|site| (site.site, row(site.direction), site.place.map(row), site.depth)).collect())
+        Ok(found.iter().map(|site| (site.site, Row(site.direction), site.place.map(Row), site.depth)).collect())
     }
 
     #[doc = stub!("SkinCue.learn")]

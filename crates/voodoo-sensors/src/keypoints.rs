@@ -1,11 +1,9 @@
 //! Converts the 2-D keypoints of a network into measurements of body sites.
 
 use crate::eye::Eye;
-use crate::sites::{SiteGate, SiteRay};
+use crate::sites::SiteGate;
 use voodoo_core::math::Vec3;
 
-/// Standard deviation of a 3-D site position along its ray where none is given, meters.
-const ALONG_SIGMA: f64 = 0.04;
 /// Standard deviation added for each meter of the person's own body before the site, beyond half a limb: the network guesses such
 /// a site.
 /// site.
@@ -81,10 +79,10 @@ pub struct SiteObservation {
 }
 
 /// The measurement that a detected site becomes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SiteMeasurement {
-    /// A ray.
-    Ray(SiteRay),
+    /// The unit direction of a ray in the world frame, and its standard deviation at the site, meters.
+    Ray(Vec3, f64),
     /// A 3-D position in the world frame and its standard deviation, meters.
     Place(Vec3, f64),
     /// Rejected: it is too far from the prediction, or the lens model has no ray for the pixel.
@@ -122,17 +120,8 @@ impl SiteKeypoints {
             return SiteMeasurement::Dropped;
         }
         let hidden = observation.hidden - self.behind;
-        SiteMeasurement::Ray(SiteRay {
-            site: self.site.clone(),
-            origin: eye.origin(),
-            direction,
-            sigma: if hidden > 0.0 { sigma.hypot(GUESSED * hidden) } else { sigma },
-            source: sensor.source.to_owned(),
-            trust: 1.0,
-            bias: 0.0,
-            place: None,
-            place_sigma: ALONG_SIGMA,
-        })
+        let sigma = if hidden > 0.0 { sigma.hypot(GUESSED * hidden) } else { sigma };
+        SiteMeasurement::Ray(direction, sigma)
     }
 }
 
@@ -205,7 +194,7 @@ mod tests {
         let wrist = part(&[(0, 1.0)]);
         let mut gate = SiteGate::new(0.1, 0.0, 0.1);
         let sigma = |measured: SiteMeasurement| match measured {
-            SiteMeasurement::Ray(ray) => ray.sigma,
+            SiteMeasurement::Ray(_, sigma) => sigma,
             _ => f64::NAN,
         };
         let clear = sigma(wrist.measurement(&observation, &sensor, Some(&mut gate)));
@@ -219,7 +208,7 @@ mod tests {
         assert!(place.distance(Vec3::new(0.0, 0.0, 1.98)) < 1e-12 && least == 0.03);
         let before = SiteObservation { surface: Some(1.0), ..observation };
         assert!(
-            matches!(wrist.measurement(&before, &sensor, Some(&mut gate)), SiteMeasurement::Ray(_)),
+            matches!(wrist.measurement(&before, &sensor, Some(&mut gate)), SiteMeasurement::Ray(..)),
             "what hides it is refused"
         );
         let far = SiteObservation { expected: Vec3::new(0.2, 0.0, 2.0), ..observation };
