@@ -1,5 +1,7 @@
 //! Detection of people in depth images.
 
+use std::sync::Arc;
+
 use std::path::PathBuf;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
@@ -169,7 +171,7 @@ pub(crate) struct PyCandidate {
 pub(crate) fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    camera: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
@@ -177,7 +179,6 @@ pub(crate) fn person_candidates<'py>(
     let wrong = || wrong_argument("depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
-    let camera = camera_of(camera)?;
     let [height, width] = [camera.height(), camera.width()];
     if view.as_array().dim() != (height, width) {
         return Err(wrong_argument("depth", &format!("shape ({height}, {width}), as its camera has"), depth));

@@ -180,36 +180,23 @@ fn input<'py>(
     around: &Surroundings,
     query: DetectionQuery,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (width, height, lens) = (image.camera.width(), image.camera.height(), image.camera.lens());
-    let ([fx, fy], [cx, cy]) = (image.camera.focal(), image.camera.center());
+    let [width, height] = [image.camera.width(), image.camera.height()];
+    let ([fx, fy], [cx, cy], lens) = (image.camera.focal(), image.camera.center(), image.camera.lens());
+    let distortion = PyTuple::new(py, lens.coefficients())?;
+    let camera = py.import("voodoo.model.camera")?.getattr("Camera")?;
+    let camera = camera.call1((width, height, fx, fy, cx, cy, distortion, lens.model()))?;
     let mut depth = Vec::new();
     around.open_depth(image, &mut depth);
-    let camera = PyDict::new(py);
-    camera.set_item("width", width)?;
-    camera.set_item("height", height)?;
-    for (name, value) in [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)] {
-        camera.set_item(name, value)?;
-    }
-    camera.set_item("distortion", PyTuple::new(py, lens.coefficients())?)?;
-    camera.set_item("model", lens.model())?;
-    let camera = py.import("voodoo.model.camera")?.getattr("Camera")?.call((), Some(&camera))?;
+    let depth = PyArray1::from_vec(py, depth).reshape([height, width])?;
+    let pose = PyArray1::from_slice(py, matrix(&image.world_from_sensor).as_flattened()).reshape([4, 4])?;
+    let floor = around.ground.map(|Ground { normal, offset }| (normal.to_array(), offset));
     let (query, near) = match query {
         DetectionQuery::All => ("all", None),
         DetectionQuery::Any => ("any", None),
         DetectionQuery::New => ("new", None),
         DetectionQuery::Near(place) => ("near", Some(Row(place))),
     };
-    let fields = PyDict::new(py);
-    fields.set_item("depth", PyArray1::from_vec(py, depth).reshape([height, width])?)?;
-    fields.set_item("camera", camera)?;
-    fields.set_item(
-        "world_from_sensor",
-        PyArray1::from_slice(py, matrix(&image.world_from_sensor).as_flattened()).reshape([4, 4])?,
-    )?;
-    fields.set_item("floor", around.ground.map(|Ground { normal, offset }| (normal.to_array(), offset)))?;
-    fields.set_item("query", query)?;
-    fields.set_item("near", near)?;
-    py.import("voodoo.detectors")?.getattr("DetectorImage")?.call((), Some(&fields))
+    py.import("voodoo.detectors")?.getattr("DetectorImage")?.call1((depth, camera, pose, floor, query, near))
 }
 
 /// An attribute that is a mapping by names; empty where it is missing or None.

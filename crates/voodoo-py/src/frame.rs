@@ -1,8 +1,11 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
+use std::sync::Arc;
+
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use voodoo_core::Camera;
 use voodoo_core::math::Aabb;
 use voodoo_core::{Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
@@ -84,13 +87,12 @@ impl PyFrame {
     fn add_depth(
         &mut self,
         image: &Bound<'_, PyAny>,
-        camera: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         #[pyo3(from_py_with = arguments::meters_per_unit)] meters_per_unit: f64,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let camera = camera_of(camera)?;
         let [height, width] = [camera.height(), camera.width()];
         let wrong = || wrong_array("image", "shape (height, width) and dtype uint16 or float32", image);
         let array = image.cast::<PyUntypedArray>().map_err(|_| wrong())?;
@@ -120,12 +122,11 @@ impl PyFrame {
     fn add_color(
         &mut self,
         image: &Bound<'_, PyAny>,
-        camera: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
         stamp: Option<&Bound<'_, PyAny>>,
         source: &str,
     ) -> PyResult<()> {
-        let camera = camera_of(camera)?;
         let [height, width] = [camera.height(), camera.width()];
         let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
         unmasked("image", image, "fill it: image.filled(0)")?;

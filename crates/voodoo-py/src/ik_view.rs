@@ -1,5 +1,7 @@
 //! `View` of inverse kinematics: one silhouette with its camera.
 
+use std::sync::Arc;
+
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
@@ -21,7 +23,7 @@ impl PyView {
         thickness: PyReadonlyArray2<'_, f32>,
         depth: Option<PyReadonlyArray2<'_, f32>>,
         border: f64,
-        camera: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let [height, width] = [distance.shape()[0], distance.shape()[1]];
@@ -29,7 +31,6 @@ impl PyView {
             let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
             return Err(MeasurementError::new_err(message));
         }
-        let camera = camera_of(camera)?;
         if [camera.height(), camera.width()] != [height, width] || camera.distorts() {
             let message = format!("camera: expected a pinhole camera of {width} x {height} pixels, found {camera:?}");
             return Err(MeasurementError::new_err(message));

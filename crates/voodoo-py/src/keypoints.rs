@@ -1,7 +1,10 @@
 //! 2-D keypoints, and points that are extrapolated with the limbs.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
+use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
@@ -43,10 +46,9 @@ impl PyKeypointLayout {
         people: Vec<PyReadonlyArray2<'py, f64>>,
         predicted: &Bound<'py, PyAny>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         least: f64,
     ) -> PyResult<Option<usize>> {
-        let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
         let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place))).collect();
@@ -64,7 +66,7 @@ impl PyKeypointLayout {
         stamp: f64,
         source: &str,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         noise: f64,
         place_sigma: f64,
         least: f64,
@@ -73,7 +75,6 @@ impl PyKeypointLayout {
         surface: Option<&Bound<'py, PyAny>>,
         before: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Observed> {
-        let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
         let found: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();

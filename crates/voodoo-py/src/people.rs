@@ -70,7 +70,7 @@ impl PyPeople {
         if let Some(found) = self::detector(detector)? {
             people = people.with_detector(found);
         }
-        let names = Arc::new(Names::from_body(people.prototype()));
+        let names = Arc::new(Names::from_body(values.py(), people.prototype())?);
         Ok(Self { people, names, detector_failures: 0 })
     }
 

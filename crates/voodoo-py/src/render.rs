@@ -1,7 +1,10 @@
 //! Renders depth images of a posed body.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::Camera;
 use voodoo_core::{Rendering, Viewpoint};
 
 use crate::arrays::{limb_poses, pose};
@@ -18,12 +21,11 @@ pub(crate) fn render_depth<'py>(
     py: Python<'py>,
     body: &PyBody,
     world_from_limb: Vec<Bound<'py, PyAny>>,
-    camera: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     world_from_sensor: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Images<'py>> {
     let poses = limb_poses(&body.0, &world_from_limb)?;
     let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
-    let camera = camera_of(camera)?;
     let view = Viewpoint { camera: &camera, world_from_sensor };
     let mut image = Rendering::default();
     py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(Raise::raise)?;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::skin::colors::CHROMA_BINS;
@@ -102,12 +103,11 @@ impl PySkinCue {
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         depth: Option<DepthArguments<'py>>,
         tracker: Option<TrackedBody<'py>>,
         others: Vec<TrackedBody<'py>>,
     ) -> PyResult<Vec<Ray>> {
-        let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
         for (site, names) in self.names.iter().enumerate() {
@@ -157,9 +157,8 @@ impl PySkinCue {
         joints: PyReadonlyArray2<'py, f64>,
         sites: PyReadonlyArray2<'py, f64>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     ) -> PyResult<()> {
-        let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (image, joints) = (colors_of(&image)?, vectors("joints", &joints)?);
         let sites = vectors("sites", &sites)?;

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use voodoo_core::math::Vec3;
@@ -71,8 +70,9 @@ impl PyTracker {
         Ok(colors)
     }
 
-    fn body_changed(&mut self) {
-        self.names = Arc::new(Names::from_body(self.tracker.body()));
+    fn body_changed(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.names = Arc::new(Names::from_body(py, self.tracker.body())?);
+        Ok(())
     }
 }
 
@@ -84,7 +84,7 @@ impl PyTracker {
         if let Some(found) = self::detector(detector)? {
             tracker = tracker.with_detector(found);
         }
-        let names = Arc::new(Names::from_body(tracker.body()));
+        let names = Arc::new(Names::from_body(values.py(), tracker.body())?);
         Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new(), detector_failures: 0 })
     }
 
@@ -105,7 +105,7 @@ impl PyTracker {
     fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
         let positions = site_positions(self.tracker.body(), joints)?;
         self.tracker.reset(&positions, fit_sizes).map_err(Raise::raise)?;
-        self.body_changed();
+        self.body_changed(joints.py())?;
         self.sources.clear();
         Ok(self.estimate())
     }
@@ -215,7 +215,7 @@ impl PyTracker {
             vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
         };
         let rows: Vec<Vec<f32>> = lines.map(row).collect();
-        PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
+        Ok(PyArray2::from_vec2(py, &rows)?)
     }
 
     /// Signed distance of world points `(N, 3)` to the posed body, meters, negative inside.
@@ -233,7 +233,7 @@ impl PyTracker {
         let view = array.view(py);
         let slice = view.points()?;
         let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(Raise::raise)?;
-        PyArray2::from_vec2(py, &distances).map_err(|error| PyValueError::new_err(error.to_string()))
+        Ok(PyArray2::from_vec2(py, &distances)?)
     }
 
     fn scale(&mut self, factor: f64) -> PyResult<()> {
@@ -246,6 +246,7 @@ impl PyTracker {
 
     fn _add_limb(
         &mut self,
+        py: Python<'_>,
         name: &str,
         parent: &str,
         shape: &PyShape,
@@ -254,21 +255,19 @@ impl PyTracker {
     ) -> PyResult<()> {
         let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
         self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(Raise::raise)?;
-        self.body_changed();
-        Ok(())
+        self.body_changed(py)
     }
 
-    fn remove_limb(&mut self, name: &str) -> PyResult<()> {
+    fn remove_limb(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
         self.tracker.remove_limb(name).map_err(Raise::raise)?;
-        self.body_changed();
-        Ok(())
+        self.body_changed(py)
     }
 
     fn __repr__(&self) -> String {
         format!(
             "Tracker(body={:?}, limbs={}, last={})",
             self.tracker.body().name(),
-            self.names.limbs.len(),
+            self.tracker.body().limbs().len(),
             self.estimate().__repr__()
         )
     }
