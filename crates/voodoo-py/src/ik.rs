@@ -85,7 +85,7 @@ impl PyChain {
                 return Err(BodyError::new_err(message));
             }
             let carrier = Carrier::World(pose("others", Some(world_from_limb))?);
-            found.push(Trunk::new(&self.body.limbs()[limb].shape, carrier));
+            found.push(Trunk { carrier, shape: self.body.limbs()[limb].shape });
         }
         Ok(found)
     }
