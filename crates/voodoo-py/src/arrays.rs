@@ -55,13 +55,14 @@ impl<T: Element, D: Dimension, U: Element, E: Dimension> EitherArray<T, D, U, E>
 impl PointArray {
     /// Takes an `(N, 3)` array of float32 or float64 without a mask.
     pub(crate) fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let wrong = || wrong_array(name, "shape (N, 3) and dtype float32 or float64", value);
-        let array = value.cast::<PyUntypedArray>().map_err(|_| wrong())?;
+        let expected = "an array of shape (N, 3) and dtype float32 or float64";
+        let wrong = |found: &Bound<'_, PyAny>| wrong_argument(name, expected, found);
+        let array = value.cast::<PyUntypedArray>().map_err(|_| wrong(&value.get_type()))?;
         if array.ndim() != 2 || array.shape()[1] != 3 {
-            return Err(wrong());
+            return Err(wrong(value));
         }
         unmasked(name, value, "leave the masked rows out: points.data[~numpy.ma.getmaskarray(points).any(axis=1)]")?;
-        Self::cast(value).ok_or_else(wrong)
+        Self::cast(value).ok_or_else(|| wrong(value))
     }
 }
 
@@ -115,14 +116,7 @@ impl<'py> IntoPyObject<'py> for Row {
     }
 }
 
-/// The error for what is no array of the expected kind.
-pub(crate) fn wrong_array(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
-    let found = match value.cast::<PyUntypedArray>() {
-        Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
-        Err(_) => value.get_type().to_string(),
-    };
-    MeasurementError::new_err(format!("{name}: expected an array of {expected}, found {found}"))
-}
+pub(crate) type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// Rejects NumPy's masked arrays: masked entries are ordinary numbers and would count as measured.
 pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
@@ -201,13 +195,18 @@ pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<V
 }
 
 /// The 4x4 matrices of poses, read-only.
-pub(crate) fn matrices<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+pub(crate) fn matrices<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Array<'py>> {
     frozen(py, poses.iter().flat_map(matrix).flatten().collect(), &[poses.len(), 4, 4])
 }
 
+/// An array of a given shape.
+pub(crate) fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
+    PyArray1::from_vec(py, values).reshape(shape)
+}
+
 /// A read-only array of a given shape.
-pub(crate) fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let array = PyArray1::from_vec(py, values).reshape(shape)?;
+pub(crate) fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
+    let array = array(py, values, shape)?;
     array.try_readwrite()?.make_nonwriteable();
     Ok(array)
 }

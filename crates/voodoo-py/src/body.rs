@@ -1,12 +1,11 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
-use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{HumanModel, Joint, Limb, Site};
 
-use crate::arrays::frozen;
+use crate::arrays::{Array, frozen};
 use crate::errors::{BodyError, Raise};
 use crate::shape::PyShape;
 
@@ -19,7 +18,6 @@ pub(crate) enum Rotation {
     Quaternion([f64; 4]),
 }
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 /// Position and rotation of a joint's ellipse.
 type JointFrame = ([f64; 3], Rotation);
 /// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion

@@ -75,15 +75,18 @@ pub(crate) struct Borrowed<'py, 'a> {
 }
 
 impl<'py, 'a> Borrowed<'py, 'a> {
-    /// Borrows the arrays of a frame and looks the names up in `body`.
-    pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body) -> PyResult<Self> {
+    /// Borrows the arrays of a frame and looks the names up in `body`. The frame's sources are numbered from `first`.
+    pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body, first: usize) -> PyResult<Self> {
+        let first = first as u16;
         let index = |name: &str| body.site_index(name).map_err(Raise::raise);
         let cloud = |(points, cloud, limb): &'a CloudData| {
             let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(Raise::raise)?;
-            Ok((points.view(py), Cloud { scope: limb.map_or(cloud.scope, Scope::Limb), ..*cloud }))
+            let (scope, source) = (limb.map_or(cloud.scope, Scope::Limb), cloud.source + first);
+            Ok((points.view(py), Cloud { scope, source, ..*cloud }))
         };
-        let position = |(name, of): &PositionData| Ok(PositionRelation { site: index(name)?, ..*of });
-        let ray = |(name, of): &RayData| Ok(RayRelation { site: index(name)?, ..*of });
+        let position =
+            |(name, of): &PositionData| Ok(PositionRelation { site: index(name)?, source: of.source + first, ..*of });
+        let ray = |(name, of): &RayData| Ok(RayRelation { site: index(name)?, source: of.source + first, ..*of });
         let person = |(positions, person): &(Vec<PositionData>, f64)| {
             Ok((positions.iter().map(position).collect::<PyResult<_>>()?, *person))
         };
@@ -136,16 +139,11 @@ pub(crate) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// `first` is the index of the first source of the person's own measurements.
-    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed, first: u16) -> PyResult<Self> {
-        let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
-        let positions =
-            own.positions.iter().map(|relation| PositionRelation { source: relation.source + first, ..*relation });
-        let rays = own.rays.iter().map(|relation| RayRelation { source: relation.source + first, ..*relation });
+    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed) -> PyResult<Self> {
         Ok(Self {
-            clouds: all.clouds.iter().copied().chain(clouds).collect(),
-            positions: all.positions.iter().copied().chain(positions).collect(),
-            rays: all.rays.iter().copied().chain(rays).collect(),
+            clouds: all.clouds.iter().copied().chain(own.clouds()?).collect(),
+            positions: [all.positions, &own.positions].concat(),
+            rays: [all.rays, &own.rays].concat(),
         })
     }
 

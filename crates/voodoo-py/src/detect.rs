@@ -31,16 +31,11 @@ impl PyDetector {
     #[new]
     #[pyo3(signature = (*, weights=None))]
     fn new(weights: Option<PathBuf>) -> PyResult<Self> {
-        let refused = |message: String| MeasurementError::new_err(message);
-        let detector = match weights {
-            None => Ok(Detector::new()),
-            Some(path) => std::fs::read(&path)
-                .map_err(|error| format!("{}: expected a readable file, found {error}", path.display()))
-                .and_then(|bytes| {
-                    Detector::with_weights(&bytes).map_err(|error| format!("{}: {error}", path.display()))
-                }),
-        };
-        detector.map(Self).map_err(refused)
+        let Some(path) = weights else { return Ok(Self(Detector::new())) };
+        let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
+        let bytes =
+            std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
+        Detector::with_weights(&bytes).map(Self).map_err(|error| refused(error.to_string()))
     }
 
     #[doc = stub!("Detector.detect")]

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
@@ -44,11 +45,16 @@ impl Raise for voodoo_core::TrackError {
     }
 }
 
-/// What was expected of an argument and what it is.
+/// What was expected of an argument and what it is: of an array its shape and type.
+pub(crate) fn wrong(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> String {
+    let found = match found.cast::<PyUntypedArray>() {
+        Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
+        Err(_) => found.repr().map_or_else(|_| "something without a repr".into(), |text| text.to_string()),
+    };
+    let more = if found.chars().count() > 120 { "..." } else { "" };
+    format!("{name}: expected {expected}, found {found:.120}{more}")
+}
+
 pub(crate) fn wrong_argument(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
-    let mut found = found.repr().map_or_else(|_| "something without a repr".into(), |text| text.to_string());
-    if found.chars().count() > 120 {
-        found = found.chars().take(120).chain("...".chars()).collect();
-    }
-    MeasurementError::new_err(format!("{name}: expected {expected}, found {found}"))
+    MeasurementError::new_err(wrong(name, expected, found))
 }

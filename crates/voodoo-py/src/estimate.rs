@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyMappingProxy, PyTuple};
 use pythonize::{depythonize, pythonize};
@@ -10,7 +9,7 @@ use voodoo_core::Estimate;
 use voodoo_core::math::{Mat3, Vec3};
 use voodoo_core::{Body, Limb};
 
-use crate::arrays::{frozen, matrices};
+use crate::arrays::{Array, frozen, matrices};
 use crate::errors::MeasurementError;
 
 /// The names for the numbers of an estimate, as Python objects that every frame reads; shared by all estimates of one body.
@@ -39,8 +38,6 @@ pub struct PyEstimate {
     pub names: Arc<Names>,
     pub sources: Vec<String>,
 }
-
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// Values by name; none of what has no name.
 fn mapping<'py, T: IntoPyObject<'py>>(

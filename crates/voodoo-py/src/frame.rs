@@ -10,7 +10,7 @@ use voodoo_core::math::Aabb;
 use voodoo_core::{Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
 use crate::arguments;
-use crate::arrays::{ColorArray, DepthArray, PointArray, Row, pose, unmasked, vector, wrong_array};
+use crate::arrays::{ColorArray, DepthArray, PointArray, Row, pose, unmasked, vector};
 use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, PositionData, RayData, number};
 use crate::camera::camera_of;
 use crate::errors::{MeasurementError, wrong_argument};
@@ -94,10 +94,11 @@ impl PyFrame {
         source: &str,
     ) -> PyResult<()> {
         let [height, width] = [camera.height(), camera.width()];
-        let wrong = || wrong_array("image", "shape (height, width) and dtype uint16 or float32", image);
-        let array = image.cast::<PyUntypedArray>().map_err(|_| wrong())?;
+        let expected = "an array of shape (height, width) and dtype uint16 or float32";
+        let wrong = |found: &Bound<'_, PyAny>| wrong_argument("image", expected, found);
+        let array = image.cast::<PyUntypedArray>().map_err(|_| wrong(&image.get_type()))?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
-        let pixels = DepthArray::cast(image).ok_or_else(wrong)?;
+        let pixels = DepthArray::cast(image).ok_or_else(|| wrong(image))?;
         if array.shape() != [height, width] {
             let text = format!(
                 "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",

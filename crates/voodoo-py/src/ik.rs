@@ -1,6 +1,6 @@
 //! `Chain` of inverse kinematics; `voodoo.ik` validates and names inputs and outputs.
 
-use numpy::{PyArrayDyn, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
@@ -10,12 +10,11 @@ use voodoo_ik::{
     SolverOptions, Trunk,
 };
 
-use crate::arrays::{frozen, limb_poses, matrices, pose};
+use crate::arrays::{Array, frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
 use crate::errors::{BodyError, MeasurementError, Raise};
 use crate::ik_view::PyView;
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 /// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, each `(N,)`; and
 /// of the last posture, poses `(P, 4, 4)` and the residual of every goal.
 type Solved<'py> = (Array<'py>, Array<'py>, Vec<Array<'py>>, Array<'py>, Bound<'py, PyTuple>);

@@ -77,14 +77,10 @@ impl PyKeypointLayout {
     ) -> PyResult<Observed> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
-        let found: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
-        let pixels: Vec<[f64; 2]> =
-            found.iter().map(|found| found.map_or([f64::NAN; 2], |found| found.pixel)).collect();
-        let flat = pixels.iter().map(|pixel| eye.undistorted(*pixel));
         let (places, mut gate) = (self.places(predicted)?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for ((part, found), (flat, place)) in self.0.iter().zip(found).zip(flat.zip(places)) {
-            let Some(found) = found else {
+        for (part, place) in self.0.iter().zip(places) {
+            let Some(found) = part.pixel(keypoints, least) else {
                 unseen.push(part.site.clone());
                 continue;
             };
@@ -100,6 +96,7 @@ impl PyKeypointLayout {
                 Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
                 None => None,
             };
+            let flat = eye.undistorted(found.pixel);
             let observation = SiteObservation { pixel: found, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
                 SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {

@@ -39,14 +39,17 @@ impl TrackedBody<'_> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
             Self::Person(people, id) => {
-                let found = people.people.present().find(|(there, _)| there == id);
-                let missing = || {
-                    let text = format!("person: expected one of those who are there, found {id}");
-                    BodyError::new_err(text)
-                };
-                found.map(|(_, tracker)| tracker).ok_or_else(missing)
+                let missing = || format!("person: expected one of those who are there, found {id}");
+                people.person(*id).ok_or_else(|| BodyError::new_err(missing()))
             }
         }
+    }
+}
+
+impl PyPeople {
+    /// The tracker of a present person.
+    fn person(&self, id: usize) -> Option<&BodyTracker> {
+        self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| tracker)
     }
 }
 
@@ -83,7 +86,7 @@ impl PyPeople {
         own: Vec<(usize, PyRef<'_, PyFrame>)>,
     ) -> PyResult<Vec<(usize, PyEstimate)>> {
         let body = self.people.prototype();
-        let all = Borrowed::new(py, frame, body)?;
+        let all = Borrowed::new(py, frame, body, 0)?;
         let (clouds, images) = (all.clouds()?, all.images()?);
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
@@ -91,11 +94,9 @@ impl PyPeople {
         let detections = all.detections();
         let input = all.frame(frame, &clouds, &images, &colors, &detections);
         // A person's own measurements follow the common ones; their sources are numbered consecutively.
-        let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body)).collect::<PyResult<Vec<_>>>()?;
-        let parts = owned
-            .iter()
-            .map(|own| Parts::new(&input, own, frame.sources.len() as u16))
-            .collect::<PyResult<Vec<_>>>()?;
+        let first = frame.sources.len();
+        let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body, first)).collect::<PyResult<Vec<_>>>()?;
+        let parts = owned.iter().map(|own| Parts::new(&input, own)).collect::<PyResult<Vec<_>>>()?;
         let frames: Vec<(usize, Frame)> =
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
@@ -145,12 +146,12 @@ impl PyPeople {
 
     /// The last estimate of a present person.
     fn estimate(&self, id: usize) -> Option<PyEstimate> {
-        let (_, tracker) = self.people.present().find(|(there, _)| *there == id)?;
-        Some(PyEstimate { estimate: tracker.estimate().clone(), names: self.names.clone(), sources: Vec::new() })
+        let estimate = self.person(id)?.estimate().clone();
+        Some(PyEstimate { estimate, names: self.names.clone(), sources: Vec::new() })
     }
 
     /// The body of a present person, in their sizes.
     fn body(&self, id: usize) -> Option<PyBody> {
-        self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| PyBody(tracker.body().clone()))
+        self.person(id).map(|tracker| PyBody(tracker.body().clone()))
     }
 }

@@ -1,12 +1,11 @@
 //! Rotations of many frames and limbs at once.
 
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{self, Mat3};
 
+use crate::arrays::{Array, array};
 use crate::errors::MeasurementError;
-
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// The leading axes of an array that ends with the given ones.
 fn leading<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, last: &[usize]) -> PyResult<&'a [usize]> {
@@ -29,7 +28,7 @@ pub(crate) fn quaternions<'py>(
         found.extend(math::quaternion(&matrix));
         skewed |= math::is_skewed(&matrix);
     }
-    Ok((PyArray1::from_vec(py, found).reshape(shape)?, skewed))
+    Ok((array(py, found, &shape)?, skewed))
 }
 
 /// Whether Euler angles can be about these axes.
@@ -50,5 +49,5 @@ pub(crate) fn euler_angles<'py>(
     }
     let rows = quaternions.as_slice()?.as_chunks::<4>().0;
     let found = rows.iter().flat_map(|row| math::euler_angles(row, order)).collect();
-    PyArray1::from_vec(py, found).reshape(shape)
+    array(py, found, &shape)
 }

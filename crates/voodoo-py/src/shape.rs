@@ -1,6 +1,6 @@
 //! `TaperedEllipticCylinder`.
 
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Points, Pose};
 use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
@@ -17,10 +17,10 @@ pub struct PyShape(pub TaperedEllipticCylinder);
 #[doc = stub!("ClosestPoints")]
 #[pyclass(name = "ClosestPoints", module = "voodoo", frozen, get_all)]
 pub(crate) struct PyClosestPoints {
-    points: Py<PyAny>,
-    normals: Py<PyAny>,
-    signed_distance: Py<PyAny>,
-    region: Py<PyAny>,
+    points: Py<PyArray2<f32>>,
+    normals: Py<PyArray2<f32>>,
+    signed_distance: Py<PyArray1<f32>>,
+    region: Py<PyArray1<u8>>,
 }
 
 #[pymethods]
@@ -94,18 +94,15 @@ impl PyShape {
             self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
             batch
         });
-        let interleave = |points: &Points| -> PyResult<Py<PyAny>> {
-            let mut values = Vec::with_capacity(3 * points.len());
-            for ((x, y), z) in points.x.iter().zip(&points.y).zip(&points.z) {
-                values.extend([*x, *y, *z]);
-            }
-            Ok(PyArray1::from_vec(py, values).reshape([points.len(), 3])?.into_any().unbind())
+        let interleave = |Points { x, y, z }: &Points| {
+            let values = x.iter().zip(y).zip(z).flat_map(|((x, y), z)| [*x, *y, *z]).collect();
+            PyArray1::from_vec(py, values).reshape([x.len(), 3]).map(Bound::unbind)
         };
         Ok(PyClosestPoints {
             points: interleave(&batch.points)?,
             normals: interleave(&batch.normals)?,
-            signed_distance: PyArray1::from_vec(py, batch.signed_distance).into_any().unbind(),
-            region: PyArray1::from_vec(py, batch.region).into_any().unbind(),
+            signed_distance: PyArray1::from_vec(py, batch.signed_distance).unbind(),
+            region: PyArray1::from_vec(py, batch.region).unbind(),
         })
     }
 

@@ -1,16 +1,16 @@
 //! Poses of many frames, or of persons of one instant, as files and live outputs need them.
 
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::f64::consts::PI;
 use voodoo_core::math::{self, Mat3, Vec3};
 use voodoo_core::{Body, Limb};
 
+use crate::arrays::{Array, array};
 use crate::body::{PyBody, at_rest};
 use crate::errors::MeasurementError;
 use crate::rotations::are_axes;
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A table of numbers, which is read faster than tuples.
 type Plan<'py> = PyReadonlyArray2<'py, i64>;
@@ -45,10 +45,6 @@ fn wrong(name: &str, expected: &str) -> PyErr {
 
 fn unplanned() -> PyErr {
     wrong("plan", "numbers of limbs, joints and frames that are there, and axes that differ")
-}
-
-fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
-    PyArray1::from_vec(py, values).reshape(shape)
 }
 
 fn rotation(rows: &[f64; 9]) -> Mat3 {

@@ -118,25 +118,22 @@ impl PySkinCue {
         let names: Vec<String> =
             predicted.call_method0("keys")?.try_iter()?.map(|name| name?.extract()).collect::<PyResult<_>>()?;
         let joints: Vec<Vec3> = places_of(predicted, names.iter().map(String::as_str))?.into_iter().flatten().collect();
-        let depth_camera = depth.as_ref().map(|(_, _, camera, _)| camera_of(camera)).transpose()?;
-        let mut view = None;
-        if let Some((image, ..)) = &depth {
+        let depth = depth.map(|(image, per_unit, camera, pose)| {
             let expected = "an array of shape (height, width) and dtype uint16 or float32";
-            let array = DepthArray::cast(image).ok_or_else(|| wrong_argument("depth", expected, image))?;
-            view = Some(array.view(py));
-        }
-        let mut beside = None;
-        if let (Some((_, per_unit, _, pose)), Some(camera), Some(view)) = (&depth, &depth_camera, &view) {
-            let depth = Eye { world_from_sensor: affine("world_from_depth", pose)?, camera };
-            let found = DepthBeside::new(view.pixels()?, *per_unit, depth, eye);
-            beside = Some(found.map_err(Raise::raise)?);
-        }
+            let array = DepthArray::cast(&image).ok_or_else(|| wrong_argument("depth", expected, &image))?;
+            Ok::<_, PyErr>((array.view(py), per_unit, camera_of(&camera)?, affine("world_from_depth", &pose)?))
+        });
+        let depth = depth.transpose()?;
+        let beside = depth.as_ref().map(|(view, per_unit, camera, pose)| {
+            let depth = Eye { world_from_sensor: *pose, camera };
+            DepthBeside::new(view.pixels()?, *per_unit, depth, eye).map_err(Raise::raise)
+        });
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
             image: colors_of(&image)?,
             stamp,
             eye,
-            depth: beside,
+            depth: beside.transpose()?,
             joints: &joints,
             expected: &expected,
             tracker: tracker.as_ref().map(TrackedBody::tracker).transpose()?,

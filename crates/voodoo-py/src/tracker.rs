@@ -5,13 +5,13 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::math::Vec3;
-use voodoo_core::{Body, Frame, Tracker};
+use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::{Body, Frame, TrackError, Tracker};
 use voodoo_core::{ColorImage, RegionLine};
 
 use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{Borrowed, ColorViews, color_image, number};
+use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{MeasurementError, Raise, wrong_argument};
@@ -68,6 +68,22 @@ impl PyTracker {
             colors.push(color_image(view, number(&mut self.cameras, name))?);
         }
         Ok(colors)
+    }
+
+    /// What the tracker makes of a frame's color images at given poses; releases the GIL.
+    fn ask<T: Send>(
+        &mut self,
+        py: Python<'_>,
+        frame: &PyFrame,
+        poses: Option<Vec<Bound<'_, PyAny>>>,
+        question: impl FnOnce(&mut Tracker, &Frame, Option<&[Pose]>) -> Result<T, TrackError> + Send,
+    ) -> PyResult<T> {
+        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
+        let views = frame.color_views(py);
+        let colors = self.pictures(frame, &views)?;
+        let input = Frame::empty(frame.stamp).with_colors(&colors);
+        let tracker = &mut self.tracker;
+        py.detach(|| question(tracker, &input, poses.as_deref())).map_err(Raise::raise)
     }
 
     fn body_changed(&mut self, py: Python<'_>) -> PyResult<()> {
@@ -136,7 +152,7 @@ impl PyTracker {
 
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
-        let borrowed = Borrowed::new(py, frame, self.tracker.body())?;
+        let borrowed = Borrowed::new(py, frame, self.tracker.body(), 0)?;
         let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
         let views = frame.color_views(py);
         let colors = self.pictures(frame, &views)?;
@@ -172,19 +188,11 @@ impl PyTracker {
         frame: &PyFrame,
         poses: Option<Vec<Bound<'py, PyAny>>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let views = frame.color_views(py);
-        let colors = self.pictures(frame, &views)?;
-        let input = Frame::empty(frame.stamp).with_colors(&colors);
-        let tracker = &mut self.tracker;
-        let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(Raise::raise)?;
+        let found = self.ask(py, frame, poses, |tracker, input, poses| tracker.segment(input, poses))?;
         let likely = PyDict::new(py);
-        for ((pixels, picture), (_, data)) in found.into_iter().zip(&colors).zip(&views) {
-            let name = &frame.sources[usize::from(data.source)];
-            likely.set_item(
-                name,
-                PyArray1::from_vec(py, pixels).reshape([picture.camera.height(), picture.camera.width()])?,
-            )?;
+        for (pixels, ColorData { camera, source, .. }) in found.into_iter().zip(&frame.colors) {
+            let pixels = PyArray1::from_vec(py, pixels).reshape([camera.height(), camera.width()])?;
+            likely.set_item(&frame.sources[usize::from(*source)], pixels)?;
         }
         Ok(likely)
     }
@@ -197,12 +205,7 @@ impl PyTracker {
         frame: &PyFrame,
         poses: Option<Vec<Bound<'py, PyAny>>>,
     ) -> PyResult<()> {
-        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let views = frame.color_views(py);
-        let colors = self.pictures(frame, &views)?;
-        let input = Frame::empty(frame.stamp).with_colors(&colors);
-        let tracker = &mut self.tracker;
-        py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(Raise::raise)
+        self.ask(py, frame, poses, |tracker, input, poses| tracker.learn_colors(input, poses))
     }
 
     /// The contour lines of the last step in the images of a camera: limb, pixel (2), outward normal (2), offset, sigma, row by
