@@ -59,7 +59,7 @@ impl Segmentation {
         into.clear();
         let of = |label: &u32| *label != NONE && candidate.labels.binary_search(label).is_ok();
         for (index, _) in self.parts.labels.iter().enumerate().filter(|(_, label)| of(label)) {
-            self.view.block(self.view.in_image(index), into);
+            self.view.block(index, into);
         }
     }
 }

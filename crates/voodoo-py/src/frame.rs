@@ -18,6 +18,7 @@ use crate::sites::PySiteRay;
 
 #[doc = stub!("Frame")]
 #[pyclass(name = "Frame", module = "voodoo")]
+#[derive(Default)]
 pub struct PyFrame {
     #[doc = stub!("Frame.stamp")]
     #[pyo3(get)]
@@ -55,8 +56,7 @@ impl PyFrame {
     #[new]
     #[pyo3(signature = (stamp))]
     fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
-        let (clouds, images, colors, positions, rays, detections, excluded, sources) = Default::default();
-        Self { stamp, clouds, images, colors, positions, rays, detections, ground: None, excluded, sources }
+        Self { stamp, ..Self::default() }
     }
 
     #[doc = stub!("Frame.add_points")]

@@ -1,8 +1,8 @@
-//! 2-D keypoints, and points that are extrapolated with the limbs.
+//! 2-D keypoints, depth registered to their images, and points that are extrapolated with the limbs.
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
@@ -150,4 +150,18 @@ pub(crate) fn carried<'py>(
     let array =
         |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);
     moved.map(array).transpose()
+}
+
+#[doc = stub!("nearest_surface")]
+#[pyfunction]
+#[pyo3(signature = (pixels, depths, *, pixel, radius))]
+pub(crate) fn nearest_surface(
+    pixels: PyReadonlyArray2<'_, f64>,
+    depths: PyReadonlyArray1<'_, f64>,
+    pixel: [f64; 2],
+    radius: f64,
+) -> PyResult<Option<f64>> {
+    let found =
+        voodoo_sensors::registration::nearest_surface(rows("pixels", &pixels)?, depths.as_slice()?, pixel, radius);
+    found.map_err(Raise::raise)
 }

@@ -14,7 +14,6 @@ mod body;
 mod borrowed;
 mod camera;
 mod config;
-#[cfg(feature = "detect")]
 mod detect;
 mod detector;
 mod errors;
@@ -24,9 +23,6 @@ mod ik;
 mod ik_view;
 mod keypoints;
 mod people;
-mod registration;
-mod render;
-mod rotations;
 mod shape;
 mod sites;
 mod skeleton;
@@ -38,26 +34,21 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _core {
-    #[cfg(feature = "detect")]
-    #[pymodule_export]
-    use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
     #[pymodule_export]
     use super::{
         body::PyBody,
-        camera::PyCamera,
+        camera::{PyCamera, render_depth},
         config::config_fields,
+        detect::{PyCandidate, PyDetection, PyDetector, person_candidates},
         estimate::{_estimate, _nobody, PyEstimate},
         frame::PyFrame,
         ik::PyChain,
         ik_view::PyView,
-        keypoints::{PyKeypointLayout, carried, linear_sum_assignment},
+        keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
         people::PyPeople,
-        registration::nearest_surface,
-        render::render_depth,
-        rotations::{euler_angles, quaternions},
         shape::{PyClosestPoints, PyShape},
         sites::{PySiteGate, PySiteRay, expected_sites},
-        skeleton::{cylinders, joint_angles, moved_covariances, placed, skeleton},
+        skeleton::{cylinders, euler_angles, joint_angles, moved_covariances, placed, quaternions, skeleton},
         skin::PySkinCue,
         template::{Template, with_numbers},
         tracker::{PyTracker, body_before},
