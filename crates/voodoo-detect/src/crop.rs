@@ -1,6 +1,6 @@
 //! The network's input for a candidate: 96 x 96 pixels around its center, rotated so that up in the world is up in the image.
 
-use crate::components::{Components, NONE, PersonCandidate};
+use crate::components::{Components, PersonCandidate};
 use crate::view::ThinnedImage;
 use voodoo_core::math::Vec3;
 
@@ -33,8 +33,7 @@ impl Crop {
         let roll = roll(up);
         let (sin, cos) = roll.sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
-        let member =
-            |index: usize| parts.labels[index] != NONE && candidate.labels.binary_search(&parts.labels[index]).is_ok();
+        let member = |index: usize| candidate.has(&parts.labels[index]);
         let (mut xs, mut ys, mut zs) = (Vec::new(), Vec::new(), Vec::new());
         for index in (0..view.depth.len()).filter(|index| member(*index)) {
             let [x, y] = view.slopes[index];

@@ -114,17 +114,12 @@ impl PyBody {
 
     #[staticmethod]
     fn human(stature: f64, model: &str) -> PyResult<Self> {
-        let model = match model {
-            "measured" => HumanModel::Measured,
-            "papers" => HumanModel::Papers,
-            "full" => HumanModel::Full,
-            _ => {
-                return Err(BodyError::new_err(format!(
-                    "model: expected \"measured\", \"full\" or \"papers\", found {model:?}"
-                )));
-            }
-        };
-        Body::human(stature, model).map(Self).map_err(Raise::raise)
+        let known = [("measured", HumanModel::Measured), ("full", HumanModel::Full), ("papers", HumanModel::Papers)];
+        let found = known.iter().find(|(name, _)| *name == model).ok_or_else(|| {
+            let text = format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}");
+            BodyError::new_err(text)
+        })?;
+        Body::human(stature, found.1).map(Self).map_err(Raise::raise)
     }
 
     fn scaled(&self, factor: f64) -> PyResult<Self> {

@@ -33,15 +33,11 @@ pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
     let mut config = Config::default();
     for (key, value) in values.iter() {
         let key: String = key.extract()?;
-        let raw = if let Ok(switch) = value.extract::<bool>() {
-            RawValue::Switch(switch)
-        } else if let Ok(number) = value.extract::<f64>() {
-            RawValue::Number(number)
-        } else if let Ok(word) = value.extract::<String>() {
-            RawValue::Word(word)
-        } else {
-            return Err(ConfigError::new_err(format!("{key}: expected a number, a switch or a word, found {value}")));
-        };
+        let number = |_| value.extract().map(RawValue::Number);
+        let word = |_: PyErr| value.extract().map(RawValue::Word);
+        let raw = value.extract().map(RawValue::Switch).or_else(number).or_else(word);
+        let wrong = || format!("{key}: expected a number, a switch or a word, found {value}");
+        let raw = raw.map_err(|_: PyErr| ConfigError::new_err(wrong()))?;
         config.set(&key, &raw).map_err(Raise::raise)?;
     }
     Ok(config)

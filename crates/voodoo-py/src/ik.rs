@@ -15,9 +15,9 @@ use crate::body::PyBody;
 use crate::errors::{BodyError, MeasurementError, Raise};
 use crate::ik_view::PyView;
 
-/// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, each `(N,)`; and
-/// of the last posture, poses `(P, 4, 4)` and the residual of every goal.
-type Solved<'py> = (Array<'py>, Array<'py>, Vec<Array<'py>>, Array<'py>, Bound<'py, PyTuple>);
+/// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, `(5, N)`; and of
+/// the last posture, poses `(P, 4, 4)` and the residual of every goal.
+type Solved<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Bound<'py, PyTuple>);
 /// site, "position" or "line", position or (direction, moment), weight, level
 type GoalParts = (String, String, [f64; 6], f64, usize);
 /// site, site, radius
@@ -30,11 +30,6 @@ type OptionParts = (usize, f64, f64, f64, f64, f64);
 pub struct PyChain {
     body: Body,
     model: ChainModel,
-}
-
-/// A solver that pulls the angles of these indices towards these values, with the lowest priority.
-fn resting(rest: &[(usize, f64)]) -> IkSolver {
-    IkSolver::with_rest(rest.iter().map(|&(unknown, angle)| Rest { unknown, angle }).collect())
 }
 
 fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> SolverOptions {
@@ -93,11 +88,8 @@ impl PyChain {
         if angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite()) {
             return Ok(());
         }
-        let message = format!(
-            "angles: expected {} finite numbers, found {}",
-            self.model.freedoms(),
-            short(&format!("{angles:?}"))
-        );
+        let (expected, found) = (self.model.freedoms(), format!("{angles:?}"));
+        let message = format!("angles: expected {expected} finite numbers, found {found:.120}");
         Err(MeasurementError::new_err(message))
     }
 
@@ -114,10 +106,6 @@ impl PyChain {
             .iter()
             .filter_map(|site| self.model.link_of(site.limb).map(|link| (site.name.as_str(), link, site.position)))
     }
-}
-
-fn short(text: &str) -> String {
-    text.chars().take(120).collect()
 }
 
 #[pymethods]
@@ -243,8 +231,9 @@ impl PyChain {
         let sites: Vec<(usize, Vec3)> = self.site_links().map(|(_, link, x)| (link, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let mut numbers = [const { Vec::new() }; 5];
-        let mut solver = resting(&rest);
+        let mut numbers = vec![0.0; 5 * count];
+        let rest = rest.into_iter().map(|(unknown, angle)| Rest { unknown, angle });
+        let mut solver = IkSolver::with_rest(rest.collect());
         let mut ordered = Vec::new();
         py.detach(|| {
             let width = 3 * goals.len();
@@ -262,7 +251,7 @@ impl PyChain {
                 let counts = [report.steps, report.tried, report.compared, usize::from(report.converged)];
                 let [steps, tried, compared, converged] = counts.map(|count| count as f64);
                 let found = [report.h, steps, tried, compared, converged];
-                numbers.iter_mut().zip(found).for_each(|(all, number)| all.push(number));
+                (0..5).for_each(|kind| numbers[kind * count + index] = found[kind]);
             }
         });
         let at = solver.kinematics();
@@ -270,7 +259,7 @@ impl PyChain {
         Ok((
             frozen(py, angles, &[count, n])?,
             frozen(py, points, &[count, sites.len(), 3])?,
-            numbers.into_iter().map(|all| frozen(py, all, &[count])).collect::<PyResult<_>>()?,
+            frozen(py, numbers, &[5, count])?,
             matrices(py, &at.poses)?,
             PyTuple::new(py, residuals)?,
         ))

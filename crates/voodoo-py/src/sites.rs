@@ -14,16 +14,11 @@ pub(crate) fn places_of<'a>(
     places: &Bound<'_, PyAny>,
     sites: impl Iterator<Item = &'a str>,
 ) -> PyResult<Vec<Option<Vec3>>> {
-    let dict = places.cast::<PyDict>().ok();
-    sites
-        .map(|site| {
-            let place = match dict {
-                Some(dict) => dict.get_item(site)?,
-                None => Some(places.call_method1("get", (site,))?).filter(|place| !place.is_none()),
-            };
-            place.map(|place| vector(site, &place)).transpose()
-        })
-        .collect()
+    let place = |site: &str| {
+        let place = places.call_method1("get", (site,))?;
+        if place.is_none() { Ok(None) } else { vector(site, &place).map(Some) }
+    };
+    sites.map(place).collect()
 }
 
 #[doc = stub!("expected_sites")]

@@ -37,6 +37,15 @@ fn put_number(messages: &mut [u8], at: usize, number: f64, single: bool) {
     }
 }
 
+/// So many numbers of arrays in their order, however they are stored.
+fn all<'a>(parts: &'a [PyReadonlyArrayDyn<'_, f64>], expected: usize) -> PyResult<impl Iterator<Item = &'a f64>> {
+    let found: usize = parts.iter().map(|part| part.len()).sum();
+    if found != expected {
+        return Err(MeasurementError::new_err(format!("numbers: expected {expected}, found {found}")));
+    }
+    Ok(parts.iter().flat_map(|part| part.as_array().into_iter()))
+}
+
 #[pymethods]
 impl Template {
     #[new]
@@ -76,13 +85,7 @@ impl Template {
         stamp: &[u8],
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let mut messages = self.messages.clone();
-        let given: usize = numbers.iter().map(|part| part.len()).sum();
-        if given != self.places.len() {
-            let text = format!("numbers: expected {}, found {given}", self.places.len());
-            return Err(MeasurementError::new_err(text));
-        }
-        // In their order, however they are stored.
-        for (place, number) in self.places.iter().zip(numbers.iter().flat_map(|part| part.as_array().into_iter())) {
+        for (place, number) in self.places.iter().zip(all(&numbers, self.places.len())?) {
             put_number(&mut messages, *place, *number, self.single);
         }
         for at in &self.stamps {
@@ -97,12 +100,7 @@ impl Template {
 #[doc = stub!("with_numbers")]
 #[pyfunction]
 pub(crate) fn with_numbers(text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
-    let places = text.matches('\0').count();
-    let given: usize = numbers.iter().map(|part| part.len()).sum();
-    if places != given {
-        return Err(MeasurementError::new_err(format!("numbers: expected {places}, found {given}")));
-    }
-    let all = numbers.iter().flat_map(|part| part.as_array().into_iter());
+    let all = all(&numbers, text.matches('\0').count())?;
     let whole = all.map(|number| (number.round_ties_even() as i64).to_string());
     Ok(text
         .split('\0')
