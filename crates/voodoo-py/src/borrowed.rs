@@ -68,7 +68,7 @@ pub(crate) fn color_image<'a>((view, data): &'a (ColorView, &ColorData), number:
 /// Everything a step borrows: the views keep the arrays alive and readable.
 pub(crate) struct Borrowed<'py, 'a> {
     clouds: Vec<(PointView<'py>, Cloud<'static>)>,
-    images: DepthViews<'py, 'a>,
+    pub(crate) images: DepthViews<'py, 'a>,
     positions: Vec<PositionRelation>,
     rays: Vec<RayRelation>,
     detections: Vec<(Vec<PositionRelation>, f64)>,
@@ -99,10 +99,6 @@ impl<'py, 'a> Borrowed<'py, 'a> {
 
     pub(crate) fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
         self.clouds.iter().map(|(view, cloud)| Ok(Cloud { points: view.points()?, ..*cloud })).collect()
-    }
-
-    pub(crate) fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
-        depth_images(&self.images)
     }
 
     /// The detected persons.

@@ -9,7 +9,7 @@ use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::{BodyTracker, Frame, People};
 
 use crate::body::PyBody;
-use crate::borrowed::{Borrowed, Parts, color_image};
+use crate::borrowed::{Borrowed, Parts, color_image, depth_images};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{BodyError, Raise};
@@ -87,7 +87,7 @@ impl PyPeople {
     ) -> PyResult<Vec<(usize, PyEstimate)>> {
         let body = self.people.prototype();
         let all = Borrowed::new(py, frame, body, 0)?;
-        let (clouds, images) = (all.clouds()?, all.images()?);
+        let (clouds, images) = (all.clouds()?, depth_images(&all.images)?);
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
         let colors = numbered.map(|(view, camera)| color_image(view, camera)).collect::<PyResult<Vec<_>>>()?;

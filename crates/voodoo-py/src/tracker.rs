@@ -11,7 +11,7 @@ use voodoo_core::{ColorImage, RegionLine};
 
 use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, number};
+use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, depth_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
 use crate::errors::{MeasurementError, Raise, wrong_argument};
@@ -153,7 +153,7 @@ impl PyTracker {
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
         let borrowed = Borrowed::new(py, frame, self.tracker.body(), 0)?;
-        let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
+        let (clouds, images) = (borrowed.clouds()?, depth_images(&borrowed.images)?);
         let views = frame.color_views(py);
         let colors = self.pictures(frame, &views)?;
         let detections = borrowed.detections();
