@@ -80,6 +80,8 @@ pub(crate) fn affine(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<
     Ok(Affine3::from_cols(column(0), column(1), column(2), column(3)))
 }
 
+type Images<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i16>>);
+
 #[doc = stub!("render_depth")]
 #[pyfunction]
 #[pyo3(signature = (body, world_from_limb, *, camera, world_from_sensor=None))]
@@ -89,7 +91,7 @@ pub(crate) fn render_depth<'py>(
     world_from_limb: Vec<Bound<'py, PyAny>>,
     #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     world_from_sensor: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i16>>)> {
+) -> PyResult<Images<'py>> {
     let poses = limb_poses(&body.0, &world_from_limb)?;
     let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
     let view = Viewpoint { camera: &camera, world_from_sensor };

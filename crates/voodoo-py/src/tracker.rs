@@ -210,15 +210,14 @@ impl PyTracker {
 
     /// The contour lines of the last step in the images of a camera: limb, pixel (2), outward normal (2), offset, sigma, row by
     /// row.
-    fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> Bound<'py, PyArray1<f32>> {
         let camera = self.cameras.iter().position(|known| known == source);
         let lines = camera.into_iter().flat_map(|camera| self.tracker.region_lines(camera as u16));
         let row = |line: RegionLine| {
             let ([u, v], [nu, nv]) = (line.place, line.normal);
-            vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
+            [line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
         };
-        let rows: Vec<Vec<f32>> = lines.map(row).collect();
-        Ok(PyArray2::from_vec2(py, &rows)?)
+        PyArray1::from_vec(py, lines.flat_map(row).collect())
     }
 
     /// Signed distance of world points `(N, 3)` to the posed body, meters, negative inside.

@@ -31,23 +31,6 @@ pub struct SitePixel {
     pub confidence: f64,
 }
 
-impl SiteKeypoints {
-    /// Pixel of a site from keypoints (column, row, confidence); `None` if one of them is missing or has a confidence below
-    /// `least`.
-    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
-        let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
-        for (index, weight) in &self.weights {
-            let [u, v, reliability] = *keypoints.get(*index)?;
-            pixel = [pixel[0] + weight * u, pixel[1] + weight * v];
-            total += reliability;
-            confidence = if reliability < confidence { reliability } else { confidence };
-        }
-        // Missing keypoints are not finite, which makes the sums not finite.
-        let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
-        known.then_some(SitePixel { pixel, confidence })
-    }
-}
-
 /// The camera of an image, and how its keypoints become measurements.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensor<'a> {
@@ -90,6 +73,21 @@ pub enum SiteMeasurement {
 }
 
 impl SiteKeypoints {
+    /// Pixel of a site from keypoints (column, row, confidence); `None` if one of them is missing or has a confidence below
+    /// `least`.
+    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
+        let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
+        for (index, weight) in &self.weights {
+            let [u, v, reliability] = *keypoints.get(*index)?;
+            pixel = [pixel[0] + weight * u, pixel[1] + weight * v];
+            total += reliability;
+            confidence = if reliability < confidence { reliability } else { confidence };
+        }
+        // Missing keypoints are not finite, which makes the sums not finite.
+        let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
+        known.then_some(SitePixel { pixel, confidence })
+    }
+
     /// Returns a 3-D position where the measured surface passes the gate, else a ray where that passes the gate.
     pub fn measurement(
         &self,
