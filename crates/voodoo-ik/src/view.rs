@@ -127,9 +127,8 @@ struct PixelPlace {
 impl PixelPlace {
     /// The values of the four pixels: upper row, lower row; `None` for an image of another size.
     fn corners<T: Copy>(&self, image: &[T]) -> Option<[T; 4]> {
-        let lower = self.start + self.width;
-        let (upper, lower) = (image.get(self.start..self.start + 2)?, image.get(lower..lower + 2)?);
-        Some([upper[0], upper[1], lower[0], lower[1]])
+        let rows = image.get(self.start..self.start + self.width + 2)?;
+        Some([rows[0], rows[1], rows[self.width], rows[self.width + 1]])
     }
 
     /// Bilinear interpolation and its gradient. Outside of the image the distance to its border is added, because everything
