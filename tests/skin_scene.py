@@ -54,4 +54,4 @@ def learned(skin, frames=8, **parts):
 
 
 def pixel_error(skin, site, pixel):
-    return np.linalg.norm(np.subtract(skin.assigned[site].pixel, pixel))
+    return np.linalg.norm(np.subtract(skin.assigned[site], pixel))

@@ -14,7 +14,7 @@ import voodoo
 from test_exports import read_bvh, with_gaps
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.files import save
-from voodoo.export.joint_angles import joint_angles
+from voodoo.export.human_frames import joint_angles
 from voodoo.export.people import PeopleTrack
 from voodoo.export.skeleton import bones, skeleton
 from voodoo.export.track import Track

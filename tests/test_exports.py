@@ -28,8 +28,7 @@ from voodoo.export import (
     write_trc,
 )
 from voodoo.export.files import check_target, save
-from voodoo.export.human_frames import human_frames
-from voodoo.export.joint_angles import joint_angles
+from voodoo.export.human_frames import human_frames, joint_angles
 from voodoo.export.skeleton import skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import by_axes, by_feet, by_floor, lying_words, turned

@@ -9,11 +9,11 @@ import pytest
 
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
-from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, instant
+from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, instant, new
 from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
+from voodoo.live.recorder import _cloud, _depth, _header, _scan, camera_info, transforms
 from voodoo.live.ros2.dds import Offer, dds_name, ros_name
 from voodoo.live.ros2.feed import ROOT_PATIENCE_S, TF, RosFeed
 from voodoo.live.session import Output, Session
@@ -153,13 +153,17 @@ def test_every_type_becomes_its_measurement():
     scan = LaserScan("", 1.0, np.full(5, 2.0, np.float32), -0.2, 0.1, 0.1, 10.0, np.eye(4))
     messages = [
         (DEPTH, IMAGE, _depth(header, depth)),
-        (DEPTH, IMAGE, _new(IMAGE, **raw, encoding="32FC1", step=128, data=meters.view(np.uint8).ravel())),
-        (topics[1], COMPRESSED, _new(COMPRESSED, header=header, format="16UC1; compressedDepth png", data=packed)),
-        (topics[2], IMAGE, _new(IMAGE, **raw, encoding="rgb8", step=96, data=picture[:, :, ::-1].ravel())),
+        (DEPTH, IMAGE, new(IMAGE, **raw, encoding="32FC1", step=128, data=meters.view(np.uint8).ravel())),
+        (
+            topics[1],
+            COMPRESSED,
+            new(COMPRESSED, header=header, format="16UC1; compressedDepth png", data=packed),
+        ),
+        (topics[2], IMAGE, new(IMAGE, **raw, encoding="rgb8", step=96, data=picture[:, :, ::-1].ravel())),
         (
             topics[3],
             COMPRESSED,
-            _new(COMPRESSED, header=header, format="png", data=cv2.imencode(".png", picture)[1].ravel()),
+            new(COMPRESSED, header=header, format="png", data=cv2.imencode(".png", picture)[1].ravel()),
         ),
         (topics[4], CLOUD, _cloud(header, points)),
         (topics[5], SCAN, _scan(header, scan)),

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import voodoo
 from made_up import two_people
-from voodoo.drawing.rerun_log import bands, nearest_limb, rounded_millimeters
+from voodoo.drawing.surfaces import bands, nearest_limb, rounded_millimeters
 from voodoo.errors import VoodooError
 from voodoo.model.projection import limb_mesh
 from voodoo.people import PeopleEstimate

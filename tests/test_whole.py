@@ -15,7 +15,7 @@ import voodoo
 from commands import refused
 from voodoo.cli import app
 from voodoo.cli.paths import OUTPUTS
-from voodoo.evaluation.plot import plot_errors
+from voodoo.evaluation.report import plot_errors
 from voodoo.evaluation.summary import write_sequences
 from voodoo.export.files import ONE_PERSON
 from voodoo.export.track import Track

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 import voodoo
-from voodoo.drawing.canvas import Picture
+from voodoo.drawing.surfaces import Picture
 from voodoo.evaluation import metrics
 from voodoo.model.projection import CameraView
 from voodoo.pipeline.run import track

@@ -15,6 +15,7 @@ from voodoo.config import Config
 from voodoo.detectors.base import AnyDetector
 from voodoo.errors import BodyError, ConfigError, MeasurementError, of_kind, one_thread
 from voodoo.model.body import Body, checked_joints
+from voodoo.model.joint import corners
 
 __all__ = ["ONE", "Followed", "People", "PeopleEstimate", "Person", "everybody"]
 
@@ -117,7 +118,7 @@ class People:
             limit=limit,
             nearest=bool(nearest),
             forget_after=float(forget_after),
-            region=_box(region),
+            region=None if region is None else corners("region", region, ConfigError),
         )
         self._estimate = PeopleEstimate(math.nan, ())
 
@@ -246,16 +247,3 @@ class Followed:
         """See Tracker.body_before."""
         places = np.ascontiguousarray(sites, dtype=np.float64).reshape(-1, 3)
         return _core.body_before(self._core, places, np.asarray(camera, dtype=np.float64))
-
-
-def _box(region: tuple[Sequence[float], Sequence[float]] | None) -> tuple[list[float], list[float]] | None:
-    if region is None:
-        return None
-    try:
-        low, high = ([float(value) for value in corner] for corner in region)
-    except (TypeError, ValueError):
-        low, high = [], []
-    good = len(low) == len(high) == 3 and all(math.isfinite(value) for value in (*low, *high))
-    if not good or any(a > b for a, b in zip(low, high, strict=True)):
-        raise ConfigError(f"region: expected a low and a high corner of three numbers each, found {region!r}")
-    return low, high

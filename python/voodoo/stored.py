@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import os
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 
 from voodoo.errors import RecordingError, VoodooError, reading
@@ -60,6 +61,18 @@ def read_stored_text(
     content = read_stored(path, expected, most=most, error=error)
     with reading(path, expected, error=error):
         return text_of(content)
+
+
+def numbers_in(where: object, cells: Iterable[str]) -> list[float]:
+    """The numbers in cells of a table; NaN for empty ones.
+
+    Raises:
+        RecordingError: other text; `where` begins the message.
+    """
+    try:
+        return [float(cell or "nan") for cell in cells]
+    except ValueError as error:
+        raise RecordingError(f"{where}: expected numbers, found {error}") from error
 
 
 def text_of(content: bytes) -> str:

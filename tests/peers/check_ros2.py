@@ -13,8 +13,8 @@ import pytest
 from live_camera import CAMERA, pictures
 
 import voodoo
-from voodoo.export.ros2 import STORE, cdr
-from voodoo.live.recorder import _cloud, _depth, _header, _new, _scan, camera_info, transforms
+from voodoo.export.ros2 import STORE, cdr, new
+from voodoo.live.recorder import _cloud, _depth, _header, _scan, camera_info, transforms
 from voodoo.live.ros2.dds import Node, Offer
 from voodoo.measurements import DepthImage, LaserScan, PointCloud
 
@@ -123,7 +123,7 @@ def compressed(stamp, image):
     assert done
     fields = {"header": _header(stamp, "camera"), "format": "16UC1; compressedDepth png"}
     packed = np.concatenate([np.zeros(12, np.uint8), data.ravel()])
-    return _new("sensor_msgs/msg/CompressedImage", **fields, data=packed)
+    return new("sensor_msgs/msg/CompressedImage", **fields, data=packed)
 
 
 def test_all_types_arrive_and_transforms_are_interpolated():

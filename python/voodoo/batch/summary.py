@@ -14,7 +14,7 @@ from urllib.parse import quote
 from pydantic import TypeAdapter
 
 from voodoo.errors import VoodooError
-from voodoo.evaluation.summary import cell
+from voodoo.evaluation.summary import cell, table_text
 
 DONE, FAILED = "done", "failed"
 REPORTS = "reports"
@@ -71,11 +71,8 @@ COLUMNS = tuple(field.name for field in fields(Row))
 
 def write_table(rows: Iterable[Row]) -> str:
     """The text of summary.csv, sorted by name."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(row.cells() for row in sorted(rows, key=lambda row: row.recording))
-    return text.getvalue()
+    ordered = sorted(rows, key=lambda row: row.recording)
+    return table_text(COLUMNS, ([getattr(row, name) for name in COLUMNS] for row in ordered))
 
 
 def read_table(text: str, source: object) -> dict[str, Row]:

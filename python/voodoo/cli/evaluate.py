@@ -67,8 +67,7 @@ def eval_command(
     from voodoo.evaluation.evaluate import evaluate_all
     from voodoo.evaluation.people import PeopleScore
     from voodoo.evaluation.people_evaluate import evaluate_result, has_people
-    from voodoo.evaluation.plot import new_figure
-    from voodoo.evaluation.report import brief, write_reports
+    from voodoo.evaluation.report import brief, new_figure, write_reports
     from voodoo.evaluation.score import Score
     from voodoo.evaluation.search import find_recordings
     from voodoo.evaluation.summary import summarize

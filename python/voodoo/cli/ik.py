@@ -73,8 +73,7 @@ def ik_command(
 
     beginning = beginning_of(init)
     source = opened(recording, reading)
-    files, keeping = spool_of(source, out, context, suffix="_ik.csv")
-    with keeping as spool:
+    with spool_of(source, out, context, suffix="_ik.csv") as spool:
         positions = known_positions(source, None if targets is None else Track.load(targets))
         tracker = start_tracker(source, init=beginning, **human.start())
         if not tracker.estimate.joints and first_pose(source, tracker, starts=starts_of(beginning, source)) is None:
@@ -94,13 +93,13 @@ def ik_command(
         steps = follow(source, tracker, positions, **how)
         with deferred():
             done = run(source, steps, take=take)
-            turn = turn_of(source, spool.sample(), files)
+            turn = turn_of(source, spool.sample(), spool.paths)
             written, failed = spool.write(turn=turn)
     for name, count in compared.items():
-        print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", files)
+        print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", spool.paths)
     message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
     refuse_missing([*failed, *done.failures], message)
     print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
-    print_result(message, files)
+    print_result(message, spool.paths)
     if words := upright_words(written, turn):
         print_message(words)

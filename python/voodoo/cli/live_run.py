@@ -22,18 +22,19 @@ from voodoo.export.ros2 import cdr, description, instant
 from voodoo.export.spool import Spool
 from voodoo.export.upright import Turn
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.first_frame import FirstFrame
 from voodoo.live.follow import Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
-from voodoo.live.sinks.registry import sink_of
+from voodoo.live.sinks import sink_of
 from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
+from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.model.body import Body
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.start import starts_of
 from voodoo.recordings import sample_path
 from voodoo.recordings.loaders import open_recording
+from voodoo.recordings.recording import Recording, SensorInfo
 from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
@@ -119,6 +120,41 @@ def _check_states(session: Session, ended: threading.Event, duration: float | No
         if now - reported >= _LINE_S:
             reported += _LINE_S
             print_message(session.line())
+
+
+class FirstFrame(Recording):
+    """A recording without frames that has the sensors of a live source, from which the start of tracking is told.
+
+    Args:
+        live: the source.
+        frame: its first frame.
+    """
+
+    loader = "live"
+
+    def __init__(self, live: Live, frame: LiveFrame) -> None:
+        """Store source and frame."""
+        self.name = live.sources[0].name
+        self.path = Path(self.name)
+        self.root_frame = live.root_frame
+        self._live, self._stamps = live, [frame.stamp]
+
+    def __len__(self) -> int:
+        """No frames."""
+        return 0
+
+    def __iter__(self) -> Iterator[RecordedFrame]:
+        """No frames."""
+        return iter(())
+
+    def _sensors(self) -> Iterator[SensorInfo]:
+        for name, kind in self._live.kinds.items():
+            yield SensorInfo.of(name, kind, self.root_frame, self._stamps, "live")
+
+    def root_from(self, frame: str, stamp: float) -> FloatArray:
+        """See Recording."""
+        known = self._live.root_from(frame, stamp)
+        return super().root_from(frame, stamp) if known is None else known
 
 
 def _follower(start: ParsedTracking, first: FirstFrame) -> Follower:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -125,6 +125,18 @@ def kinds_of(words: str | None) -> tuple[str, ...] | None:
     return FrontEndSettings(use=tuple(word.strip() for word in words.split(","))).use
 
 
+def _meters(option: str, names: str, word: str) -> list[float]:
+    """The numbers in a word, as many as there are names.
+
+    Raises:
+        VoodooError: others.
+    """
+    with suppress(ValueError):
+        if len(numbers := [float(part) for part in word.split(",")]) == len(names.split(",")):
+            return numbers
+    raise VoodooError(f"{option}: expected {names} in meters, found {word!r}")
+
+
 def depth_filter_of(words: str | None) -> DepthFilter | None:
     """The filter of "NEAR,FAR" in meters; none for None.
 
@@ -133,10 +145,7 @@ def depth_filter_of(words: str | None) -> DepthFilter | None:
     """
     if words is None:
         return None
-    try:
-        nearest, farthest = (float(word) for word in words.split(","))
-    except ValueError:
-        raise VoodooError(f"depth-range: expected NEAR,FAR in meters, found {words!r}") from None
+    nearest, farthest = _meters("depth-range", "NEAR,FAR", words)
     return DepthFilter(nearest=nearest, farthest=farthest)
 
 
@@ -166,12 +175,7 @@ def boxes_of(words: Sequence[str] | None) -> tuple[Box, ...]:
     """
     boxes = []
     for word in words or ():
-        try:
-            numbers = [float(part) for part in word.split(",")]
-        except ValueError:
-            numbers = []
-        if len(numbers) != 6 or not np.isfinite(numbers).all():
-            raise VoodooError(f"exclude: expected X0,Y0,Z0,X1,Y1,Z1 in meters, found {word!r}")
+        numbers = _meters("exclude", "X0,Y0,Z0,X1,Y1,Z1", word)
         low, high = np.sort(np.reshape(numbers, (2, 3)), axis=0).tolist()
         boxes.append(((low[0], low[1], low[2]), (high[0], high[1], high[2])))
     return FrontEndSettings(exclude=tuple(boxes)).exclude
@@ -189,8 +193,8 @@ def spool_of(
     *,
     suffix: str = ".csv",
     upright: bool = False,
-) -> tuple[Sequence[Path], Spool]:
-    """The outputs of a command, by default one with the name of the recording, and where their poses are kept until the end.
+) -> Spool:
+    """Where poses are kept until the outputs of a command are written, by default one with the name of the recording.
 
     What killed commands left in their folders is completed before.
 
@@ -204,7 +208,7 @@ def spool_of(
         check_paths(context, targets)
     recover_before(targets)
     how: dict[str, Any] = {"optical": source.info().camera_root, "upright": upright}
-    return targets, Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
+    return Spool(targets, root_frame=lambda: source.root_frame, together=TOGETHER, **how)
 
 
 def turn_of(source: Recording, tracks: Sequence[Track], targets: Sequence[Path], *, upright: bool = False) -> Turn:

@@ -20,15 +20,14 @@ def info_command(
     """Print the contents of a recording: sensors, topics, frames, rates, root frame and reference, and of the first image of each
     camera size, bits, calibration, field of view and range of depths."""
     from voodoo.cli.running import opened
-    from voodoo.recordings.first_images import depth_range, doubts, first_images
+    from voodoo.recordings.first_images import depths_of, doubts, first_images
     from voodoo.recordings.left_out import LeftOut
 
     left_out = LeftOut()
     source = opened(recording, reading, left_out=left_out)
     about = source.info()
-    with left_out.aside():
-        depth = depth_range(source)
     images, damage = first_images(source)
+    depth = depths_of(images)
     notes = [*doubts(about, left_out, images), damage, "" if depth is None else depth.warning]
     if as_json:
         print_json(

@@ -108,11 +108,10 @@ def track_command(
 
     voodoo track walk_bag/ --keypoints /camera/color/image_raw=openpose/ --with markers.trc --save walk.rrd
     """
-    from contextlib import nullcontext
+    from contextlib import ExitStack
     from dataclasses import replace
 
     from voodoo.cli.running import ParsedTracking, opened, refuse_unused, run, spool_of, turn_of
-    from voodoo.cli.track import closing_doubts, closing_lines
     from voodoo.export.files import upright_words
     from voodoo.export.upright import lying_words
     from voodoo.pipeline.inputs import join, keypoint_words, loader_options
@@ -167,9 +166,9 @@ def track_command(
         draw_regions=(draw_regions, ("color",)),
         background=(background, ("color",)),
     )
-    targets, keeping = spool_of(source, out, context, upright=upright)
-    shown = Viewer(save=save, name=source.name) if view or save is not None else nullcontext()
-    with keeping as spool, shown as viewer:
+    with ExitStack() as stack:
+        spool = stack.enter_context(spool_of(source, out, context, upright=upright))
+        viewer = stack.enter_context(Viewer(save=save, name=source.name)) if view or save is not None else None
         how: dict[str, Any] = {"overlay": overlay, "save": save, "viewer": viewer, "left_out": left_out}
         settings = replace(used, draw_regions=draw_regions)
         tracker = start.tracker(source, markers=markers)
@@ -184,7 +183,7 @@ def track_command(
         with deferred():
             done = run(source, steps, take=take, **how)
             sample = spool.sample()
-            turn = turn_of(source, sample, targets, upright=upright)
+            turn = turn_of(source, sample, spool.paths, upright=upright)
             files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
     turned = upright_words(files, turn, every=upright)
     if several:
@@ -200,7 +199,7 @@ def track_command(
     size = None if several or not spool.found else stature_of(tracker.body)
     if not several:
         message = "\n".join([message, *closing_lines(spool.states, done.seconds, source.info(), stature=size)])
-    print_result(message, targets)
+    print_result(message, spool.paths)
     for doubt in [words for one in sample if (words := lying_words(one, source.root_frame, turn))][:1]:
         print_message(f"{source.name}: {doubt}")
     told = tracking.height or getattr(start.beginning, "height_m", None)
@@ -219,7 +218,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
     Raises:
         NoPoseError: nobody was found.
     """
-    from voodoo.recordings.first_images import depth_range
+    from voodoo.recordings.first_images import depths_of, first_images
 
     if left_out is not None:
         for reason, count in left_out.counts.items():
@@ -228,7 +227,7 @@ def _print_warnings(source: Recording, spool: Spool, left_out: LeftOut | None, r
         for note in left_out.notes:
             print_message(f"{source.name}: {note}")
     if not {"tracking", "degraded"} & spool.states.keys():
-        depth = depth_range(source)
+        depth = depths_of(first_images(source)[0])
         if depth is not None and depth.warning:
             print_message(f"{source.name}: {depth.warning}")
     if not spool.found:

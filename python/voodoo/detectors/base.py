@@ -52,11 +52,8 @@ class DetectorImage:
 
     def points(self) -> npt.NDArray[np.float64]:
         """The point (H, W, 3) of every pixel in the sensor's frame [m]; the origin where depth is 0."""
-        depth = self.depth.astype(np.float64)
-        rows, columns = np.indices(depth.shape, dtype=np.float64)
-        rays = np.nan_to_num(self.camera.undistorted(np.stack([columns.ravel(), rows.ravel()], axis=-1)))
-        x, y = rays.T.reshape(2, *depth.shape)
-        return np.stack([depth * x, depth * y, depth], axis=-1)
+        depth = self.depth.astype(np.float64)[..., None]
+        return np.concatenate([depth * np.nan_to_num(self.camera.rays()), depth], axis=-1)
 
     def to_world(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Points (..., 3) [m] of the sensor's frame in the world."""

@@ -50,6 +50,8 @@ _CARRIER = {
 
 NOWHERE_M = 10.0
 """Error of a joint while no person is tracked, larger than every limit, for the tracking class."""
+_SAME_TIME_S = 0.1
+"""Greatest time between a frame and the true joints by which its points are selected."""
 _SEGMENTED_LOADERS = ("utd-mhad",)
 
 
@@ -79,10 +81,10 @@ def evaluate(
     recording = open_recording(path, **how | pictures_alone(path, how.get("loader"), use))
     tracker = start_tracker(recording, init=init, config=config, model=model, use=use)
     selection = select_by(recording)
-    steps = []
+    reference, steps = recording.reference, []
     for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=use)):
         estimate = frame.estimate
-        truth = _truth_at(recording, estimate.stamp)
+        truth = reference.at(estimate.stamp, reference.names, within=_SAME_TIME_S) if reference else {}
         joints = np.array([estimate.joints.get(name, np.full(3, np.nan)) for name in metrics.JOINTS], dtype=np.float64)
         observed = witness(frame.recorded, tracker, estimate, truth, selection)
         known = joints, called_measured(estimate), sigma_of(estimate)
@@ -194,20 +196,6 @@ def _task(how: Mapping[str, Any], path: Path) -> tuple[Score | PeopleScore, Fram
         return evaluate_people(path, **how) if several else evaluate(path, **how)
     except (VoodooError, OSError) as error:
         return (PeopleScore if several else Score)(path.name, path, failure=str(error)), None
-
-
-def _truth_at(recording: Recording, stamp: float) -> dict[str, FloatArray]:
-    """Reference positions at a stamp by linear interpolation; NaN outside of the reference."""
-    reference = recording.reference
-    if reference is None or not reference.stamps[0] - 0.1 <= stamp <= reference.stamps[-1] + 0.1:
-        return {}
-    after = int(np.clip(np.searchsorted(reference.stamps, stamp), 1, max(len(reference.stamps) - 1, 1)))
-    if after >= len(reference.stamps):
-        return dict(zip(reference.names, reference.positions[0], strict=True))
-    span = reference.stamps[after] - reference.stamps[after - 1]
-    t = float(np.clip((stamp - reference.stamps[after - 1]) / span, 0.0, 1.0))
-    positions = (1.0 - t) * reference.positions[after - 1] + t * reference.positions[after]
-    return dict(zip(reference.names, positions, strict=True))
 
 
 def _score(

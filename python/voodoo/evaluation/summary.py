@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -86,12 +87,19 @@ def _together(scores: Sequence[Score], name: str, count: str) -> float:
     return sum(fraction * number for fraction, number in counts) / total if total else math.nan
 
 
+def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
+    """Rows of values as CSV; unknown ones are empty cells."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(map(cell, row) for row in rows)
+    return text.getvalue()
+
+
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write rows of values; unknown ones are empty cells."""
-    with appearing_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(map(cell, row) for row in rows)
+    """Write `table_text`, which appears when it is complete."""
+    with appearing_whole(path) as part:
+        part.write_text(table_text(header, rows), encoding="utf-8")
 
 
 def cell(value: object) -> str:

@@ -11,12 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from voodoo.errors import VoodooError, reason
-from voodoo.export.bvh import write_bvh
 from voodoo.export.foxglove import SUFFIX as FOXGLOVE
 from voodoo.export.foxglove import write_foxglove
 from voodoo.export.glb import write_glb
-from voodoo.export.markers import write_c3d, write_trc
-from voodoo.export.opensim import write_mot, write_sto
+from voodoo.export.motion import write_bvh, write_c3d, write_mot, write_sto, write_trc
 from voodoo.export.people import PeopleTrack
 from voodoo.export.ros2 import person_id, write_people_bag
 from voodoo.export.table import SUFFIXES

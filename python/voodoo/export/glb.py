@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, names_of
-from voodoo.export.skeleton import Bone, FloatArray, held, placed_on_parents, skeleton
+from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, placed_on_parents, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.projection import limb_mesh
@@ -92,8 +92,7 @@ class _File:
 
     def add_person(self, name: str, track: Track, body: Body, color: tuple[float, ...], start: float) -> None:
         """Add nodes, skin, mesh and animation of a person; `start` [s] is the time zero."""
-        if (np.diff(track.stamps) <= 0.0).any():
-            raise VoodooError("stamps: expected rising times, found others")
+        mean_interval(track.stamps)  # rejects stamps that do not rise
         if len(body.limbs) > 256:
             raise VoodooError(f"body: expected at most 256 limbs for .glb, found {len(body.limbs)}")
         posed = held(skeleton(track, body), track.found)

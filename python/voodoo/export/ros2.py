@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.human_frames import human_frames, placed_names
-from voodoo.export.joint_angles import joint_angles
+from voodoo.export.human_frames import human_frames, joint_angles, placed_names
 from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
@@ -40,7 +40,8 @@ STORE = get_typestore(Stores.ROS2_HUMBLE)
 STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
 TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
-_SPHERE, _CYLINDER, _SPHERES, _ADD, _DELETE_ALL = 2, 3, 7, 0, 3
+_MARKER = "visualization_msgs/msg/Marker"
+_SPHERE, _CYLINDER, _SPHERES, _DELETE_ALL = 2, 3, 7, 3
 
 
 def person_id(number: int) -> str:
@@ -50,12 +51,12 @@ def person_id(number: int) -> str:
 
 def description(body: Body, person: str) -> dict[str, Any]:
     """Topic -> message (std_msgs/String) of the person's URDF in the body's current sizes."""
-    return {f"/human_description_{person}": _new(STRING, data=urdf(body, person))}
+    return {f"/human_description_{person}": new(STRING, data=urdf(body, person))}
 
 
 def tracked(stamp: float, persons: Sequence[str], *, root_frame: str) -> dict[str, Any]:
     """Topic -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s]."""
-    return {TRACKED: _new(IDS, header=_header(round(stamp * 1e9), root_frame), ids=list(persons))}
+    return {TRACKED: new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons))}
 
 
 def write_bag(
@@ -189,9 +190,13 @@ class _Human:
             if np.isfinite(sure).all():
                 messages[f"{self.topic}/pose"] = pose_message(at, self.root, rows[0].tolist(), sure)
         if markers:
-            header = _header(at, self.root)
-            drawn = _markers(self.track, self.body, index, header) if self._displayed[index] else [_no_markers(header)]
-            messages[f"{self.topic}/markers"] = _new("visualization_msgs/msg/MarkerArray", markers=drawn)
+            header = header_at(at, self.root)
+            drawn = (
+                _markers(self.track, self.body, index, header)
+                if self._displayed[index]
+                else [new(_MARKER, header=header, action=_DELETE_ALL)]
+            )
+            messages[f"{self.topic}/markers"] = new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
 
 
@@ -204,44 +209,31 @@ def transforms_message(nanoseconds: int, rows: Iterable[tuple[str, str, Sequence
     """TFMessage of parents, names, and place x, y, z and rotation x, y, z, w on the parent."""
     transforms = []
     for parent, name, (x, y, z, qx, qy, qz, qw) in rows:
-        place = _new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
-        turn = _new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw)
-        moved = _new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
-        header = _header(nanoseconds, parent)
+        place = new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+        turn = new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw)
+        moved = new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
+        header = header_at(nanoseconds, parent)
         transforms.append(
-            _new("geometry_msgs/msg/TransformStamped", header=header, child_frame_id=name, transform=moved)
+            new("geometry_msgs/msg/TransformStamped", header=header, child_frame_id=name, transform=moved)
         )
-    return _new(TF, transforms=transforms)
+    return new(TF, transforms=transforms)
 
 
 def joint_message(nanoseconds: int, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
     """JointState of angles [rad]."""
-    return _new(
+    return new(
         JOINTS,
-        header=_header(nanoseconds, f"body_{person}"),
+        header=header_at(nanoseconds, f"body_{person}"),
         name=[f"{name}_{person}" for name in joints],
         position=np.ascontiguousarray(angles, dtype=np.float64),
-        velocity=np.empty(0),
-        effort=np.empty(0),
     )
 
 
 def pose_message(nanoseconds: int, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
     """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers)."""
-    x, y, z, w = row[3:]
-    return _new(
-        POSE,
-        header=_header(nanoseconds, root),
-        pose=_new(
-            "geometry_msgs/msg/PoseWithCovariance",
-            pose=_new(
-                "geometry_msgs/msg/Pose",
-                position=_point(row[:3]),
-                orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-            ),
-            covariance=np.asarray(covariance, dtype=np.float64).ravel(),
-        ),
-    )
+    uncertain = np.asarray(covariance, dtype=np.float64).ravel()
+    pose = new("geometry_msgs/msg/PoseWithCovariance", pose=_pose(row), covariance=uncertain)
+    return new(POSE, header=header_at(nanoseconds, root), pose=pose)
 
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
@@ -266,14 +258,6 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
     return result
 
 
-def _no_markers(header: Any) -> Any:  # noqa: ANN401
-    """Message that removes all markers."""
-    still = np.array([0.0, 0.0, 0.0, 1.0])
-    marker = _marker(header, "", 0, _CYLINDER, np.zeros(3), still, (0.0,) * 3, (0.0,) * 3, [])
-    marker.action = _DELETE_ALL
-    return marker
-
-
 def _marker(
     header: Any,  # noqa: ANN401
     namespace: str,
@@ -286,61 +270,60 @@ def _marker(
     points: list[Any],
     opacity: float = 0.6,
 ) -> Any:  # noqa: ANN401
-    x, y, z, w = turn.tolist()
-    no_image, for_ever, no_file = _nothing()
-    return _new(
-        "visualization_msgs/msg/Marker",
+    return new(
+        _MARKER,
         header=header,
         ns=namespace,
         id=number,
         type=kind,
-        action=_ADD,
-        pose=_new(
-            "geometry_msgs/msg/Pose",
-            position=_point(place.tolist()),
-            orientation=_new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-        ),
-        scale=_new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
-        color=_new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
-        lifetime=for_ever,
-        frame_locked=False,
+        pose=_pose([*place.tolist(), *turn.tolist()]),
+        scale=new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
+        color=new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
         points=points,
-        colors=[],
-        texture_resource="",
-        texture=no_image,
-        uv_coordinates=[],
-        text="",
-        mesh_resource="",
-        mesh_file=no_file,
-        mesh_use_embedded_materials=False,
     )
 
 
+def new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
+    """A message of a type, by its fields; others are zero, empty or false."""
+    return STORE.types[kind](**{**_unset(kind), **fields})
+
+
 @cache
-def _nothing() -> tuple[Any, Any, Any]:
-    """Fields of markers that are not used: an image, a lifetime and a mesh."""
-    no_bytes = np.empty(0, dtype=np.uint8)
-    image = _new("sensor_msgs/msg/CompressedImage", header=_header(0, ""), format="", data=no_bytes)
-    for_ever = _new("builtin_interfaces/msg/Duration", sec=0, nanosec=0)
-    return image, for_ever, _new("visualization_msgs/msg/MeshFile", filename="", data=no_bytes)
+def _unset(kind: str) -> dict[str, Any]:
+    """Fields of a message that says nothing."""
+    return {name: _nothing(*node) for name, node in STORE.fielddefs[kind][1]}
 
 
-def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
-    return STORE.types[kind](**fields)
+def _nothing(form: Nodetype, content: Any) -> Any:  # noqa: ANN401 - of rosbags
+    if form == Nodetype.NAME:
+        return new(content)
+    if form == Nodetype.BASE:
+        return "" if content[0] == "string" else np.zeros((), content[0]).item()
+    (of, inner), count = content
+    if of == Nodetype.BASE and inner[0] != "string":
+        return np.zeros(count if form == Nodetype.ARRAY else 0, inner[0])
+    return []
 
 
-def _header(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
+def header_at(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
+    """A std_msgs/Header."""
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
-    return _new(
+    return new(
         "std_msgs/msg/Header",
-        stamp=_new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest),
+        stamp=new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest),
         frame_id=frame,
     )
 
 
+def _pose(row: Sequence[float]) -> Any:  # noqa: ANN401
+    x, y, z, w = row[3:]
+    turn = new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
+    return new("geometry_msgs/msg/Pose", position=_point(row[:3]), orientation=turn)
+
+
 def _point(position: Sequence[float]) -> Any:  # noqa: ANN401
     x, y, z = position
-    return _new("geometry_msgs/msg/Point", x=x, y=y, z=z)
+    return new("geometry_msgs/msg/Point", x=x, y=y, z=z)
 
 
 def instant(

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from voodoo._core import Estimate
 from voodoo.errors import NoPoseError, VoodooError, a_path, reading, reason
 from voodoo.export.cut_off import complete
-from voodoo.export.files import FORMATS, STDOUT, check_target, is_table, on_stdout, save, written
+from voodoo.export.files import FORMATS, STDOUT, is_table, on_stdout, save, written
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import BODIES, BODY_OF, Arrays, save_result
 from voodoo.export.track import Track, arrays_of, left_out_arrays, rows_of
@@ -46,7 +46,7 @@ class Spool:
     An error of this package in the block removes them; after another one, or a crash, `recover` makes the outputs.
 
     Args:
-        paths: outputs, see `voodoo.export.files.FORMATS`.
+        paths: outputs, see `voodoo.export.files.check_target`.
         root_frame: returns the frame of the poses, when there are some.
         optical: whether that is a camera's optical frame; None: by its name.
         upright: turn every output upright.
@@ -56,9 +56,7 @@ class Spool:
         frames: number of frames.
         states: number of poses of each status.
         persons: numbers of the persons.
-
-    Raises:
-        VoodooError: a path that cannot be written to.
+        paths: see above.
     """
 
     def __init__(
@@ -70,10 +68,8 @@ class Spool:
         upright: bool = False,
         together: int,
     ) -> None:
-        """Check the paths, and make the folder."""
-        for path in paths:
-            check_target(path)
-        self._paths, self._root = list(paths), root_frame
+        """Make the folder."""
+        self.paths, self._root = list(paths), root_frame
         self._optical, self._upright = optical, upright
         self._turn: Turn | None = None
         self._kept_for = [path for path in paths if path != STDOUT]
@@ -111,7 +107,7 @@ class Spool:
 
     def _put_away(self) -> None:
         arrays = dict(self._last())
-        needed = not all(map(is_table, self._paths))
+        needed = not all(map(is_table, self.paths))
         if needed and time.monotonic() - self._bodies_at >= _BODIES_S:
             arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
             arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
@@ -184,7 +180,7 @@ class Spool:
                 failing.extend([path] if path != STDOUT else [])
                 raise
 
-        done, failed = written(self._paths, write)
+        done, failed = written(self.paths, write)
         if not failing:
             self._hidden.remove()
             return done, failed
@@ -248,7 +244,6 @@ def _write(
     left_out: Mapping[str, int],
 ) -> list[Path]:
     """Write one output. A part is in memory at a time, in formats other than .csv and .npz all."""
-    check_target(path)
     if upright and turn.words:
         contents = partial(_turned, contents, turn)
         root_frame, turn = f"{root_frame}{ROOT_SUFFIX}", UNTURNED

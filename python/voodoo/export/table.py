@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError, a_path, columns_in, naming, reading
-from voodoo.stored import MOST_RECORDED, check_stored
+from voodoo.stored import MOST_RECORDED, check_stored, numbers_in
 from voodoo.unpacking import stored_arrays
 from voodoo.whole import appearing_whole
 
@@ -159,10 +159,7 @@ def _read_csv(path: Path) -> Arrays:
             raise VoodooError(f"line {number}: expected {len(header)} cells, found {len(line)}")
         if line[at] not in _STATUSES:
             raise VoodooError(f"line {number}: status: expected one of {', '.join(_STATUSES)}, found {line[at]!r}")
-        try:
-            row[:] = [float(cell or "nan") for cell in (*line[:at], "", *line[at + 1 : last])]
-        except ValueError as error:
-            raise VoodooError(f"line {number}: expected numbers, found {error}") from error
+        row[:] = numbers_in(f"line {number}", (*line[:at], "", *line[at + 1 : last]))
         if not (row[1] >= 1.0 and row[1] % 1.0 == 0.0):
             raise VoodooError(f"line {number}: person: expected an integer from 1, found {row[1]:g}")
     if not np.isfinite(table[:, 0]).all() or np.isinf(table).any():

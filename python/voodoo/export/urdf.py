@@ -7,27 +7,12 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.export.human_frames import FRAMES, human_frames
+from voodoo.export.human_frames import FRAMES, human_frames, turns_of
 from voodoo.export.skeleton import bones, skeleton
 from voodoo.export.track import Track
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
 from voodoo.tracker import Tracker
-
-_X, _Y, _Z = np.eye(3)
-_JOINTS = {"torso": (("waist", _Y),), "head": (("r_head", _X), ("y_head", _Z), ("p_head", -_Y))}
-for _side, _s in (("l", 1.0), ("r", -1.0)):
-    _JOINTS |= {
-        f"{_side}_shoulder": (
-            (f"{_side}_y_shoulder", -_s * _Z),
-            (f"{_side}_p_shoulder", _s * _X),
-            (f"{_side}_r_shoulder", _s * _Z),
-        ),
-        f"{_side}_elbow": ((f"{_side}_elbow", -_Y),),
-        f"{_side}_hip": ((f"{_side}_y_hip", -_Z), (f"{_side}_p_hip", _s * _X), (f"{_side}_r_hip", -_Y)),
-        f"{_side}_knee": ((f"{_side}_knee", -_Y),),
-    }
-"""Frame -> the joints between its parent and it, with their axes, see `voodoo.export.joint_angles`; others are fixed."""
 
 
 def urdf(body: Body, person: str) -> str:
@@ -49,6 +34,10 @@ def urdf(body: Body, person: str) -> str:
     track = Track(np.zeros(1), ("tracking",), np.zeros(1), names, estimate.joint_positions[None], limb_names, poses)
     frames = human_frames(names, track.joints, skeleton(track, body))
     ids, places = [f"{name}_{person}" for name in frames.names], frames.places[0]
+    joints: dict[str, list[tuple[str, npt.NDArray[np.float64]]]] = {}
+    for joint, _, limb, axes, which, sign in turns_of(limb_names):
+        axis = sign * np.eye(3)[axes[which] if axes[which] >= 0 else 1]
+        joints.setdefault(FRAMES.get(limb, limb), []).append((joint, axis))
     robot = ElementTree.Element("robot", name=f"human_{person}")
     limbs = {f"{FRAMES.get(limb.name, limb.name)}_{person}": limb for limb in body.limbs}
     for number, (name, parent) in enumerate(zip(ids, frames.parents, strict=True)):
@@ -64,7 +53,7 @@ def urdf(body: Body, person: str) -> str:
         if parent < 0:
             continue
         offset, above = places[number] - places[parent], ids[parent]
-        turns = _JOINTS.get(name.removesuffix(f"_{person}"), ())
+        turns = joints.get(name.removesuffix(f"_{person}"), ())
         for count, (joint, axis) in enumerate(turns, 1):
             below = name if count == len(turns) else f"{joint}_{person}"
             if below != name:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import MeasurementError
+from voodoo.errors import MeasurementError, of_kind
 from voodoo.ik.values import numbers
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import inverse, rigid
@@ -52,8 +52,7 @@ class Silhouette:
             MeasurementError: the border is no number of pixels, mask or depth have not the camera's size, depths are
                 whole numbers (millimeters) or negative, or the pose is not rigid.
         """
-        if not isinstance(camera, Camera):
-            raise MeasurementError(f"camera: expected a voodoo.Camera, found {camera!r}")
+        of_kind("camera", camera, Camera, MeasurementError)
         person = np.asarray(mask)
         if person.shape != (camera.height, camera.width):
             raise MeasurementError(

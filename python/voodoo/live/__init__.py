@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from voodoo.live.assembly import LiveFrame as LiveFrame
-from voodoo.live.faults import FAULTS as FAULTS
-from voodoo.live.faults import Faults as Faults
 from voodoo.live.follow import Follower as Follower
 from voodoo.live.follow import Step as Step
+from voodoo.live.source import FAULTS as FAULTS
 from voodoo.live.source import Arrival as Arrival
+from voodoo.live.source import Faults as Faults
 from voodoo.live.source import Source as Source
 from voodoo.live.source import SourceEnded as SourceEnded
 from voodoo.live.source import SourceGone as SourceGone

@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.errors import VoodooError
-from voodoo.live.faults import Fault, Faults
-from voodoo.live.source import Arrival
+from voodoo.live.source import Arrival, Fault, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
+from voodoo.pipeline.frozen import unchanged
 from voodoo.recordings.recording import refuse_blank
 
 GAP_S = 1.0
@@ -269,7 +269,7 @@ class Assembler:
             self._refuse_far(item)
             before_image = self._images.get(item.sensor)
             self._images[item.sensor] = item.image
-            if before_image is not None and _same(before_image, item.image):
+            if before_image is not None and unchanged(before_image, item.image):
                 raise Fault("frozen picture", f"{item.sensor}, stamp {item.stamp:.6f}: the same as the image before")
         return item
 
@@ -283,11 +283,3 @@ class Assembler:
                 "wrong unit",
                 f"{item.sensor}, stamp {item.stamp:.6f}: expected meters, found a median of {np.median(meters):.0f}",
             )
-
-
-def _same(before: npt.NDArray[np.generic], image: npt.NDArray[np.generic]) -> bool:
-    # Noise makes the first rows differ, so comparing them suffices.
-    rows = slice(None, None, _STRIDE)
-    if before.shape != image.shape or not np.array_equal(before[rows], image[rows], equal_nan=image.dtype.kind == "f"):
-        return False
-    return np.array_equal(before, image, equal_nan=image.dtype.kind == "f")

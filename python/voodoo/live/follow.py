@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,15 +12,18 @@ import numpy as np
 
 from voodoo._core import Detector, Estimate
 from voodoo.errors import VoodooError
-from voodoo.export.upright import Turn
+from voodoo.export.track import Track
+from voodoo.export.upright import Turn, by_axes, by_floor, lying_words
 from voodoo.live.assembly import LiveFrame
-from voodoo.measurements import FloatArray
+from voodoo.live.stream import Live
+from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
+from voodoo.model.standing import is_optical
 from voodoo.people import People, PeopleEstimate, Person
-from voodoo.pipeline.floor import detections
+from voodoo.pipeline.floor import EVERY, FloorSight, detections
 from voodoo.pipeline.front_end import ONE, FrontEnd
 from voodoo.pipeline.starts import FoundStart, Starts
-from voodoo.sensors.settings import FrontEndSettings
+from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
 from voodoo.tracker import Tracker
 
 GONE_S = 5.0
@@ -158,3 +162,47 @@ class Follower:
             # `People` handles a gap by itself.
             self._numbers = self._most
             self._front = FrontEnd(self._make(), **self._how)
+
+
+_SIGHTS, _LOOKS = 5, 50
+"""After seeing the floor so often, or searching so many frames for it, the search ends."""
+
+
+class Upright:
+    """Finds out how poses are turned: by the floor that is seen in the first frames with a person, until then by the axes.
+
+    Args:
+        live: the sources; told what was found, and what speaks against it.
+    """
+
+    def __init__(self, live: Live) -> None:
+        """Nothing is known yet."""
+        self._live = live
+        self._turn: Turn | None = None
+        self._sight: FloorSight | None = None
+        self._seen: list[Estimate] = []
+        self._steps = 0
+
+    def of(self, step: Step) -> Turn:
+        """How the root frame of a step is turned."""
+        root = self._live.root_frame
+        if self._turn is None:
+            cameras = [item for item in step.frame.measurements if isinstance(item, DepthImage | ColorImage)]
+            own = any(np.array_equal(item.root_from_sensor, np.eye(4)) for item in cameras)
+            optical = is_optical(root) or (own and root not in LEVEL_FRAMES)
+            self._turn = by_axes(root, optical=optical)
+            self._sight = FloorSight() if optical else None
+        there = [one for one in step.estimates.values() if one.joints]
+        self._steps += bool(there)
+        if not there or self._steps % EVERY or self._steps > _LOOKS * EVERY:
+            return self._turn
+        self._seen.append(there[0])
+        if self._sight is not None:
+            with suppress(VoodooError):  # tracking reports damage
+                self._sight.look(step.frame)
+            if len(self._sight.planes) >= _SIGHTS and (floor := self._sight.floor) is not None:
+                self._turn, self._sight = by_floor(floor, optical=True), None
+                self._live.faults.log(f"outputs are turned upright {self._turn.words}")
+        if len(self._seen) == 2 * _SIGHTS and (words := lying_words(Track.of(self._seen), root, self._turn)):
+            self._live.faults.log(words)
+        return self._turn

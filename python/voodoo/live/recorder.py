@@ -12,7 +12,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from voodoo.errors import VoodooError
-from voodoo.export.ros2 import STORE, cdr, description, instant, person_id, tracked, transforms_message
+from voodoo.export import ros2
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, LaserScan, Measurement, PointCloud
@@ -63,16 +63,16 @@ class Recorder(Output):
         for item in sorted(step.frame.measurements, key=lambda item: item.stamp == step.stamp):
             self._write_item(item)
         for number, estimate in step.estimates.items():
-            person = person_id(number)
+            person = ros2.person_id(number)
             how: Any = {"root_frame": self._root(), "person": person, "turn": step.turn}
-            messages = instant(estimate, step.bodies[number], **how)
+            messages = ros2.instant(estimate, step.bodies[number], **how)
             if estimate.joints and person not in self._described:
-                messages |= description(step.bodies[number], person)
+                messages |= ros2.description(step.bodies[number], person)
                 self._described.add(person)
             for topic, message in messages.items():
                 self._write(topic, message)
-        there = [person_id(number) for number, one in step.estimates.items() if one.joints]
-        for topic, message in tracked(step.stamp, there, root_frame=self._root()).items():
+        there = [ros2.person_id(number) for number, one in step.estimates.items() if one.joints]
+        for topic, message in ros2.tracked(step.stamp, there, root_frame=self._root()).items():
             self._write(topic, message)
 
     def _write_item(self, item: Measurement) -> None:
@@ -90,9 +90,9 @@ class Recorder(Output):
 
     def _write(self, topic: str, message: Any) -> None:  # noqa: ANN401
         if topic not in self._topics:
-            self._topics[topic] = self._writer.add_connection(topic, message.__msgtype__, typestore=STORE)
+            self._topics[topic] = self._writer.add_connection(topic, message.__msgtype__, typestore=ros2.STORE)
         self._at += 1
-        self._writer.write(self._topics[topic], self._at, cdr(message))
+        self._writer.write(self._topics[topic], self._at, ros2.cdr(message))
 
     def close(self) -> None:
         """Finish the file.
@@ -113,12 +113,12 @@ class Recorder(Output):
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
     """A tf2_msgs/TFMessage of one transform (4, 4)."""
     row = [*parent_from_child[:3, 3].tolist(), *quaternions(parent_from_child[:3, :3]).tolist()]
-    return transforms_message(round(stamp * 1e9), [(parent, child, row)])
+    return ros2.transforms_message(round(stamp * 1e9), [(parent, child, row)])
 
 
 def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
     """A sensor_msgs/CameraInfo."""
-    return _new(
+    return ros2.new(
         "sensor_msgs/msg/CameraInfo",
         header=header,
         height=camera.height,
@@ -128,9 +128,6 @@ def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
         k=camera.matrix.ravel(),
         r=np.eye(3).ravel(),
         p=np.pad(camera.matrix, ((0, 0), (0, 1))).ravel(),
-        binning_x=0,
-        binning_y=0,
-        roi=_new("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
     )
 
 
@@ -140,13 +137,12 @@ def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
         image = np.where(image > 0, image * np.float64(item.meters_per_unit), np.nan).astype(np.float32)
     elif image.dtype.kind == "f" and item.meters_per_unit != 1.0:
         image = (image * item.meters_per_unit).astype(np.float32)
-    return _new(
+    return ros2.new(
         "sensor_msgs/msg/Image",
         header=header,
         height=image.shape[0],
         width=image.shape[1],
         encoding="16UC1" if image.dtype.kind == "u" else "32FC1",
-        is_bigendian=0,
         step=image.shape[1] * image.dtype.itemsize,
         data=np.ascontiguousarray(image).view(np.uint8).ravel(),
     )
@@ -154,22 +150,21 @@ def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
 
 def _color(header: Any, item: ColorImage) -> Any:  # noqa: ANN401
     _, data = cv2.imencode(".jpg", item.image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    return _new("sensor_msgs/msg/CompressedImage", header=header, format="bgr8; jpeg compressed bgr8", data=data)
+    return ros2.new("sensor_msgs/msg/CompressedImage", header=header, format="bgr8; jpeg compressed bgr8", data=data)
 
 
 def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
     points = np.ascontiguousarray(item.points, dtype=np.float32)
     fields = [
-        _new("sensor_msgs/msg/PointField", name=name, offset=4 * index, datatype=7, count=1)
+        ros2.new("sensor_msgs/msg/PointField", name=name, offset=4 * index, datatype=7, count=1)
         for index, name in enumerate("xyz")
     ]
-    return _new(
+    return ros2.new(
         "sensor_msgs/msg/PointCloud2",
         header=header,
         height=1,
         width=len(points),
         fields=fields,
-        is_bigendian=False,
         point_step=12,
         row_step=12 * len(points),
         data=points.view(np.uint8).ravel(),
@@ -178,18 +173,15 @@ def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
 
 
 def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
-    return _new(
+    return ros2.new(
         "sensor_msgs/msg/LaserScan",
         header=header,
         angle_min=item.angle_min,
         angle_max=item.angle_min + item.angle_increment * (len(item.ranges) - 1),
         angle_increment=item.angle_increment,
-        time_increment=0.0,
-        scan_time=0.0,
         range_min=item.range_min,
         range_max=item.range_max,
         ranges=item.ranges.astype(np.float32),
-        intensities=np.empty(0, dtype=np.float32),
     )
 
 
@@ -201,11 +193,5 @@ _WRITTEN: dict[type, tuple[str, Callable[[Any, Any], Any]]] = {
 }
 
 
-def _new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
-    return STORE.types[kind](**fields)
-
-
 def _header(stamp: float, frame: str) -> Any:  # noqa: ANN401
-    seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
-    time = _new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
-    return _new("std_msgs/msg/Header", stamp=time, frame_id=frame)
+    return ros2.header_at(round(stamp * 1e9), frame)

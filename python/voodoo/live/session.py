@@ -14,11 +14,10 @@ import numpy as np
 
 from voodoo.errors import VoodooError, reason
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.follow import Follower, Step
+from voodoo.live.follow import Follower, Step, Upright
 from voodoo.live.latencies import Latencies
 from voodoo.live.mailbox import Mailbox
 from voodoo.live.stream import Live
-from voodoo.live.upright import Upright
 from voodoo.measurements import FloatArray
 from voodoo.pipeline.run import decodable
 

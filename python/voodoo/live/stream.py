@@ -10,9 +10,8 @@ from typing import Any, Literal, TypeAlias
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.live.assembly import Assembler, LiveFrame
 from voodoo.live.clock import Clock, HostClock
-from voodoo.live.faults import Faults
 from voodoo.live.mailbox import Inbox, Mailbox
-from voodoo.live.source import Arrival, Source, SourceEnded, SourceGone
+from voodoo.live.source import Arrival, Faults, Source, SourceEnded, SourceGone
 from voodoo.measurements import FloatArray
 from voodoo.sensors.keypoints.networks import KeypointNetwork
 

@@ -217,6 +217,19 @@ def numbers_or_nan(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
         return np.array([np.nan])
 
 
+def corners(what: str, box: object, error: type[VoodooError]) -> tuple[list[float], list[float]]:
+    """The low and the high corner (3,) [m] of a box given by the caller.
+
+    Raises:
+        VoodooError: of the class `error`, for other values, or a box without inside; names `what`.
+    """
+    found = numbers_or_nan(box)  # type: ignore[arg-type]
+    if found.shape != (2, 3) or not np.isfinite(found).all() or not (found[0] < found[1]).all():
+        raise error(f"{what}: expected two corners of three meters, the lower one first, found {short(box)}")
+    low, high = found.tolist()
+    return low, high
+
+
 def short(value: object) -> str:
     """A value as text for a message."""
     try:

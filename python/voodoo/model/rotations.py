@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
 
 FloatArray = npt.NDArray[np.float64]
-
-_NO_TURN = 1e-3
-"""Below this angle [rad] a series is used instead of a division by it."""
 
 
 def quaternions(rotations: FloatArray) -> FloatArray:
@@ -40,47 +38,19 @@ def matrix_of_quaternion(quaternion: tuple[float, float, float, float]) -> Float
 
 def matrix_of_turn(turn: npt.ArrayLike) -> FloatArray:
     """The rotation matrix (3, 3) of an axis times an angle (3,) [rad]."""
-    return matrix_of_quaternion(_quaternion_of_turn(*(float(value) for value in np.asarray(turn))))
-
-
-def _quaternion_of_turn(x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    angle = math.sqrt(x * x + y * y + z * z)
-    squared = angle * angle
-    scale = 0.5 - squared / 48.0 + squared * squared / 3840.0 if angle <= _NO_TURN else math.sin(angle / 2.0) / angle
-    return scale * x, scale * y, scale * z, math.cos(angle / 2.0)
-
-
-def _turn_of_quaternion(x: float, y: float, z: float, w: float) -> tuple[float, float, float]:
-    # Of the two quaternions of a rotation, the one with an angle of at most pi.
-    if w < 0.0 or (w == 0.0 and (x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0))))):
-        x, y, z, w = -x, -y, -z, -w
-    angle = 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), w)
-    squared = angle * angle
-    scale = (
-        2.0 + squared / 12.0 + 7.0 * squared * squared / 2880.0 if angle <= _NO_TURN else angle / math.sin(angle / 2.0)
-    )
-    return scale * x, scale * y, scale * z
-
-
-def _product(
-    p: tuple[float, float, float, float], q: tuple[float, float, float, float]
-) -> tuple[float, float, float, float]:
-    px, py, pz, pw = p
-    qx, qy, qz, qw = q
-    x = pw * qx + qw * px + (py * qz - pz * qy)
-    y = pw * qy + qw * py + (pz * qx - px * qz)
-    z = pw * qz + qw * pz + (px * qy - py * qx)
-    w = pw * qw - px * qx - py * qy - pz * qz
-    length = math.sqrt(x * x + y * y + z * z + w * w)
-    return x / length, y / length, z / length, w / length
+    return np.asarray(cv2.Rodrigues(np.asarray(turn, dtype=np.float64))[0], dtype=np.float64)
 
 
 def turned_between(first: FloatArray, second: FloatArray, fraction: float) -> FloatArray:
     """Interpolated rotation (3, 3) at a fraction, 0 to 1, with constant angular velocity about one axis."""
-    (ax, ay, az, aw), (bx, by, bz, bw) = quaternions(np.array([first, second])).tolist()
-    turn = _turn_of_quaternion(*_product((-ax, -ay, -az, aw), (bx, by, bz, bw)))
-    x, y, z = (value * fraction for value in turn)
-    return matrix_of_quaternion(_product((ax, ay, az, aw), _quaternion_of_turn(x, y, z)))
+    start, end = quaternions(np.array([first, second]))
+    end = end if start @ end >= 0.0 else -end
+    angle = 2.0 * math.atan2(float(np.linalg.norm(end - start)), float(np.linalg.norm(end + start)))
+    # np.sinc(x / pi) is sin(x) / x, also at 0.
+    shares = [part * np.sinc(part * angle / math.pi) for part in (1.0 - fraction, fraction)]
+    x, y, z, w = shares[0] * start + shares[1] * end
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return matrix_of_quaternion((x / length, y / length, z / length, w / length))
 
 
 def euler_angles(rotations: FloatArray, order: str) -> FloatArray:

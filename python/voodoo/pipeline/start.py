@@ -26,9 +26,8 @@ from voodoo.pipeline.starts.legs import legs_body, serves
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.recording import Recording
 from voodoo.recordings.truth import FirstPose
-from voodoo.sensors.kinds import inputs_of
 from voodoo.sensors.markers import body_with_markers
-from voodoo.sensors.settings import inputs_for
+from voodoo.sensors.settings import inputs_for, inputs_in
 from voodoo.stored import MOST_METADATA, read_stored
 from voodoo.tracker import Tracker
 
@@ -246,8 +245,7 @@ def _upright(body: Body) -> float:
 
 def used_kinds(recording: Recording, use: Sequence[str] | None) -> set[str]:
     """Kinds of inputs that a recording has and that are used."""
-    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
-    return has & set(use if use is not None else inputs_for(recording))
+    return inputs_in(recording) & set(use if use is not None else inputs_for(recording))
 
 
 def check_findable(recording: Recording, tracker: Tracker | People, use: Sequence[str] | None) -> None:

@@ -18,7 +18,7 @@ from voodoo.errors import CameraError, RecordingError, installed, naming, readin
 from voodoo.measurements import ColorImage, DepthImage, FloatArray, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.model.joint import short
-from voodoo.model.transforms import pose_of
+from voodoo.model.transforms import is_rigid, pose_of
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.pictures import decode_color
 from voodoo.recordings.recording import Recording, SensorInfo, usable
@@ -189,7 +189,6 @@ def _pose(path: Path, cameras: dict[str, Any], purpose: str) -> FloatArray:
     with reading(f"{path}, calibration", f"{purpose} with a rigid transform from the depth camera"):
         turn, place = (list(map(float, cameras[purpose]["Rt"][name])) for name in ("Rotation", "Translation"))
         pose = pose_of(np.reshape(turn, (3, 3)), place)
-        off = np.abs(pose[:3, :3] @ pose[:3, :3].T - np.eye(3)).max()
-        if not off < 1e-3 or not np.isfinite(pose).all() or np.linalg.det(pose) < 0.0:
-            raise ValueError(f"a rotation with products of rows off by {off:.2g}")
+        if not is_rigid(pose, off=1e-3):
+            raise ValueError(f"no rotation: {turn}")
         return pose

@@ -7,16 +7,17 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
+from pydantic import Field, StrictBool
 from ruamel.yaml import YAML
 
 from voodoo.errors import CameraError, RecordingError, naming, reading
 from voodoo.measurements import FloatArray
 from voodoo.model.camera import Camera
-from voodoo.model.joint import numbers_or_nan, short
+from voodoo.model.joint import Strict, numbers_or_nan, short, valid
 from voodoo.model.toml_io import parse_toml, read_text
 from voodoo.model.transforms import is_rigid, pose_of
 from voodoo.recordings.mcap_file import is_plain_yaml
@@ -187,11 +188,44 @@ def _chain(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     return tables
 
 
-T = TypeVar("T")
-_CAMERA_KEYS = ("width", "height", "fx", "fy", "cx", "cy")
-_OPTIONAL_KEYS = ("distortion", "model", "mirrored", "sensor_frame", "root_from_sensor")
 _ROUNDING, _TYPED = 1e-9, 2e-3
 """Tolerances for the deviation of a matrix from a rotation: by rounding of doubles, and with three typed digits."""
+
+
+class _Placed(Strict):
+    """The entries for a camera in a calibration.toml."""
+
+    width: Any
+    height: Any
+    fx: Any
+    fy: Any
+    cx: Any
+    cy: Any
+    distortion: tuple[Any, ...] = ()
+    model: Any = "plumb_bob"
+    mirrored: StrictBool = False
+    sensor_frame: str | None = None
+    root_from_sensor: Any = None
+
+    def placed(self, kind: str, where: str) -> PlacedCamera:
+        """The camera, checked.
+
+        Raises:
+            RecordingError: invalid numbers; `where` begins the message.
+        """
+        with naming(where, CameraError, error=RecordingError):
+            size, focal, middle = (self.width, self.height), (self.fx, self.fy), (self.cx, self.cy)
+            camera = Camera(*size, *focal, *middle, self.distortion, self.model)
+        name = self.sensor_frame or f"camera_{kind}_optical_frame"
+        return PlacedCamera(name, camera, _pose(self.root_from_sensor, where), self.mirrored)
+
+
+class _Calibration(_Placed):
+    """A calibration.toml: the camera of the depth images, and what else it says."""
+
+    depth_factor: Annotated[float, Field(strict=True, gt=0.0, lt=1e9)] = 5000.0
+    root_frame: str | None = None
+    color: _Placed | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,26 +270,20 @@ def read_calibration(path: Path, *, like: Path | None = None) -> FolderCalibrati
         RecordingError: missing, not TOML, or a key is missing, unknown or out of range.
     """
     if not path.is_file():
-        if path.parent.is_dir() and (found := _from_yaml(path.parent)):
-            return found
+        if path.parent.is_dir() and (only := _from_yaml(path.parent)):
+            return only
         hint = f"Write {path} with the numbers of the camera:\n\n{template(like)}"
         raise RecordingError(f"{path}: expected a calibration file beside the images, found none", hint=hint)
     content = parse_toml(read_text(path, error=RecordingError), source=str(path), error=RecordingError)
-    tables = {"depth", "color"}
-    _check_keys(content, {*_CAMERA_KEYS, *_OPTIONAL_KEYS, "depth_factor", "root_frame", "color"}, str(path))
-    depth = _camera({key: value for key, value in content.items() if key not in tables}, "depth", str(path))
-    factor = content.get("depth_factor", 5000.0)
-    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not 0.0 < factor < 1e9:
-        raise RecordingError(f"{path}: depth_factor: expected units per meter > 0, found {short(factor)}")
-    color = None
-    if "color" in content:
-        table = _entry(content, "color", dict, {}, "a table", str(path))
-        _check_keys(table, {*_CAMERA_KEYS, *_OPTIONAL_KEYS}, f"{path}, [color]")
-        color = _camera(table, "color", f"{path}, [color]")
+    with valid(
+        path, RecordingError, known=(*_Placed.model_fields, "outside [color] depth_factor", "root_frame", "color")
+    ):
+        found = _Calibration.model_validate(content)
+    depth = found.placed("depth", str(path))
+    color = None if found.color is None else found.color.placed("color", f"{path}, [color]")
     unmoved = np.array_equal(depth.world_from_sensor, np.eye(4))
-    otherwise = depth.name if unmoved else "root"
-    root_frame = _entry(content, "root_frame", str, otherwise, "a name", str(path))
-    return FolderCalibration(root_frame, float(factor), depth, color)
+    root_frame = found.root_frame or (depth.name if unmoved else "root")
+    return FolderCalibration(root_frame, found.depth_factor, depth, color)
 
 
 def _from_yaml(folder: Path) -> FolderCalibration | None:
@@ -266,41 +294,6 @@ def _from_yaml(folder: Path) -> FolderCalibration | None:
         return None
     frame = "camera_depth_optical_frame"
     return FolderCalibration(frame, 1000.0, PlacedCamera(frame, camera_of(*tables[0]), np.eye(4)), None)
-
-
-def _check_keys(table: dict[str, Any], known: set[str], where: str) -> None:
-    unknown = sorted(set(table) - known)
-    missing = [key for key in _CAMERA_KEYS if key not in table]
-    if unknown or missing:
-        raise RecordingError(
-            f"{where}: expected the keys {', '.join(_CAMERA_KEYS)} and optionally "
-            f"{', '.join(sorted(known - set(_CAMERA_KEYS)))}; found missing {missing}, unknown {unknown}"
-        )
-
-
-def _entry(table: dict[str, Any], key: str, kind: type[T], otherwise: T, expected: str, where: str) -> T:
-    """An entry of a kind.
-
-    Raises:
-        RecordingError: it is of another one.
-    """
-    value = table.get(key, otherwise)
-    if not isinstance(value, kind):
-        raise RecordingError(f"{where}: {key}: expected {expected}, found {short(value)}")
-    return value
-
-
-def _camera(table: dict[str, Any], kind: str, where: str) -> PlacedCamera:
-    distortion = _entry(table, "distortion", list, [], "a list of numbers", where)
-    with naming(where, CameraError, error=RecordingError):
-        camera = Camera(
-            **{key: table[key] for key in _CAMERA_KEYS},
-            distortion=tuple(distortion),
-            model=table.get("model", "plumb_bob"),
-        )
-    frame = _entry(table, "sensor_frame", str, f"camera_{kind}_optical_frame", "a name", where)
-    mirrored = _entry(table, "mirrored", bool, False, "true or false", where)
-    return PlacedCamera(frame, camera, _pose(table.get("root_from_sensor"), where), mirrored)
 
 
 def _pose(rows: Any, where: str) -> FloatArray:  # noqa: ANN401 - checked here

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from voodoo.errors import VoodooError
-from voodoo.measurements import ColorImage, DepthImage
+from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.recording import Recording, RecordingInfo
 
@@ -18,12 +18,33 @@ _FRAMES = 10
 """Frames in which the first images are looked for."""
 _LEAST_DEG, _MOST_DEG = 30.0, 150.0
 """Fields of view that depth cameras have."""
-_IMAGES = 5
-"""Number of images at the start that are searched for valid depths."""
 _NEAR_M, _FAR_M = 1.2, 8.0
 """Plausible depths of a camera that observes a person: some are beyond the first limit, and the median is below the second."""
 FIXED_FRAMES = ("odom", "map", "world")
 """Root frames that stay where they are while a robot drives."""
+
+
+@dataclass(frozen=True)
+class DepthRange:
+    """Depths [m] of an image: the nearest 5 %, the middle, the farthest 5 %."""
+
+    near: float
+    middle: float
+    far: float
+
+    def __str__(self) -> str:
+        """Readable line."""
+        return f"{self.near:.2f} to {self.far:.2f} m (90 % of the first image, half of it before {self.middle:.2f} m)"
+
+    @property
+    def warning(self) -> str:
+        """Description of the problem if depths are too small or too large for a person; "" otherwise."""
+        if self.near < self.far < _NEAR_M or self.middle > _FAR_M:
+            return (
+                f"depths of {self.near:.2f} to {self.far:.2f} m leave no room for a person: is the unit right? "
+                "(depth_factor of calibration.toml: 1000 for millimeters; --option meters_per_unit=0.001 of a bag)"
+            )
+        return ""
 
 
 @dataclass(frozen=True)
@@ -37,6 +58,7 @@ class FirstImage:
         bits: of a value, e.g. "16-bit unsigned".
         meters_per_unit: scale of depth; None for color.
         field_of_view: horizontal and vertical [deg], by the calibration.
+        depths: their range; None for color, and where nothing returned.
     """
 
     sensor: str
@@ -45,6 +67,7 @@ class FirstImage:
     bits: str
     meters_per_unit: float | None
     field_of_view: tuple[float, float]
+    depths: DepthRange | None = None
 
     def __str__(self) -> str:
         """One line."""
@@ -82,7 +105,18 @@ def _of(item: DepthImage | ColorImage) -> FirstImage:
         bits=f"{8 * image.dtype.itemsize}-bit {kind}",
         meters_per_unit=item.meters_per_unit if isinstance(item, DepthImage) else None,
         field_of_view=(next(angles), next(angles)),
+        depths=_range_of(item.meters()) if isinstance(item, DepthImage) else None,
     )
+
+
+def _range_of(meters: FloatArray) -> DepthRange | None:
+    known = meters[np.isfinite(meters)]
+    return DepthRange(*np.percentile(known, (5.0, 50.0, 95.0)).tolist()) if known.size else None
+
+
+def depths_of(images: Sequence[FirstImage]) -> DepthRange | None:
+    """The range of the first image with depths."""
+    return next((image.depths for image in images if image.depths is not None), None)
 
 
 def doubts(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage] = ()) -> list[str]:
@@ -106,41 +140,3 @@ def doubts(about: RecordingInfo, left_out: LeftOut, images: Sequence[FirstImage]
             "needs odometry, or what stands still seems to move"
         )
     return found
-
-
-@dataclass(frozen=True)
-class DepthRange:
-    """Depths [m] of an image: the nearest 5 %, the middle, the farthest 5 %."""
-
-    near: float
-    middle: float
-    far: float
-
-    def __str__(self) -> str:
-        """Readable line."""
-        return f"{self.near:.2f} to {self.far:.2f} m (90 % of the first image, half of it before {self.middle:.2f} m)"
-
-    @property
-    def warning(self) -> str:
-        """Description of the problem if depths are too small or too large for a person; "" otherwise."""
-        if self.near < self.far < _NEAR_M or self.middle > _FAR_M:
-            return (
-                f"depths of {self.near:.2f} to {self.far:.2f} m leave no room for a person: is the unit right? "
-                "(depth_factor of calibration.toml: 1000 for millimeters; --option meters_per_unit=0.001 of a bag)"
-            )
-        return ""
-
-
-def depth_range(recording: Recording) -> DepthRange | None:
-    """The range of the first depth image with valid depths; None without one, or if it cannot be read."""
-    try:
-        for recorded in islice(recording, _IMAGES):
-            for item in recorded.measurements:
-                if isinstance(item, DepthImage):
-                    meters = item.meters()
-                    if (meters := meters[np.isfinite(meters)]).size:
-                        near, middle, far = (float(value) for value in np.percentile(meters, (5.0, 50.0, 95.0)))
-                        return DepthRange(near, middle, far)
-    except VoodooError:
-        return None  # reading the frames reports the error
-    return None

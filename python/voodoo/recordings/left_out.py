@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 
@@ -56,14 +56,9 @@ class LeftOut:
         """Number of left-out measurements."""
         return sum(self.counts.values())
 
-    @staticmethod
-    def words(counts: Mapping[str, int]) -> str:
-        """Counts and reasons in one line."""
-        return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items()))
-
     def __str__(self) -> str:
         """Counts and reasons in one line."""
-        return self.words(self.counts)
+        return ", ".join(f"{count} {reason}" for reason, count in sorted(self.counts.items()))
 
 
 def leave_out(left_out: LeftOut | None, error: RecordingError, reason: str = "", count: int = 1) -> None:

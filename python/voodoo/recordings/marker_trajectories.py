@@ -15,7 +15,7 @@ import numpy as np
 
 from voodoo.errors import RecordingError, reading, shortened
 from voodoo.measurements import FloatArray
-from voodoo.stored import read_stored, read_stored_text
+from voodoo.stored import numbers_in, read_stored, read_stored_text
 
 Z_UP_FROM_Y_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation from OpenSim's axes (X forward, Y up, Z to the right) to REP-103's order of axes (Z up): (x, y, z) = (Z,
@@ -137,10 +137,7 @@ def read_trc(path: str | Path) -> MarkerTrajectories:
             cells.pop()
         if len(cells) > len(row) or len(cells) < 2:
             raise RecordingError(f"{path}, line {number}: expected {len(row)} columns, found {len(cells)}")
-        try:
-            row[: len(cells)] = [float(cell) if cell else math.nan for cell in cells]
-        except ValueError as error:
-            raise RecordingError(f"{path}, line {number}: expected numbers, found {error}") from error
+        row[: len(cells)] = numbers_in(f"{path}, line {number}", cells)
     stamps = table[:, 1].copy()
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0.0).any():
         raise RecordingError(f"{path}: expected rising times in the second column, found others")

@@ -10,7 +10,7 @@ import numpy as np
 
 from voodoo.errors import MeasurementError, RecordingError, naming
 from voodoo.measurements import KeypointImage, RecordedFrame
-from voodoo.recordings.camera_files import read_camera_toml, tables_of
+from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml, tables_of
 from voodoo.recordings.keypoint_check import check_keypoints, some_of, taken_layout
 from voodoo.recordings.keypoint_files import read_people
 from voodoo.recordings.keypoint_layouts import layout_of
@@ -83,17 +83,7 @@ class Pose2SimRecording(Recording):
         scale = number_option(path, "meters_per_unit", meters_per_unit, "a length > 0", most=1e3)
         placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)
         folders = keypoint_folders(path)
-        pairs = matched([camera.name for camera in placed], [folder.name.removesuffix("_json") for folder in folders])
-        if pairs is None:
-            raise RecordingError(
-                f"{path}: expected folders keypoints/*_json with the names of cameras or as many as cameras "
-                f"({', '.join(one.name for one in placed)}), found {', '.join(folder.name for folder in folders) or 'none'}"
-            )
-        names = [placed[camera].name for camera, _ in pairs]
-        unknown = sorted(set(cameras or ()) - set(names))
-        if unknown or cameras == ():
-            raise RecordingError(f"{path}: cameras: expected some of {', '.join(names)}, found {cameras}")
-        chosen = [(placed[a], folders[b]) for a, b in pairs if cameras is None or placed[a].name in cameras]
+        chosen = cameras_of(path, placed, folders, ("a folder keypoints/*_json", "cameras"), cameras)
         self.cameras = tuple(camera for camera, _ in chosen)
         self._folders = tuple(folder for _, folder in chosen)
         self._files, self._notes = _rows_of(path, self._folders)
@@ -151,6 +141,45 @@ class Pose2SimRecording(Recording):
         for one, folder in zip(self.cameras, self._folders, strict=True):
             detail = f"{self.layout} keypoints of {folder.relative_to(self.path)}"
             yield SensorInfo.of(one.name, "keypoints", one.name, self._stamps, detail)
+
+
+def cameras_of(
+    path: Path,
+    placed: Sequence[PlacedCamera],
+    sources: Sequence[Path],
+    words: tuple[str, str],
+    chosen: str | Sequence[str] | None,
+) -> list[tuple[PlacedCamera, Path]]:
+    """Cameras and what each has recorded, in the order of the calibration; those that are chosen, in that order.
+
+    Args:
+        path: folder of the recording.
+        placed: calibrated cameras.
+        sources: a file or folder of each.
+        words: what the sources are, and the name of the option `chosen`, for errors.
+        chosen: names of cameras or of their sources; None: all.
+
+    Raises:
+        RecordingError: neither names nor numbers match, or a chosen one does not exist.
+    """
+    own = [each.name.removesuffix("_json") if each.is_dir() else each.stem for each in sources]
+    found = matched([camera.name for camera in placed], own)
+    if found is None:
+        raise RecordingError(
+            f"{path}: expected {words[0]} for each camera, by its name or as many as there are cameras "
+            f"({', '.join(one.name for one in placed)}), found {', '.join(one.name for one in sources) or 'none'}"
+        )
+    pairs = [(placed[camera], sources[source]) for camera, source in found]
+    if chosen is None:
+        return pairs
+    names = [chosen] if isinstance(chosen, str) else list(chosen)
+    known = {
+        name: pair for pair in pairs for name in (pair[1].relative_to(path).as_posix(), pair[1].stem, pair[0].name)
+    }
+    if (unknown := [name for name in names if name not in known]) or not names:
+        some = ", ".join(camera.name for camera, _ in pairs)
+        raise RecordingError(f"{path}: {words[1]}: expected some of {some}, found {', '.join(unknown) or 'none'}")
+    return [known[name] for name in dict.fromkeys(names)]
 
 
 def _rows_of(path: Path, folders: Sequence[Path]) -> tuple[list[tuple[Path | None, ...]], tuple[str, ...]]:

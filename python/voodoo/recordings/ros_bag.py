@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-import weakref
 import zipfile
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -149,8 +148,8 @@ class Bag:
         self._reader: BagFile | None = None
         folder = path
         if path.suffix == ".zip":
-            folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
-            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+            self._unpacked_to = tempfile.TemporaryDirectory(prefix="voodoo-", ignore_cleanup_errors=True)
+            folder = Path(self._unpacked_to.name)
             _unpack(path, folder, unpacked)
         self._folder = folder
         with self._naming():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import sqlite3
 import tempfile
-import weakref
 from collections.abc import Collection, Iterator
 from functools import lru_cache, partial
 from pathlib import Path
@@ -31,21 +30,14 @@ DAMAGED = "in a damaged part of the file"
 """Reason of messages that are left out."""
 
 
-class _Copy:
-    """A copy of a file and its log, which exists as long as this object."""
-
-    def __init__(self, path: Path, log: Path) -> None:
-        folder = Path(tempfile.mkdtemp(prefix="voodoo-"))
-        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self.path = folder / "bag.db3"
-        shutil.copyfile(path, self.path)
-        shutil.copyfile(log, self.path.with_name("bag.db3-wal"))
-
-
 @lru_cache(maxsize=1)
-def _copied(path: Path, log: Path, _state: tuple[int, ...]) -> _Copy:
-    """The copy of files in a state; a bag is opened several times."""
-    return _Copy(path, log)
+def _copied(path: Path, log: Path, _state: tuple[int, ...]) -> tempfile.TemporaryDirectory[str]:
+    """A folder with a copy of a file and its log in a state, which exists as long as this object; a bag is opened several
+    times."""
+    folder = tempfile.TemporaryDirectory(prefix="voodoo-", ignore_cleanup_errors=True)
+    shutil.copyfile(path, Path(folder.name) / "bag.db3")
+    shutil.copyfile(log, Path(folder.name) / "bag.db3-wal")
+    return folder
 
 
 class SqliteFile:
@@ -65,7 +57,7 @@ class SqliteFile:
         self.connections: list[Connection] = []
         self.metadata = ReaderMetadata(0, 2**63 - 1, 0, 0, None, None, None, None)
         self._base: sqlite3.Connection | None = None
-        self._copy: _Copy | None = None
+        self._copy: tempfile.TemporaryDirectory[str] | None = None
 
     def open(self) -> None:
         """Check the schema, and read topics and times.
@@ -107,7 +99,7 @@ class SqliteFile:
                 states = [part.stat() for part in (path, log)]
                 state = tuple(number for found in states for number in (found.st_ino, found.st_size, found.st_mtime_ns))
                 self._copy = _copied(path, log, state)
-                path, options = self._copy.path, "mode=rw"
+                path, options = Path(self._copy.name) / "bag.db3", "mode=rw"
         base = sqlite3.connect(f"file:{quote(str(path.absolute()))}?{options}", uri=True, check_same_thread=False)
         base.execute("PRAGMA trusted_schema=OFF")
         base.execute("PRAGMA query_only=ON")

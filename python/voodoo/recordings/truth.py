@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from array import array
 from collections.abc import Callable
 from functools import partial
@@ -21,7 +20,7 @@ from voodoo.model.projection import transform
 from voodoo.recordings.left_out import LeftOut
 from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording, Reference, Start
-from voodoo.stored import MOST_BYTES, MOST_METADATA, read_stored_text
+from voodoo.stored import MOST_BYTES, MOST_METADATA, numbers_in, read_stored_text
 
 OWN_ROOTS = ("base_link", "world")
 """The default root frame of a recording is the first of these in its transforms; the files are in it."""
@@ -75,10 +74,7 @@ def read_positions(path: Path, first: tuple[str, ...]) -> tuple[tuple[str, ...],
         for line, row in enumerate(rows, start=2):
             if len(row) != len(header):
                 raise RecordingError(f"{path}, line {line}: expected {len(header)} cells, found {len(row)}")
-            try:
-                cells.extend(float(cell) if cell else math.nan for cell in row)
-            except ValueError as error:
-                raise RecordingError(f"{path}, line {line}: expected numbers, found {error}") from error
+            cells.extend(numbers_in(f"{path}, line {line}", row))
     if not cells:
         raise RecordingError(f"{path}: expected a header and at least one row, found {int(bool(header))} lines")
     return names, np.array(cells).reshape(-1, len(header))

@@ -18,9 +18,9 @@ from voodoo.recordings.camera_files import PlacedCamera, read_camera_toml
 from voodoo.recordings.empty_scene import FOLDER, PICTURES, EmptyScene
 from voodoo.recordings.folder import FrameClock
 from voodoo.recordings.left_out import LeftOut
-from voodoo.recordings.order import in_order, matched
+from voodoo.recordings.order import in_order
 from voodoo.recordings.pictures import decode_color, picture_size
-from voodoo.recordings.pose2sim import FRAME, calibration_of, read_triangulation
+from voodoo.recordings.pose2sim import FRAME, calibration_of, cameras_of, read_triangulation
 from voodoo.recordings.recording import Recording, SensorInfo, number_option
 from voodoo.recordings.together import together
 from voodoo.recordings.truth import find_beside, read_beside
@@ -224,7 +224,7 @@ class VideosRecording(Recording):
         )
         clock = FrameClock(rate)
         self._cameras: list[Pictures] = []
-        for camera, source in _chosen(path, _matched(path, placed, sources), color_topic):
+        for camera, source in cameras_of(path, placed, sources, ("a video", "color_topic"), color_topic):
             sensor = source.relative_to(path).as_posix()
             if source.is_dir():
                 self._cameras.append(of_folder(pictures_in(source), sensor, camera, clock))
@@ -275,41 +275,3 @@ def _is_source(item: Path) -> bool:
     if item.is_dir():
         return item.name not in (*_OTHERS, *_ROOMS) and bool(pictures_in(item))
     return item.suffix.lower() in VIDEOS
-
-
-def _matched(path: Path, placed: Sequence[PlacedCamera], sources: Sequence[Path]) -> list[tuple[PlacedCamera, Path]]:
-    """Each video with its camera, in the order of the calibration file.
-
-    Raises:
-        RecordingError: neither the names nor the numbers match.
-    """
-    pairs = matched([camera.name for camera in placed], [source.stem for source in sources])
-    if pairs is not None:
-        return [(placed[camera], sources[source]) for camera, source in pairs]
-    raise RecordingError(
-        f"{path}: expected a video for each camera, by its name or as many as there are cameras "
-        f"({', '.join(camera.name for camera in placed)}), found {', '.join(source.name for source in sources)}"
-    )
-
-
-def _chosen(
-    path: Path, pairs: list[tuple[PlacedCamera, Path]], names: str | Sequence[str] | None
-) -> list[tuple[PlacedCamera, Path]]:
-    """The requested ones, by the name of the camera or of its video.
-
-    Raises:
-        RecordingError: one does not exist.
-    """
-    if names is None:
-        return pairs
-    expected = [names] if isinstance(names, str) else list(names)
-    known = {
-        name: pair for pair in pairs for name in (pair[1].relative_to(path).as_posix(), pair[1].stem, pair[0].name)
-    }
-    unknown = [name for name in expected if name not in known]
-    if unknown or not expected:
-        raise RecordingError(
-            f"{path}: color_topic: expected some of {', '.join(camera.name for camera, _ in pairs)}, found "
-            f"{', '.join(unknown) or 'none'}"
-        )
-    return [known[name] for name in dict.fromkeys(expected)]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from voodoo.errors import MeasurementError
 from voodoo.measurements import ByteImage, FloatArray
+from voodoo.model.joint import corners
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
@@ -83,7 +84,7 @@ class FrontEndSettings:
         """Check the kinds, the boxes, and the confidence, which would accept every keypoint if it were NaN."""
         check_confidence(self.min_confidence)
         for box in self.exclude:
-            _check_box(box)
+            corners("exclude", box, MeasurementError)
         unknown = sorted(set(self.use) - set(inputs()))
         if unknown or not self.use:
             raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
@@ -103,7 +104,7 @@ class FrontEndSettings:
         Raises:
             MeasurementError: an unknown kind, or kinds of which the recording has none.
         """
-        has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+        has = inputs_in(recording)
         settings = cls(use=inputs_for(recording) if use is None else tuple(use))
         if has and not has & set(settings.use):
             raise MeasurementError(
@@ -116,9 +117,14 @@ class FrontEndSettings:
         )
 
 
+def inputs_in(recording: Recording) -> set[str]:
+    """The inputs that the sensors of a recording provide."""
+    return {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+
+
 def inputs_for(recording: Recording) -> tuple[str, ...]:
     """Returns the default inputs for tracking a recording, see `FrontEndSettings.of`."""
-    has = {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+    has = inputs_in(recording)
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
     return tuple(kind for kind in inputs() if kind != "skin")
@@ -130,12 +136,3 @@ def within_boxes(places: FloatArray, boxes: Sequence[Box]) -> npt.NDArray[np.boo
     for low, high in boxes:
         inside |= ((places >= low) & (places <= high)).all(axis=1)
     return inside
-
-
-def _check_box(box: Box) -> None:
-    """Raise an error for a box that excludes nothing."""
-    low, high = corners = np.array(box, dtype=np.float64)
-    if not np.isfinite(corners).all() or not (low < high).all():
-        raise MeasurementError(
-            f"exclude: expected two corners in meters, the lower one first, found {box[0]} and {box[1]}"
-        )

@@ -6,16 +6,15 @@ from collections.abc import Mapping
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.drawing.ink import INK, PAPER, SUBPIXEL, Color, FloatArray, Picture, fixed, person_color, point, side_color
 from voodoo.model.body import Body
-from voodoo.model.projection import View, limb_rings, limb_silhouette, transform
+from voodoo.model.projection import View, limb_mesh, limb_silhouette, transform
 from voodoo.people import PeopleEstimate, Person
 
 _OPACITY = 0.62
-_FACETS = 64
+_NORMAL_M = 1e-3
 _DEVIATIONS = 2.0
 """Semi-axes of the ellipses in standard deviations."""
 _STEP_M = 1e-4
@@ -103,33 +102,17 @@ def _draw_solid(
     view: View,
     color: tuple[int, int, int],
 ) -> None:
-    """Fill the facets of a limb that face the viewer; the brightness grows with the cosine of the angle to the view."""
-    rings = transform(root_from_limb, limb_rings(shape, samples=_FACETS))
-    pixels, depths = view.project(rings.reshape(-1, 3))
-    points = np.column_stack([pixels, depths]).reshape(2, _FACETS, 3)
-    following = np.roll(points, -1, axis=1)
-    sides = np.stack([points[0], points[1], following[1], following[0]], axis=1)[..., :2]
-    caps = np.stack([points[0], points[1][::-1]])[..., :2]
-    axis = transform(root_from_limb, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, shape.length]]))
-    middle = axis.mean(axis=0)
-    corners = np.concatenate([rings, np.roll(rings, -1, axis=1)])
-    normals = corners.mean(axis=0) - middle
-    normals -= np.outer(normals @ (axis[1] - axis[0]), axis[1] - axis[0]) / max(shape.length**2, 1e-12)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    """Fill the triangles of a limb that face the viewer; the brightness grows with the cosine of the angle to the view."""
+    vertices, triangles, normals = limb_mesh(shape)
+    places = transform(root_from_limb, vertices.astype(np.float64))
+    pixels, depths = view.project(places)
     # The light is at the viewer: the cosine is the decrease of the depth for a small step along the normal.
-    step = 1e-3
-    towards = (view.project(middle[None])[1] - view.project(middle + step * normals)[1]) / step
-    lights = 0.35 + 0.65 * np.clip(towards, 0.0, 1.0)
-    for facets, shades in ((sides, lights), (caps, np.full(2, 0.8))):
-        # The other facets are back faces.
-        for facet, light in zip(fixed(facets[_ahead(facets)]), shades[_ahead(facets)].tolist(), strict=True):
-            cv2.fillConvexPoly(layer, facet, tuple(light * channel for channel in color), cv2.LINE_8, SUBPIXEL)
-
-
-def _ahead(facets: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which polygons (K, N, 2) in pixels are clockwise, and hence face the viewer."""
-    x, y = facets[..., 0], facets[..., 1]
-    return np.asarray((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) > 0.0)
+    towards = (depths - view.project(places + _NORMAL_M * normals @ root_from_limb[:3, :3].T)[1]) / _NORMAL_M
+    lights = (0.35 + 0.65 * np.clip(towards, 0.0, 1.0))[triangles].mean(axis=1)
+    a, b, c = pixels[triangles].transpose(1, 2, 0)
+    facing = (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0])  # the others are behind the limb
+    for facet, light in zip(fixed(pixels[triangles[facing]]), lights[facing].tolist(), strict=True):
+        cv2.fillConvexPoly(layer, facet, tuple(light * channel for channel in color), cv2.LINE_8, SUBPIXEL)
 
 
 def _draw_spread(picture: Picture, estimate: Estimate, view: View, color: Color | None) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Estimate
-from voodoo.drawing.canvas import Canvas, Pictured, same_place
 from voodoo.drawing.ink import INK, LEFT, MIDDLE, PAPER, RIGHT, SUBPIXEL, Color, Picture, person_color, point
+from voodoo.drawing.surfaces import Canvas, Pictured, same_place
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import Axes, CameraView, TopView

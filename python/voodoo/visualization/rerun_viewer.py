@@ -19,7 +19,7 @@ import numpy as np
 from voodoo._core import Estimate, TaperedEllipticCylinder
 from voodoo.children import children
 from voodoo.drawing.ink import person_color
-from voodoo.drawing.rerun_log import Log, bands, entity, limb_colors
+from voodoo.drawing.surfaces import Log, bands, entity, limb_colors
 from voodoo.errors import VoodooError, installed
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body

@@ -22,7 +22,7 @@ use crate::math::Pose;
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
-use proposals::{ColorDirections, DetectedEnd, Pool, Propose, UnexplainedCluster};
+use proposals::{ColorDirections, DetectedBody, DetectedEnd, Pool, Propose, UnexplainedCluster};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
@@ -75,7 +75,8 @@ impl Hypotheses {
     }
 
     /// Tests every arm and leg. Where the frame contradicts one, proposes and refines alternatives, and accepts one that explains
-    /// the frame better. `detection` holds the detections in this frame. Returns the number of ICP steps.
+    /// the frame better. `detection` holds the detections in this frame, and `detected` the poses of all limbs that were fitted
+    /// to them, world frame; empty without detections. Returns the number of ICP steps.
     pub(crate) fn improve(
         &mut self,
         context: Context,
@@ -83,6 +84,7 @@ impl Hypotheses {
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
         detection: Option<Detected>,
+        mut detected: &[Pose],
     ) -> usize {
         self.before.clone_from(poses);
         self.make_room(context, fit);
@@ -95,7 +97,7 @@ impl Hypotheses {
             if !self.is_due(at) {
                 continue;
             }
-            self.propose(at, detection);
+            self.propose(at, detection, &mut detected);
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);
             steps += taken;
             if better {
@@ -156,13 +158,14 @@ impl Hypotheses {
     }
 
     /// Fills the pool with alternative configurations of one arm or leg.
-    fn propose(&mut self, at: Extremity, detection: Option<Detected>) {
+    fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &mut &[Pose]) {
         let Self { rough, clusters, color_directions, pool, .. } = self;
         rough.score.begin(at);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current);
         // All kinds of proposals. To add one, add a file in `proposals` and an element here.
-        let kinds: [&mut dyn Propose; 3] = [clusters, color_directions, &mut DetectedEnd(detection)];
+        let kinds: [&mut dyn Propose; 4] =
+            [clusters, color_directions, &mut DetectedEnd(detection), &mut DetectedBody(detected)];
         for kind in kinds {
             kind.propose(at, rough, pool);
         }
@@ -212,7 +215,7 @@ mod tests {
             let mut predicted = previous.clone();
             with_context(&pixels, &config, &model, &previous, |context| {
                 fit.match_last(context, &poses);
-                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None);
+                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None, &[]);
                 assert_eq!(poses == previous, predicted == previous, "poses and prediction change together");
                 found.push((poses.clone(), steps));
             });

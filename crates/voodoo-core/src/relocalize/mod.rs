@@ -132,6 +132,11 @@ impl Relocalizer {
         }
     }
 
+    /// Returns the poses of this body that fit the detection of this frame, world frame.
+    pub(crate) fn detected_pose(&self, body: &Body) -> Option<Vec<Pose>> {
+        fit_pose(body, self.people.detection()?)
+    }
+
     /// Notes that no frame has come for long before the one of `stamp`: the body may be anywhere, in any pose.
     pub(crate) fn interrupt(&mut self, stamp: f64) {
         self.loss.interrupt(stamp);

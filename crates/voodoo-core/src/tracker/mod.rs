@@ -315,7 +315,9 @@ impl BodyTracker {
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
         if config.hypotheses && schedule.whole_body && known && assessor.status() != Status::Lost {
-            steps += hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected());
+            let detected = relocalizer.detected_pose(&model.body).unwrap_or_default();
+            steps +=
+                hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected(), &detected);
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status() == Status::Lost;

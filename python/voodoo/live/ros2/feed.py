@@ -10,8 +10,7 @@ from functools import partial
 from voodoo.errors import RecordingError, reading
 from voodoo.export.ros2 import STORE
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Fault, Faults, faulty
-from voodoo.live.source import Arrival
+from voodoo.live.source import Arrival, Fault, Faults, faulty
 from voodoo.measurements import FloatArray, Measurement
 from voodoo.model.camera import Camera
 from voodoo.recordings.ros_messages import (

@@ -9,7 +9,7 @@ from voodoo.export.foxglove import Channels, FoxgloveRow, library, shapes_of
 from voodoo.export.ros2 import person_id
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
-from voodoo.live.sinks.address import parts_of
+from voodoo.live.sinks import parts_of
 from voodoo.live.sinks.people import shown, upright_frame
 
 PORT = 8766

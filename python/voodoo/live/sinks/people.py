@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate
-from voodoo.export.human_frames import HumanFrames, human_frames
-from voodoo.export.joint_angles import joint_angles
+from voodoo.export.human_frames import HumanFrames, human_frames, joint_angles
 from voodoo.export.skeleton import FloatArray, Skeleton, skeleton_of
 from voodoo.export.upright import SUFFIX, Turn, by_axes
 from voodoo.live.follow import Step

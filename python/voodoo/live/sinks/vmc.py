@@ -21,7 +21,7 @@ from voodoo.export.skeleton import FloatArray, Skeleton
 from voodoo.export.template import template
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
-from voodoo.live.sinks.address import parts_of
+from voodoo.live.sinks import parts_of
 from voodoo.live.sinks.people import shown
 from voodoo.model.rotations import matrix_of_turn
 

@@ -22,7 +22,7 @@ import voodoo._core as _core
 from voodoo.errors import VoodooError, installed
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
-from voodoo.live.sinks.address import parts_of
+from voodoo.live.sinks import parts_of
 from voodoo.live.sinks.people import shown, upright_frame
 from voodoo.model.rotations import quaternions
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -16,8 +14,8 @@ import numpy.typing as npt
 
 from voodoo.errors import CameraError, VoodooError, naming
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Faults
-from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.live.mailbox import Mailbox
+from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import pose_of
@@ -78,9 +76,8 @@ class CameraSource(Source):
             place = read_calibration(calibration)
             self.root_frame, self._root_from_depth = place.root_frame, place.depth.world_from_sensor
         self._ends: list[Callable[[], object]] = []
-        self._arrivals: deque[Arrival] = deque(maxlen=_WAITING)
+        self._arrivals: Mailbox[Arrival] = Mailbox(_WAITING)
         self._error: VoodooError | None = None
-        self._came = threading.Condition()
         self._about: dict[str, Any] = {"name": self.name, "kind": self.kind}
 
     @abstractmethod
@@ -110,11 +107,7 @@ class CameraSource(Source):
 
     def read(self, timeout: float) -> Sequence[Arrival]:
         """See Source."""
-        with self._came:
-            if not self._arrivals:
-                self._came.wait(timeout)
-            arrivals = list(self._arrivals)
-            self._arrivals.clear()
+        arrivals = self._arrivals.take_all(timeout)
         now = self._clock.now()
         if self._error is not None:
             raise self._error
@@ -160,9 +153,8 @@ class CameraSource(Source):
         except Exception as error:
             self._error = VoodooError(f"{self.name}: an image that cannot be used: {error}")
             return
-        with self._came:
-            self._arrivals.extend([] if arrival is None else [arrival])
-            self._came.notify()
+        if arrival is not None:
+            self._arrivals.put(arrival)
 
     def _depth(self, stamp: float, image: npt.ArrayLike, unit: float, camera: Camera) -> Arrival:
         sensor = f"{self.name}/depth"

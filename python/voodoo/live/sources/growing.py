@@ -10,8 +10,7 @@ from typing import Any
 
 from voodoo.errors import RecordingError
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Faults
-from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.recordings.camera_files import FolderCalibration, read_calibration
 from voodoo.recordings.folder import FrameClock as NameClock
 from voodoo.recordings.folder import color_image, depth_image

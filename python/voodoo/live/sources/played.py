@@ -9,8 +9,7 @@ from functools import partial
 from typing import Any
 
 from voodoo.live.clock import Clock
-from voodoo.live.faults import Faults, kind_of
-from voodoo.live.source import Arrival, Source, SourceEnded
+from voodoo.live.source import Arrival, Faults, Source, SourceEnded, kind_of
 from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.pipeline.pairing import paired
 from voodoo.recordings.left_out import LeftOut

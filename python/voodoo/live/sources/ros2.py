@@ -10,16 +10,14 @@ from typing import Any
 
 from voodoo.errors import VoodooError
 from voodoo.live.clock import Clock, HostClock
-from voodoo.live.faults import Faults
 from voodoo.live.ros2.dds import Node, Offer, Subscription
 from voodoo.live.ros2.feed import TF, RosFeed
-from voodoo.live.source import Arrival, Source, SourceGone
+from voodoo.live.source import Arrival, Faults, Source, SourceGone
 from voodoo.measurements import FloatArray
 from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, info_topic
 
-_DISCOVERY_S = 3.0
-_POLL_S = 0.05
+_DISCOVERY_S, _LISTEN_S, _POLL_S = 3.0, 2.0, 0.05
 _DEPTH, _TF_DEPTH = 30, 100
 """Queue length for a busy machine. Messages dropped from it are counted; those lost before it are not."""
 
@@ -150,9 +148,6 @@ class Ros2Source(Source):
     def about(self) -> dict[str, Any]:
         """See Source."""
         return {"name": self.name, "kind": "ros2", "topics": self._topics, "root_frame": self.root_frame}
-
-
-_DISCOVERY_S, _LISTEN_S, _POLL_S = 1.0, 2.0, 0.05
 
 
 def listing(node: Node | None = None, *, seconds: float = _LISTEN_S) -> list[str]:

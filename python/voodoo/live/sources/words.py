@@ -15,7 +15,7 @@ from voodoo.recordings.loaders import open_recording
 CAMERAS = {"realsense": "RealSenseSource", "oak": "OakSource", "orbbec": "OrbbecSource"}
 """Kind, which is also the name of its module -> class."""
 ROS2, GROW = "ros2", "grow"
-_OF_TOPICS = ("meters_per_unit", "tf_max_age")
+_OF_TOPICS = ("frame", "meters_per_unit", "tf_max_age")
 
 
 def source_of(
@@ -71,26 +71,24 @@ def source_of(
 
 
 def options_for(word: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of several sources' options that one of them uses."""
+    """Those of several sources' options that one of them uses; those of recordings are checked by their loaders.
+
+    Args:
+        word: see source_of.
+        options: `frame`, `rate`, `loop` and the ones of loaders.
+    """
     kind = word.partition(":")[0]
     known = _OF_TOPICS if kind == ROS2 else () if kind in (*CAMERAS, GROW) else options
     return {name: value for name, value in options.items() if name in known}
 
 
 def refuse_unused(words: Sequence[str], options: Mapping[str, Any]) -> None:
-    """Reject options that none of the sources uses; those of recordings are checked by their loaders.
-
-    Args:
-        words: see source_of.
-        options: those that are given; `frame`, `rate`, `loop` and the ones of loaders.
+    """Reject options that none of the sources uses, see options_for.
 
     Raises:
         VoodooError: names them.
     """
-    kinds = {word.partition(":")[0] for word in words}
-    known = ("frame", *_OF_TOPICS) if ROS2 in kinds else ()
-    unknown = sorted(set(options) - set(known))
-    if unknown and kinds <= {*CAMERAS, ROS2, GROW}:
-        raise VoodooError(
-            f"{', '.join(words)}: expected no {', '.join(unknown)}, found some; options: {', '.join(known) or 'none'}"
-        )
+    used = {name for word in words for name in options_for(word, options)}
+    if unknown := sorted(set(options) - used):
+        known = ", ".join(_OF_TOPICS) if any(word.partition(":")[0] == ROS2 for word in words) else "none"
+        raise VoodooError(f"{', '.join(words)}: expected no {', '.join(unknown)}, found some; options: {known}")

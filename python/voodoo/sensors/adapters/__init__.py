@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from voodoo.drawing.canvas import Canvas as Canvas
-from voodoo.drawing.rerun_log import Log as Log
+from voodoo.drawing.surfaces import Canvas as Canvas
+from voodoo.drawing.surfaces import Log as Log
 from voodoo.errors import MeasurementError
 from voodoo.names import INPUTS
 from voodoo.sensors.adapters.base import NOBODY as NOBODY

@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate, Frame
-from voodoo.drawing.canvas import Canvas
-from voodoo.drawing.rerun_log import Log
+from voodoo.drawing.surfaces import Canvas, Log
 from voodoo.measurements import DepthImage, FloatArray
 from voodoo.people import Followed
 from voodoo.sensors.gating import SiteGate

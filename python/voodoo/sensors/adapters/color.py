@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from voodoo._core import Frame
-from voodoo.drawing.canvas import Canvas
+from voodoo.drawing.surfaces import Canvas
 from voodoo.measurements import ByteImage, ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.pinhole import Pinhole

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo._core import Frame
-from voodoo.drawing.rerun_log import Log, every, grown
+from voodoo.drawing.surfaces import Log, every, grown
 from voodoo.measurements import DepthImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from voodoo._core import Frame
-from voodoo.drawing.canvas import Canvas, same_place
-from voodoo.drawing.rerun_log import Log
+from voodoo.drawing.surfaces import Canvas, Log, same_place
 from voodoo.measurements import KeypointImage
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.adapters.base import NOBODY, Adapter, Context, Memory

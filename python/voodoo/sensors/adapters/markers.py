@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from voodoo._core import Frame
-from voodoo.drawing.canvas import Canvas
-from voodoo.drawing.rerun_log import Log
+from voodoo.drawing.surfaces import Canvas, Log
 from voodoo.measurements import MarkerSet
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy.typing as npt
 
 from voodoo._core import Frame
-from voodoo.drawing.canvas import Canvas
-from voodoo.drawing.rerun_log import Log
+from voodoo.drawing.surfaces import Canvas, Log
 from voodoo.measurements import LaserScan, PointCloud
 from voodoo.model.projection import transform
 from voodoo.sensors.adapters.base import Adapter, Context, Memory

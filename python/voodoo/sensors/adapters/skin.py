@@ -8,8 +8,7 @@ from typing import Any
 import numpy.typing as npt
 
 from voodoo._core import Estimate, Frame
-from voodoo.drawing.canvas import Canvas
-from voodoo.drawing.rerun_log import Log
+from voodoo.drawing.surfaces import Canvas, Log
 from voodoo.measurements import ColorImage
 from voodoo.sensors.adapters.base import Adapter, Context, Memory
 from voodoo.sensors.skin.tracker import SkinTracker
@@ -75,13 +74,7 @@ class SkinAdapter(Adapter[ColorImage]):
         """Outlines of all skin regions; candidates are dots, the assigned ones are named."""
         skin = memory.all(self.kind).get(item.sensor)
         if skin is not None and skin.mask.size:
-            canvas.regions(
-                item,
-                skin.mask,
-                marks=[candidate.pixel for candidate in skin.candidates],
-                names={site: candidate.pixel for site, candidate in skin.assigned.items()},
-                color=SKIN,
-            )
+            canvas.regions(item, skin.mask, marks=skin.candidates, names=skin.assigned, color=SKIN)
 
     def log(self, item: ColorImage, log: Log, memory: Memory) -> None:
         """The picture with the outlines of the limbs and the skin candidates."""
@@ -90,5 +83,4 @@ class SkinAdapter(Adapter[ColorImage]):
         log.silhouettes(path, item)
         skin = memory.all(self.kind).get(item.sensor)
         if skin is not None:
-            places = [candidate.pixel for candidate in skin.candidates]
-            log.send(f"{path}/picture/skin", rr.Points2D(places, radii=3.0, colors=(0, 255, 255)))
+            log.send(f"{path}/picture/skin", rr.Points2D(skin.candidates, radii=3.0, colors=(0, 255, 255)))

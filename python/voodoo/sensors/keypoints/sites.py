@@ -16,6 +16,7 @@ from voodoo._core import Frame
 from voodoo.errors import MeasurementError
 from voodoo.measurements import DepthArray, FloatArray, KeypointImage
 from voodoo.model.camera import Camera
+from voodoo.model.joint import numbers_of
 from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.gating import SiteGate
@@ -108,10 +109,8 @@ def checked_rows(keypoints: npt.ArrayLike, layout: str) -> FloatArray:
         MeasurementError: unknown layout, or another shape.
     """
     count = layout_of(layout).count
-    try:
-        rows = np.ascontiguousarray(keypoints, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise MeasurementError(f"keypoints: expected numbers (u, v, confidence), found {keypoints!r}") from error
+    numbers = numbers_of("keypoints", keypoints, MeasurementError, "numbers (u, v, confidence)")
+    rows = np.ascontiguousarray(numbers)
     if rows.shape != (count, 3):
         raise MeasurementError(f"keypoints: expected shape ({count}, 3) for {layout}, found {rows.shape}")
     return rows

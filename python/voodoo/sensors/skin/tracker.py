@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -24,21 +23,6 @@ from voodoo.tracker import Tracker
 Mask = npt.NDArray[np.bool_]
 
 _NOWHERE = np.full(3, np.nan)
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A pixel where a head or hand may be.
-
-    Args:
-        pixel: (u, v).
-        region: number of its region.
-        area: of that region [px].
-    """
-
-    pixel: tuple[float, float]
-    region: int
-    area: int
 
 
 class SkinTracker:
@@ -81,12 +65,12 @@ class SkinTracker:
         return self._cue.mask
 
     @property
-    def candidates(self) -> list[Candidate]:
-        """Candidates for heads and hands in the last image."""
-        return [Candidate(*item) for item in self._cue.candidates]
+    def candidates(self) -> list[tuple[float, float]]:
+        """Pixels (u, v) in the last image where a head or hand may be."""
+        return [pixel for pixel, *_ in self._cue.candidates]
 
     @property
-    def assigned(self) -> dict[str, Candidate]:
+    def assigned(self) -> dict[str, tuple[float, float]]:
         """Site -> the candidate that is assigned to it."""
         found = self.candidates
         return {self._sites[site]: found[number] for site, number in self._cue.assigned}
