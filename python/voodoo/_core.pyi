@@ -952,7 +952,7 @@ class Chain:
     ) -> tuple[
         npt.NDArray[np.float64],
         npt.NDArray[np.float64],
-        list[npt.NDArray[np.float64]],
+        npt.NDArray[np.float64],
         npt.NDArray[np.float64],
         tuple[float, ...],
     ]: ...

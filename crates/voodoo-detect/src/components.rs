@@ -26,7 +26,7 @@ const COMPONENT_SAMPLES: usize = 48;
 /// Maximum number of components considered, the largest first.
 const MOST_COMPONENTS: usize = 40;
 /// No label.
-pub(crate) const NONE: u32 = u32::MAX;
+const NONE: u32 = u32::MAX;
 
 /// A connected component; camera frame, meters.
 #[derive(Clone, Copy, Debug)]
@@ -106,9 +106,14 @@ impl PersonCandidate {
         0.5 * (self.low + self.high)
     }
 
+    /// Whether a component is one of its.
+    pub(crate) fn has(&self, label: &u32) -> bool {
+        self.labels.binary_search(label).is_ok()
+    }
+
     /// Whether two candidates share a component.
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        self.labels.iter().any(|label| other.labels.binary_search(label).is_ok())
+        self.labels.iter().any(|label| other.has(label))
     }
 }
 
@@ -306,7 +311,7 @@ impl Components {
                 continue;
             }
             let alone = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
-            let together = self.with_near_parts(number);
+            let together = self.with_near_parts(number, alone.clone());
             for candidate in [alone, together] {
                 let fits = candidate.area > AREA[0] && candidate.area < AREA[1] && {
                     let length = (candidate.high - candidate.low).max_element();
@@ -321,10 +326,8 @@ impl Components {
     }
 
     /// Combines a component with nearby ones as long as the result is no larger than a person.
-    fn with_near_parts(&self, seed: usize) -> PersonCandidate {
+    fn with_near_parts(&self, seed: usize, mut whole: PersonCandidate) -> PersonCandidate {
         let mut taken = vec![seed];
-        let part = &self.parts[seed];
-        let mut whole = PersonCandidate { labels: vec![part.label], area: part.area, low: part.low, high: part.high };
         let mut next = 0;
         while next < taken.len() {
             let from = &self.parts[taken[next]];

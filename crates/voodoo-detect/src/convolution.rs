@@ -41,8 +41,14 @@ enum Products {
 
 impl Convolution {
     /// Takes a convolution from a weight file; its input maps have this `edge`.
-    pub(crate) fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
-        let layer = weights.layer(name, 4)?;
+    pub(crate) fn take(
+        weights: &mut Weights,
+        name: &str,
+        [stride, edge]: [usize; 2],
+        inputs: usize,
+        outputs: Option<usize>,
+    ) -> Result<Self, WeightsError> {
+        let layer = weights.layer(name, 4, inputs, outputs)?;
         Ok(Self::from_weights(&layer.weights, &layer.bias, layer.kernel, stride, edge))
     }
 
@@ -54,13 +60,6 @@ impl Convolution {
             Products::Whole(Panels::from_weights(weights, bias))
         };
         Self { products, kernel, stride, padding: usize::from(kernel > 1) }
-    }
-
-    pub(crate) fn inputs(&self) -> usize {
-        match &self.products {
-            Products::Whole(panels) => panels.inputs / (self.kernel * self.kernel),
-            Products::Tiled(tiled) => tiled.inputs(),
-        }
     }
 
     pub(crate) fn outputs(&self) -> usize {
@@ -133,7 +132,7 @@ mod tests {
             let map = Map { edge, channels, values: noise(edge * edge * channels, 0.3) };
             let weights = noise(outputs * kernel * kernel * channels, 7.1);
             let layer = Convolution::from_weights(&weights, &noise(outputs, 1.7), kernel, stride, edge);
-            assert_eq!((layer.inputs(), layer.outputs(), layer.padding), (channels, outputs, padding));
+            assert_eq!((layer.outputs(), layer.padding), (outputs, padding));
             let (mut out, mut working) = (Map { values: vec![5.0; 3], ..Map::default() }, Working::default());
             layer.apply(&map, &mut out, &mut working, false);
             assert_eq!(out.edge, (edge + 2 * padding - kernel) / stride + 1);

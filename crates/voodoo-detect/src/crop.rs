@@ -1,6 +1,6 @@
 //! The network's input for a candidate: 96 x 96 pixels around its center, rotated so that up in the world is up in the image.
 
-use crate::components::{Components, NONE, PersonCandidate};
+use crate::components::{Components, PersonCandidate};
 use crate::view::ThinnedImage;
 use voodoo_core::math::Vec3;
 
@@ -10,6 +10,8 @@ pub const SIZE: usize = 96;
 pub const WIDTH: f64 = 2.6;
 /// Range of depth in front of and behind the center that is resolved, meters.
 pub const DEPTH: f64 = 1.2;
+/// Below this sine of the angle between up and the optical axis, up is not defined in the image.
+const LEAST_UP: f64 = 0.3;
 
 /// An input image, and the transform from it back to the camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,11 +32,11 @@ impl Crop {
         candidate: &PersonCandidate,
         up: Vec3,
     ) -> Option<Self> {
-        let roll = roll(up);
+        // Up in the world is up in the image, unless the camera looks along the vertical.
+        let roll = if up.x.hypot(up.y) < LEAST_UP { 0.0 } else { (-up.x).atan2(-up.y) };
         let (sin, cos) = roll.sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
-        let member =
-            |index: usize| parts.labels[index] != NONE && candidate.labels.binary_search(&parts.labels[index]).is_ok();
+        let member = |index: usize| candidate.has(&parts.labels[index]);
         let (mut xs, mut ys, mut zs) = (Vec::new(), Vec::new(), Vec::new());
         for index in (0..view.depth.len()).filter(|index| member(*index)) {
             let [x, y] = view.slopes[index];
@@ -68,14 +70,6 @@ impl Crop {
         let (sin, cos) = self.roll.sin_cos();
         Vec3::new(cos * turned.x + sin * turned.y, cos * turned.y - sin * turned.x, turned.z)
     }
-}
-
-/// Rotation of the camera about its axis that makes up point upwards in the image; zero where the camera looks along the
-/// vertical.
-fn roll(up: Vec3) -> f64 {
-    /// Below this sine of the angle between up and the optical axis, up is not defined in the image.
-    const LEAST: f64 = 0.3;
-    if up.x.hypot(up.y) < LEAST { 0.0 } else { (-up.x).atan2(-up.y) }
 }
 
 fn median(values: &mut [f32]) -> Option<f32> {

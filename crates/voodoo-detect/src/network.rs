@@ -19,9 +19,10 @@ struct Residual {
 }
 
 impl Residual {
-    fn take(weights: &mut Weights, name: &str, edge: usize) -> Result<Self, WeightsError> {
-        let first = Convolution::take(weights, &format!("{name}.a"), 1, edge)?;
-        Ok(Self { first, second: Convolution::take(weights, &format!("{name}.b"), 1, edge)? })
+    fn take(weights: &mut Weights, name: &str, edge: usize, channels: usize) -> Result<Self, WeightsError> {
+        let first = Convolution::take(weights, &format!("{name}.a"), [1, edge], channels, None)?;
+        let second = Convolution::take(weights, &format!("{name}.b"), [1, edge], first.outputs(), Some(channels))?;
+        Ok(Self { first, second })
     }
 
     fn apply(&self, map: &mut Map, memory: &mut [Map; 2], working: &mut Working) {
@@ -41,19 +42,25 @@ struct Stage {
 
 impl Stage {
     /// Takes a stage whose input maps have this `edge`.
-    fn take(weights: &mut Weights, name: &str, stride: usize, edge: usize) -> Result<Self, WeightsError> {
-        let reduce = Convolution::take(weights, &format!("{name}.conv"), stride, edge)?;
+    fn take(
+        weights: &mut Weights,
+        name: &str,
+        [stride, edge]: [usize; 2],
+        inputs: usize,
+    ) -> Result<Self, WeightsError> {
+        let reduce = Convolution::take(weights, &format!("{name}.conv"), [stride, edge], inputs, None)?;
         let mut blocks = Vec::new();
         while weights.has(&format!("{name}.res{}.a.weight", blocks.len())) {
-            blocks.push(Residual::take(weights, &format!("{name}.res{}", blocks.len()), edge / stride)?);
+            let name = format!("{name}.res{}", blocks.len());
+            blocks.push(Residual::take(weights, &name, edge / stride, reduce.outputs())?);
         }
         Ok(Self { reduce, blocks })
     }
 }
 
 /// Takes a linear layer: a matrix and a bias.
-fn linear(weights: &mut Weights, name: &str) -> Result<Panels, WeightsError> {
-    let layer = weights.layer(name, 2)?;
+fn linear(weights: &mut Weights, name: &str, inputs: usize, outputs: Option<usize>) -> Result<Panels, WeightsError> {
+    let layer = weights.layer(name, 2, inputs, outputs)?;
     Ok(Panels::from_weights(&layer.weights, &layer.bias))
 }
 
@@ -115,72 +122,28 @@ pub struct Memory {
 impl Network {
     /// Reads the bytes of a file of weights.
     pub fn read(bytes: &[u8]) -> Result<Self, WeightsError> {
-        let mut weights = Weights::read(bytes)?;
-        let weights = &mut weights;
-        let stages = [
-            Stage::take(weights, "s2", 4, SIZE)?,
-            Stage::take(weights, "s3", 2, SIZE / 4)?,
-            Stage::take(weights, "s4", 2, SIZE / 8)?,
-            Stage::take(weights, "s5", 2, SIZE / 16)?,
+        let weights = &mut Weights::read(bytes)?;
+        let s2 = Stage::take(weights, "s2", [4, SIZE], 2)?;
+        let s3 = Stage::take(weights, "s3", [2, SIZE / 4], s2.reduce.outputs())?;
+        let s4 = Stage::take(weights, "s4", [2, SIZE / 8], s3.reduce.outputs())?;
+        let s5 = Stage::take(weights, "s5", [2, SIZE / 16], s4.reduce.outputs())?;
+        let stages = [s2, s3, s4, s5];
+        let [_, third, fourth, fifth] = stages.each_ref().map(|stage| stage.reduce.outputs());
+        let top = [
+            Convolution::take(weights, "top5", [1, SIZE / 32], fifth, Some(fourth))?,
+            Convolution::take(weights, "top4", [1, SIZE / 16], fourth, Some(third))?,
         ];
-        let top =
-            [Convolution::take(weights, "top5", 1, SIZE / 32)?, Convolution::take(weights, "top4", 1, SIZE / 16)?];
-        let [scale, length, length_scale] = ["scale", "length", "length_scale"].map(|name| linear(weights, name));
-        let network = Self {
-            middle: Residual::take(weights, "mid", SIZE / 8)?,
-            head: Convolution::take(weights, "head", 1, SIZE / 8)?,
-            visible: linear(weights, "visible")?,
-            facing: linear(weights, "facing")?,
-            person: linear(weights, "person")?,
-            hidden: linear(weights, "hidden")?,
-            sizes: [scale?, length?, length_scale?],
-            stages,
-            top,
-        };
-        network.check()?;
-        Ok(network)
-    }
-
-    /// Checks that the shape of every layer matches that of the layer before.
-    fn check(&self) -> Result<(), WeightsError> {
-        let shape = |layer: &Convolution| [layer.inputs(), layer.outputs()];
-        let linear = |layer: &Panels| [layer.inputs, layer.outputs];
-        let residual = |block: &Residual, channels: usize| {
-            let between = block.first.outputs();
-            [(shape(&block.first), [channels, between]), (shape(&block.second), [between, channels])]
-        };
-        let mut channels = 2;
-        let mut ends = Vec::new();
-        let mut layers = Vec::new();
-        for stage in &self.stages {
-            let outputs = stage.reduce.outputs();
-            layers.push((shape(&stage.reduce), [channels, outputs]));
-            layers.extend(stage.blocks.iter().flat_map(|block| residual(block, outputs)));
-            ends.push(outputs);
-            channels = outputs;
-        }
-        layers.extend(residual(&self.middle, ends[1]));
-        let [scale, length, length_scale] = &self.sizes;
-        let (pooled, joints, lengths) = (self.hidden.outputs, self.joints(), length.outputs);
-        layers.extend([
-            (shape(&self.top[0]), [ends[3], ends[2]]),
-            (shape(&self.top[1]), [ends[2], ends[1]]),
-            (shape(&self.head), [ends[1], self.head.outputs()]),
-            (linear(&self.hidden), [ends[3], pooled]),
-            (linear(&self.visible), [pooled, joints]),
-            (linear(&self.facing), [pooled, 1]),
-            (linear(&self.person), [pooled, 1]),
-            (linear(scale), [pooled, joints]),
-            (linear(length), [pooled, lengths]),
-            (linear(length_scale), [pooled, lengths]),
-        ]);
-        for (found, [inputs, outputs]) in layers {
-            if found != [inputs, outputs] {
-                let found = format!("{} and {}", found[0], found[1]);
-                return Err(WeightsError::new(format!("a layer of {inputs} inputs and {outputs} outputs"), found));
-            }
-        }
-        Ok(())
+        let middle = Residual::take(weights, "mid", SIZE / 8, third)?;
+        let head = Convolution::take(weights, "head", [1, SIZE / 8], third, None)?;
+        let hidden = linear(weights, "hidden", fifth, None)?;
+        let mut overall = |name: &str, outputs: Option<usize>| linear(weights, name, hidden.outputs, outputs);
+        let joints = Some(head.outputs() / A_JOINT);
+        let (visible, facing, person) =
+            (overall("visible", joints)?, overall("facing", Some(1))?, overall("person", Some(1))?);
+        let length = overall("length", None)?;
+        let length_scale = overall("length_scale", Some(length.outputs))?;
+        let sizes = [overall("scale", joints)?, length, length_scale];
+        Ok(Self { stages, top, middle, head, hidden, visible, facing, person, sizes })
     }
 
     /// Number of joints that it reports.

@@ -21,10 +21,10 @@ pub(crate) struct Panels {
 }
 
 impl Panels {
-    /// From the `weights` of all outputs, output by output, and their `bias`.
+    /// From the `weights` of all outputs, output by output, and their `bias`; there is at least one of each.
     pub(crate) fn from_weights(weights: &[f32], bias: &[f32]) -> Self {
         let outputs = bias.len();
-        let inputs = weights.len().checked_div(outputs).unwrap_or(0);
+        let inputs = weights.len() / outputs;
         let groups = outputs.div_ceil(TOGETHER);
         let mut sorted = vec![[0.0; TOGETHER]; groups * inputs];
         let mut sorted_bias = vec![[0.0; TOGETHER]; groups];
@@ -42,9 +42,6 @@ impl Panels {
     /// Multiplies each row of `activations` (`inputs` values) with the weights and adds the biases; writes rows of `outputs`
     /// values to `out`.
     pub(crate) fn apply(&self, activations: &[f32], out: &mut [f32]) {
-        if self.inputs == 0 || self.outputs == 0 {
-            return;
-        }
         let whole = wide_registers();
         widest(
             #[inline(always)]

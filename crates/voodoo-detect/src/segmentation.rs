@@ -1,6 +1,6 @@
 //! Segments a depth image into candidates and crops them for the network.
 
-use crate::components::{Components, NONE, PersonCandidate};
+use crate::components::{Components, PersonCandidate};
 use crate::crop::Crop;
 use crate::floor::FloorFinder;
 use crate::view::ThinnedImage;
@@ -57,9 +57,8 @@ impl Segmentation {
     /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.
     pub fn mask(&self, candidate: &PersonCandidate, into: &mut Vec<usize>) {
         into.clear();
-        let of = |label: &u32| *label != NONE && candidate.labels.binary_search(label).is_ok();
-        for (index, _) in self.parts.labels.iter().enumerate().filter(|(_, label)| of(label)) {
-            self.view.block(self.view.in_image(index), into);
+        for (index, _) in self.parts.labels.iter().enumerate().filter(|(_, label)| candidate.has(label)) {
+            self.view.block(index, into);
         }
     }
 }

@@ -24,8 +24,6 @@ pub(crate) struct ThinnedImage {
     pub(crate) depth: Vec<f32>,
     /// `(x/z, y/z)` of every pixel.
     pub(crate) slopes: Vec<[f32; 2]>,
-    /// Width of the full image, to compute pixel indices.
-    columns: usize,
     camera: Option<Camera>,
 }
 
@@ -38,7 +36,7 @@ impl ThinnedImage {
             step += 1;
         }
         (self.width, self.height, self.step) = (width.div_ceil(step), height.div_ceil(step), step);
-        (self.columns, self.camera) = (width, Some(image.camera.clone()));
+        self.camera = Some(image.camera.clone());
         self.depth.clear();
         self.slopes.clear();
         for row in (0..height).step_by(step) {
@@ -77,12 +75,8 @@ impl ThinnedImage {
     /// The pixel in the direction `(x/z, y/z)`.
     pub(crate) fn pixel_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let [column, row] = self.camera.as_ref()?.pixel([f64::from(x), f64::from(y)])?;
-        self.index(column as f32, row as f32)
-    }
-
-    fn index(&self, column: f32, row: f32) -> Option<usize> {
         let step = self.step as f32;
-        let (column, row) = ((column / step).round(), (row / step).round());
+        let (column, row) = ((column as f32 / step).round(), (row as f32 / step).round());
         let inside = column >= 0.0 && row >= 0.0 && column < self.width as f32 && row < self.height as f32;
         inside.then(|| row as usize * self.width + column as usize)
     }
@@ -93,17 +87,12 @@ impl ThinnedImage {
         (self.step * self.step) as f64 / (fx * fy)
     }
 
-    /// Appends the pixels of the full image that the subsampled pixel with this full-image index stands for.
+    /// Appends the pixels of the full image that a pixel stands for.
     pub(crate) fn block(&self, index: usize, into: &mut Vec<usize>) {
-        let (row, column) = (index / self.columns, index % self.columns);
-        let rows = self.camera.as_ref().map_or(0, Camera::height);
+        let (row, column) = (index / self.width * self.step, index % self.width * self.step);
+        let [rows, columns] = self.camera.as_ref().map_or([0; 2], |camera| [camera.height(), camera.width()]);
         for row in row..(row + self.step).min(rows) {
-            into.extend((column..(column + self.step).min(self.columns)).map(|column| row * self.columns + column));
+            into.extend((column..(column + self.step).min(columns)).map(|column| row * columns + column));
         }
-    }
-
-    /// Index of a pixel in the full image.
-    pub(crate) fn in_image(&self, index: usize) -> usize {
-        (index / self.width) * self.step * self.columns + (index % self.width) * self.step
     }
 }

@@ -93,14 +93,21 @@ impl Weights {
         Ok((shape, values))
     }
 
-    /// Takes a layer whose weights have `edges` dimensions.
-    pub(crate) fn layer(&mut self, name: &str, edges: usize) -> Result<Layer, WeightsError> {
+    /// Takes a layer whose weights have `edges` dimensions, with so many inputs, and so many outputs if they are known.
+    pub(crate) fn layer(
+        &mut self,
+        name: &str,
+        edges: usize,
+        inputs: usize,
+        outputs: Option<usize>,
+    ) -> Result<Layer, WeightsError> {
         let (shape, weights) = self.take(&format!("{name}.weight"), edges)?;
         let (_, bias) = self.take(&format!("{name}.bias"), 1)?;
+        let outputs = outputs.unwrap_or(shape[0]);
         let square = edges == 2 || shape[1] == shape[2];
-        if !square || bias.len() != shape[0] {
+        if !square || [shape[edges - 1], shape[0], bias.len()] != [inputs, outputs, outputs] {
             return Err(WeightsError::new(
-                format!("a square kernel and {} biases of {name}", shape[0]),
+                format!("a square kernel, {inputs} inputs, {outputs} outputs and {outputs} biases of {name}"),
                 format!("{shape:?} and {}", bias.len()),
             ));
         }
@@ -157,9 +164,9 @@ mod tests {
     fn damaged_files_are_refused() {
         let good = b"voodoo person 1\nhead.weight 2 1\nhead.bias 2\n\n\x00\x3c\x00\x40\x00\x00\x00\x3c".to_vec();
         let mut weights = Weights::read(&good).unwrap();
-        let layer = weights.layer("head", 2).unwrap();
+        let layer = weights.layer("head", 2, 1, None).unwrap();
         assert_eq!((layer.weights, layer.bias, layer.kernel), (vec![1.0, 2.0], vec![0.0, 1.0], 1));
-        assert!(weights.layer("head", 2).is_err(), "taken already");
+        assert!(weights.layer("head", 2, 1, None).is_err(), "taken already");
         let mut wrong =
             vec![good[..good.len() - 1].to_vec(), [&good[..], b"x"].concat(), b"voodoo person 2\n\n".to_vec()];
         wrong.push(b"voodoo person 1\nhead.weight 4294967296 4294967296 2\n\n".to_vec());

@@ -35,9 +35,9 @@ impl Winograd {
     /// From `weights` (out, ky, kx, in) and biases.
     pub(crate) fn from_weights(weights: &[f32], bias: &[f32]) -> Self {
         let none = vec![0.0; bias.len()];
-        let inputs = weights.len().checked_div(bias.len() * KERNEL * KERNEL).unwrap_or(0);
+        let inputs = weights.len() / (bias.len() * KERNEL * KERNEL);
         let mut transformed = vec![Vec::new(); PLACES];
-        for kernel in weights.chunks_exact((KERNEL * KERNEL * inputs).max(1)) {
+        for kernel in weights.chunks_exact(KERNEL * KERNEL * inputs) {
             for input in 0..inputs {
                 let at = |ky: usize, kx: usize| kernel[(ky * KERNEL + kx) * inputs + input];
                 let columns: [[f32; TILE]; KERNEL] =

@@ -48,7 +48,7 @@ pub fn trunk(body: &Body, model: &ChainModel) -> Vec<Trunk> {
     let links = model.links().iter().enumerate().map(|(index, link)| (Carrier::Link(index), link.limb));
     for (carrier, limb) in base.map(|limb| (Carrier::Base, limb)).into_iter().chain(links) {
         if branches(body, limb) {
-            found.push(Trunk::new(&body.limbs()[limb].shape, carrier));
+            found.push(Trunk { carrier, shape: body.limbs()[limb].shape });
         }
     }
     found

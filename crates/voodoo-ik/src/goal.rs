@@ -101,11 +101,8 @@ pub fn level_rows(
 /// The ranges of equal levels in goals sorted by level.
 pub(super) fn level_ranges(goals: &[Goal], ranges: &mut Vec<Range<usize>>) {
     ranges.clear();
-    let mut start = 0;
-    for end in 1..=goals.len() {
-        if end == goals.len() || goals[end].level != goals[start].level {
-            ranges.push(start..end);
-            start = end;
-        }
+    for same in goals.chunk_by(|a, b| a.level == b.level) {
+        let start = ranges.last().map_or(0, |before: &Range<usize>| before.end);
+        ranges.push(start..start + same.len());
     }
 }

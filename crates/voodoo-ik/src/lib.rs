@@ -2,7 +2,7 @@
 //! to Inverse Kinematics for Human Motion Capture", EURASIP JASP 2010) on the kinematic chain of R07 (Rosenhahn, Brox, Cremers,
 //! Seidel, "Online Smoothing for Markerless Motion Capture", DAGM 2007).
 //!
-//! Files depend downwards only: `solver` > `image`, `goal`, `linear` > `view`, `trunk` > `model` > `twist`.
+//! Files depend downwards only: `solver` > `image`, `goal`, `linear` > `view`, `trunk` > `model`.
 
 mod bones;
 mod goal;
@@ -12,7 +12,6 @@ mod model;
 mod project;
 mod solver;
 mod trunk;
-mod twist;
 mod view;
 
 pub use bones::{bones, trunk};

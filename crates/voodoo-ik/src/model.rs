@@ -2,10 +2,8 @@
 
 use voodoo_core::BodyError;
 use voodoo_core::kinematics::hinge_axis;
-use voodoo_core::math::{Mat3, Pose, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{Body, JointKind, Limb};
-
-use super::twist::turn;
 
 /// Whether the first limb of the chain is among the unknowns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,8 +183,7 @@ impl ChainModel {
                 Turn::Rigid => joint * link.joint_from_limb,
                 Turn::Hinge(axis) => {
                     let (sine, cosine) = (0.5 * value[0]).sin_cos();
-                    let rotation =
-                        voodoo_core::math::Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
+                    let rotation = Quat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine);
                     let omega = joint.rotation * axis;
                     columns.push(Column { omega, v: joint.translation.cross(omega) });
                     Pose::from_parts(joint.translation, joint.rotation * rotation) * link.joint_from_limb
@@ -233,7 +230,7 @@ impl ChainModel {
 }
 
 /// Rotation of a ball joint; pushes its three columns, `J_left(v) e_i` about the joint's center.
-fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> voodoo_core::math::Quat {
+fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> Quat {
     let (rotation, b, c) = turn(v);
     let axes = Mat3::from_quat(joint.rotation);
     for e in Vec3::AXES {
@@ -242,4 +239,21 @@ fn ball(v: Vec3, joint: &Pose, columns: &mut Vec<Column>) -> voodoo_core::math::
         columns.push(Column { omega, v: joint.translation.cross(omega) });
     }
     rotation
+}
+
+/// Rotation of a rotation vector and the two factors of its left Jacobian `I + b [v] + c [v]^2`, `b = (1 - cos t)/t^2`,
+/// `c = (t - sin t)/t^3`.
+fn turn(v: Vec3) -> (Quat, f64, f64) {
+    let square = v.length_squared();
+    if square < 1e-6 {
+        let half = 0.5 - square / 48.0;
+        let rotation = Quat::from_xyzw(v.x * half, v.y * half, v.z * half, 1.0 - square / 8.0).normalize();
+        return (rotation, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0);
+    }
+    let angle = square.sqrt();
+    let (sine, cosine) = (0.5 * angle).sin_cos();
+    let k = sine / angle;
+    // 1 - cos t = 2 sin^2(t/2), sin t = 2 sin(t/2) cos(t/2)
+    let c = (angle - 2.0 * sine * cosine) / (square * angle);
+    (Quat::from_xyzw(v.x * k, v.y * k, v.z * k, cosine), 2.0 * sine * sine / square, c)
 }

@@ -20,25 +20,16 @@ pub enum Carrier {
     World(Pose),
 }
 
-/// A limb that no bone may enter: a tapered elliptic cylinder along z of its frame.
+/// A limb that no bone may enter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trunk {
     /// What carries it.
     pub carrier: Carrier,
-    /// Length, meters.
-    pub length: f64,
-    /// Semi-axes along x at both ends.
-    pub a: [f64; 2],
-    /// Semi-axes along y at both ends.
-    pub b: [f64; 2],
+    /// Its shape.
+    pub shape: TaperedEllipticCylinder,
 }
 
 impl Trunk {
-    /// A limb's shape on a carrier.
-    pub fn new(shape: &TaperedEllipticCylinder, carrier: Carrier) -> Self {
-        Self { carrier, length: shape.length(), a: [shape.a0(), shape.a1()], b: [shape.b0(), shape.b1()] }
-    }
-
     /// Its pose.
     pub(super) fn pose(&self, at: &Kinematics) -> Pose {
         match self.carrier {
@@ -51,20 +42,21 @@ impl Trunk {
     /// How deep a point with flesh of a radius around it lies inside, meters (approximate, from the ellipse's level function),
     /// and the derivative with respect to the point, in the trunk's frame.
     pub(super) fn depth(&self, x: Vec3, radius: f64) -> (f64, Vec3) {
-        let t = x.z / self.length;
+        let shape = &self.shape;
+        let t = x.z / shape.length();
         if !(0.0..=1.0).contains(&t) {
             return (0.0, Vec3::ZERO);
         }
-        let (slope_a, slope_b) = (self.a[1] - self.a[0], self.b[1] - self.b[0]);
-        let (a, b) = (self.a[0] + t * slope_a, self.b[0] + t * slope_b);
+        let (slope_a, slope_b) = (shape.a1() - shape.a0(), shape.b1() - shape.b0());
+        let (a, b) = (shape.a0() + t * slope_a, shape.b0() + t * slope_b);
         let (p, q) = (x.x / a, x.y / b);
         let level = p.hypot(q).max(1e-6);
-        let thickness = self.a[0].min(self.a[1]).min(self.b[0]).min(self.b[1]);
+        let thickness = shape.a0().min(shape.a1()).min(shape.b0()).min(shape.b1());
         let depth = thickness * (1.0 - level) + CLEARANCE * radius;
         if depth <= 0.0 {
             return (0.0, Vec3::ZERO);
         }
-        let along = -(p * p * slope_a / a + q * q * slope_b / b) / self.length;
+        let along = -(p * p * slope_a / a + q * q * slope_b / b) / shape.length();
         (depth, -thickness / level * Vec3::new(p / a, q / b, along))
     }
 }

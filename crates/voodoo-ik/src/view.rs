@@ -42,10 +42,10 @@ impl SilhouetteView {
         let [fx, fy] = self.camera.focal();
         let inverse = 1.0 / x.z;
         let (px, py) = (x.x * inverse, x.y * inverse);
-        let place = self.camera.pixel([px, py]).and_then(|place| self.locate(place));
-        let Some(at) = place else { return (0.0, Vec3::ZERO) };
-        let Some([distance, half]) = at.sample(&self.pixels, self.camera.width()) else { return (0.0, Vec3::ZERO) };
-        let [distance, mut du, mut dv] = distance.at(&at);
+        let Some(at) = self.camera.pixel([px, py]).map(|place| self.locate(place)) else { return (0.0, Vec3::ZERO) };
+        let Some(corners) = at.corners(&self.pixels) else { return (0.0, Vec3::ZERO) };
+        let of = |channel: usize| at.interpolated(corners.map(|pixel| f64::from(pixel[channel])));
+        let [distance, mut du, mut dv] = of(0);
         let projected = fx * radius * inverse;
         let mut depth = (projected - self.border).max(0.0);
         // The derivative of the depth with respect to the distance from the camera plane.
@@ -54,7 +54,7 @@ impl SilhouetteView {
         let mut own_surface = false;
         // No pixel is deeper inside than half the width, so a pixel deeper than this cannot be in a thin part.
         if distance < 0.0 && -distance <= thin * projected {
-            let [half, su, sv] = half.at(&at);
+            let [half, su, sv] = of(1);
             own_surface = half > 0.0 && half <= thin * projected;
             if own_surface && half - middle > depth {
                 depth = half - middle;
@@ -80,13 +80,13 @@ impl SilhouetteView {
     /// in pixels (meters as projected perpendicular to the line of sight), and the derivative with respect to the point.
     fn depth_violation(&self, at: &PixelPlace, x: Vec3, radius: f64, own_surface: bool) -> (f64, Vec3) {
         let nothing = (0.0, Vec3::ZERO);
-        let Some(corners) = at.corners(&self.depth, self.camera.width()) else { return nothing };
+        let Some(corners) = at.corners(&self.depth) else { return nothing };
         let corners = corners.map(f64::from);
         let (least, most) = corners.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(*d), b.max(*d)));
         if at.beyond != [0.0; 2] || !(least > NEAREST && most < (1.0 + EDGE) * least) {
             return nothing;
         }
-        let [observed, du, dv] = Corners(corners).at(at);
+        let [observed, du, dv] = at.interpolated(corners);
         let (before, behind) = (observed + LEAST_RADII * radius - x.z, x.z - observed - MOST_RADII * radius);
         let (gap, sign) = if before > 0.0 { (before, 1.0) } else { (behind, -1.0) };
         if sign < 0.0 && !own_surface {
@@ -104,53 +104,41 @@ impl SilhouetteView {
     }
 
     /// The four pixels around a position; outside of the image the nearest ones on its border.
-    fn locate(&self, [u, v]: [f64; 2]) -> Option<PixelPlace> {
+    fn locate(&self, [u, v]: [f64; 2]) -> PixelPlace {
         let (width, height) = (self.camera.width(), self.camera.height());
         let (right, bottom) = ((width - 1) as f64, (height - 1) as f64);
         let (x, y) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
         let column = (x as usize).min(width - 2);
         let row = (y as usize).min(height - 2);
-        let place =
-            PixelPlace { start: row * width + column, s: x - column as f64, t: y - row as f64, beyond: [u - x, v - y] };
-        (place.start + width + 2 <= self.pixels.len()).then_some(place)
+        let (start, s, t) = (row * width + column, x - column as f64, y - row as f64);
+        PixelPlace { start, width, s, t, beyond: [u - x, v - y] }
     }
 }
 
 /// A position between four pixels, and its distance outside the image.
 struct PixelPlace {
     start: usize,
+    width: usize,
     s: f64,
     t: f64,
     beyond: [f64; 2],
 }
 
-/// The values of those four pixels: upper row, lower row.
-struct Corners([f64; 4]);
-
 impl PixelPlace {
-    fn corners<T: Copy>(&self, image: &[T], width: usize) -> Option<[T; 4]> {
-        let (upper, lower) =
-            (image.get(self.start..self.start + 2)?, image.get(self.start + width..self.start + width + 2)?);
-        Some([upper[0], upper[1], lower[0], lower[1]])
+    /// The values of the four pixels: upper row, lower row; `None` for an image of another size.
+    fn corners<T: Copy>(&self, image: &[T]) -> Option<[T; 4]> {
+        let rows = image.get(self.start..self.start + self.width + 2)?;
+        Some([rows[0], rows[1], rows[self.width], rows[self.width + 1]])
     }
 
-    /// The corner values of both channels; `None` for an image of another size.
-    fn sample(&self, pixels: &[[f32; 2]], width: usize) -> Option<[Corners; 2]> {
-        let corners = self.corners(pixels, width)?;
-        Some([0, 1].map(|image| Corners(corners.map(|pixel| f64::from(pixel[image])))))
-    }
-}
-
-impl Corners {
     /// Bilinear interpolation and its gradient. Outside of the image the distance to its border is added, because everything
     /// outside counts as background.
-    fn at(&self, place: &PixelPlace) -> [f64; 3] {
-        let (s, t) = (place.s, place.t);
-        let [d00, d01, d10, d11] = self.0;
+    fn interpolated(&self, [d00, d01, d10, d11]: [f64; 4]) -> [f64; 3] {
+        let (s, t) = (self.s, self.t);
         let (first, second) = (d00 + s * (d01 - d00), d10 + s * (d11 - d10));
         let value = first + t * (second - first);
         let (mut du, mut dv) = ((1.0 - t) * (d01 - d00) + t * (d11 - d10), second - first);
-        let [ox, oy] = place.beyond;
+        let [ox, oy] = self.beyond;
         if ox == 0.0 && oy == 0.0 {
             return [value, du, dv];
         }

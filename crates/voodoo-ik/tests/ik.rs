@@ -124,7 +124,7 @@ proptest! {
         prop_assert_eq!(trunk.len(), 2);
         // A limb beside the chain, through the body's middle.
         let beside = Pose::from_parts(Vec3::new(0.1, 0.0, -0.3), Quat::from_axis_angle(Vec3::Y, 0.3));
-        trunk.push(Trunk::new(&body.limbs()[0].shape, Carrier::World(beside)));
+        trunk.push(Trunk { carrier: Carrier::World(beside), shape: body.limbs()[0].shape });
         let criterion = Criterion { views: &[&view, &deep], segments: &segments, thin, trunk: &trunk };
         let evaluate = |angles: &[f64]| {
             let (mut at, mut gradient) = (Kinematics::default(), vec![0.0; angles.len()]);

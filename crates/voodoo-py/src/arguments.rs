@@ -4,32 +4,17 @@
 
 use pyo3::prelude::*;
 
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{BodyError, MeasurementError, wrong};
 
 /// Functions for `from_py_with`, each named like its argument.
 macro_rules! arguments {
-    ($convert:ident, $type:ty: $($name:ident)*) => {
+    ($error:ident, $expected:literal, $type:ty: $($name:ident)*) => {
         $(pub(crate) fn $name(value: &Bound<'_, PyAny>) -> PyResult<$type> {
-            $convert(stringify!($name), value)
+            value.extract().map_err(|_| $error::new_err(wrong(stringify!($name), $expected, value)))
         })*
     };
 }
 
-arguments!(number, f64: stamp weight bias offset meters_per_unit log_odds);
-arguments!(dimension, f64: length a0 b0 a1 b1);
-arguments!(word, String: site);
-
-fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    value.extract().map_err(|_| wrong_argument(value.py(), name, "a number", value))
-}
-
-fn dimension(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    value.extract().map_err(|_| {
-        let text = wrong_argument(value.py(), name, "meters", value).value(value.py()).to_string();
-        exception(value.py(), "BodyError", text)
-    })
-}
-
-fn word(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
-    value.extract().map_err(|_| wrong_argument(value.py(), name, "a name", value))
-}
+arguments!(MeasurementError, "a number", f64: stamp weight bias offset meters_per_unit log_odds);
+arguments!(BodyError, "meters", f64: length a0 b0 a1 b1);
+arguments!(MeasurementError, "a name", String: site);

@@ -1,5 +1,7 @@
 //! Conversion from and to NumPy arrays.
 
+use std::convert::Infallible;
+
 use numpy::ndarray::Dimension;
 use numpy::{
     Element, Ix2, Ix3, PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
@@ -10,7 +12,7 @@ use pyo3::type_object::PyTypeInfo;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3, matrix};
 use voodoo_core::{Body, ColorPixels, DepthPixels, Limb, PointSlice};
 
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{MeasurementError, wrong_argument};
 
 /// An array of the caller that may have either of two types, contiguous and aligned.
 pub(crate) enum EitherArray<T, D, U, E> {
@@ -53,13 +55,14 @@ impl<T: Element, D: Dimension, U: Element, E: Dimension> EitherArray<T, D, U, E>
 impl PointArray {
     /// Takes an `(N, 3)` array of float32 or float64 without a mask.
     pub(crate) fn new(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let wrong = || wrong_array(name, "shape (N, 3) and dtype float32 or float64", value);
-        let array = value.cast::<PyUntypedArray>().map_err(|_| wrong())?;
+        let expected = "an array of shape (N, 3) and dtype float32 or float64";
+        let wrong = |found: &Bound<'_, PyAny>| wrong_argument(name, expected, found);
+        let array = value.cast::<PyUntypedArray>().map_err(|_| wrong(&value.get_type()))?;
         if array.ndim() != 2 || array.shape()[1] != 3 {
-            return Err(wrong());
+            return Err(wrong(value));
         }
         unmasked(name, value, "leave the masked rows out: points.data[~numpy.ma.getmaskarray(points).any(axis=1)]")?;
-        Self::cast(value).ok_or_else(wrong)
+        Self::cast(value).ok_or_else(|| wrong(value))
     }
 }
 
@@ -99,20 +102,27 @@ impl ColorView<'_> {
     }
 }
 
-/// The error for what is no array of the expected kind.
-pub(crate) fn wrong_array(name: &str, expected: &str, value: &Bound<'_, PyAny>) -> PyErr {
-    let found = match value.cast::<PyUntypedArray>() {
-        Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
-        Err(_) => value.get_type().to_string(),
-    };
-    exception(value.py(), "MeasurementError", format!("{name}: expected an array of {expected}, found {found}"))
+/// A vector that becomes an array (3,).
+#[derive(Clone, Copy)]
+pub(crate) struct Row(pub(crate) Vec3);
+
+impl<'py> IntoPyObject<'py> for Row {
+    type Target = PyArray1<f64>;
+    type Output = Bound<'py, PyArray1<f64>>;
+    type Error = Infallible;
+
+    fn into_pyobject(self, py: Python<'py>) -> Result<Self::Output, Infallible> {
+        Ok(PyArray1::from_slice(py, &self.0.to_array()))
+    }
 }
+
+pub(crate) type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
 /// Rejects NumPy's masked arrays: masked entries are ordinary numbers and would count as measured.
 pub(crate) fn unmasked(name: &str, value: &Bound<'_, PyAny>, instead: &str) -> PyResult<()> {
     if value.hasattr("mask")? {
         let text = format!("{name}: expected an array without a mask, found a masked one; {instead}");
-        return Err(exception(value.py(), "MeasurementError", text));
+        return Err(MeasurementError::new_err(text));
     }
     Ok(())
 }
@@ -133,7 +143,7 @@ pub(crate) fn rows<'a, const N: usize>(name: &str, array: &'a PyReadonlyArray2<'
         return Ok(array.as_slice()?.as_chunks().0);
     }
     let text = format!("{name}: expected shape (N, {N}), found {:?}", array.shape());
-    Err(exception(array.py(), "MeasurementError", text))
+    Err(MeasurementError::new_err(text))
 }
 
 /// The entries of a C-contiguous array of double precision with the given shape; `None` for anything else, including masked
@@ -152,16 +162,13 @@ pub(crate) fn vector(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3> {
     if let Some(numbers) = entries(value, &[3]) {
         return Ok(Vec3::from_array(numbers));
     }
-    value
-        .extract::<[f64; 3]>()
-        .map(Vec3::from_array)
-        .map_err(|_| wrong_argument(value.py(), name, "three numbers", value))
+    value.extract::<[f64; 3]>().map(Vec3::from_array).map_err(|_| wrong_argument(name, "three numbers", value))
 }
 
 /// A pose from a rigid 4x4 matrix; the identity without one.
 pub(crate) fn pose(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Pose> {
     let Some(value) = value else { return Ok(Pose::IDENTITY) };
-    let wrong = || wrong_argument(value.py(), name, "a rigid 4x4 transform", value);
+    let wrong = || wrong_argument(name, "a rigid 4x4 transform", value);
     let rows: [[f64; 4]; 4] = match entries::<16>(value, &[4, 4]) {
         Some(numbers) => [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| numbers[4 * row + column])),
         None => value.extract().map_err(|_| wrong())?,
@@ -188,13 +195,18 @@ pub(crate) fn limb_poses(body: &Body, values: &[Bound<'_, PyAny>]) -> PyResult<V
 }
 
 /// The 4x4 matrices of poses, read-only.
-pub(crate) fn matrices<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+pub(crate) fn matrices<'py>(py: Python<'py>, poses: &[Pose]) -> PyResult<Array<'py>> {
     frozen(py, poses.iter().flat_map(matrix).flatten().collect(), &[poses.len(), 4, 4])
 }
 
+/// An array of a given shape.
+pub(crate) fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
+    PyArray1::from_vec(py, values).reshape(shape)
+}
+
 /// A read-only array of a given shape.
-pub(crate) fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let array = PyArray1::from_vec(py, values).reshape(shape)?;
+pub(crate) fn frozen<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
+    let array = array(py, values, shape)?;
     array.try_readwrite()?.make_nonwriteable();
     Ok(array)
 }

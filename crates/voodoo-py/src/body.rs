@@ -1,13 +1,12 @@
 //! `Body`: created by `voodoo.model.body` from validated parts.
 
-use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use voodoo_core::Body;
 use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::{HumanModel, Joint, Limb, Site};
 
-use crate::arrays::frozen;
-use crate::errors::{IntoPy, exception};
+use crate::arrays::{Array, frozen};
+use crate::errors::{BodyError, Raise};
 use crate::shape::PyShape;
 
 /// A rotation as Python represents it.
@@ -19,7 +18,6 @@ pub(crate) enum Rotation {
     Quaternion([f64; 4]),
 }
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 /// Position and rotation of a joint's ellipse.
 type JointFrame = ([f64; 3], Rotation);
 /// name, ellipse on the parent, ellipse on the limb, semi-axes, weight, limits, motion
@@ -77,11 +75,11 @@ pub(crate) fn at_rest(body: &Body) -> Vec<(Mat3, Vec3)> {
 #[pymethods]
 impl PyBody {
     #[new]
-    fn new(py: Python<'_>, name: String, limbs: Vec<LimbParts>, sites: Vec<SiteParts>) -> PyResult<Self> {
+    fn new(name: String, limbs: Vec<LimbParts>, sites: Vec<SiteParts>) -> PyResult<Self> {
         let names: Vec<String> = limbs.iter().map(|limb| limb.0.clone()).collect();
         let index = |key: String, name: &str| {
             names.iter().position(|known| known == name).ok_or_else(|| {
-                exception(py, "BodyError", format!("{key}: expected one of {}, found {name:?}", names.join(", ")))
+                BodyError::new_err(format!("{key}: expected one of {}, found {name:?}", names.join(", ")))
             })
         };
         let limbs = limbs
@@ -93,11 +91,9 @@ impl PyBody {
                     }
                     (None, None) => None,
                     _ => {
-                        return Err(exception(
-                            py,
-                            "BodyError",
-                            format!("limbs.{name}: expected both a parent and a joint, or neither for the root"),
-                        ));
+                        return Err(BodyError::new_err(format!(
+                            "limbs.{name}: expected both a parent and a joint, or neither for the root"
+                        )));
                     }
                 };
                 Ok(Limb { name, shape: shape.0, parent, match_caps })
@@ -113,28 +109,21 @@ impl PyBody {
                 })
             })
             .collect::<PyResult<Vec<_>>>()?;
-        Body::new(name, limbs, sites).map(Self).map_err(|error| error.into_py(py))
+        Body::new(name, limbs, sites).map(Self).map_err(Raise::raise)
     }
 
     #[staticmethod]
-    fn human(py: Python<'_>, stature: f64, model: &str) -> PyResult<Self> {
-        let model = match model {
-            "measured" => HumanModel::Measured,
-            "papers" => HumanModel::Papers,
-            "full" => HumanModel::Full,
-            _ => {
-                return Err(exception(
-                    py,
-                    "BodyError",
-                    format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}"),
-                ));
-            }
-        };
-        Body::human(stature, model).map(Self).map_err(|error| error.into_py(py))
+    fn human(stature: f64, model: &str) -> PyResult<Self> {
+        let known = [("measured", HumanModel::Measured), ("full", HumanModel::Full), ("papers", HumanModel::Papers)];
+        let found = known.iter().find(|(name, _)| *name == model).ok_or_else(|| {
+            let text = format!("model: expected \"measured\", \"full\" or \"papers\", found {model:?}");
+            BodyError::new_err(text)
+        })?;
+        Body::human(stature, found.1).map(Self).map_err(Raise::raise)
     }
 
-    fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
-        self.0.scaled(factor).map(Self).map_err(|error| error.into_py(py))
+    fn scaled(&self, factor: f64) -> PyResult<Self> {
+        self.0.scaled(factor).map(Self).map_err(Raise::raise)
     }
 
     /// The parts that `new` takes, rotations as vectors.

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use pyo3::prelude::*;
-use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::math::Pose;
 use voodoo_core::{Body, Camera};
 use voodoo_core::{Cloud, ColorImage, DepthImage, DetectedPerson, Frame, PositionRelation, RayRelation, Scope};
 
 use crate::arrays::{ColorArray, ColorView, DepthArray, DepthView, PointArray, PointView};
-use crate::errors::IntoPy;
+use crate::errors::Raise;
 use crate::frame::PyFrame;
 
 /// Index of a name in a list, which it joins if it is new.
@@ -21,14 +21,12 @@ pub(crate) fn number(names: &mut Vec<String>, name: &str) -> u16 {
     number as u16
 }
 
-pub(crate) struct CloudData {
-    pub points: PointArray,
-    pub world_from_sensor: Pose,
-    pub weight: f64,
-    pub limb: Option<String>,
-    pub on_body: bool,
-    pub source: u16,
-}
+/// A cloud, whose points are in the array, and the name of the limb that they are on.
+pub(crate) type CloudData = (PointArray, Cloud<'static>, Option<String>);
+/// A measured position, and the name of its site, whose index is not known yet.
+pub(crate) type PositionData = (String, PositionRelation);
+/// A ray, and the name of its site, whose index is not known yet.
+pub(crate) type RayData = (String, RayRelation);
 
 pub(crate) struct ImageData {
     pub pixels: DepthArray,
@@ -67,72 +65,40 @@ pub(crate) fn color_image<'a>((view, data): &'a (ColorView, &ColorData), number:
     Ok(ColorImage { pixels: view.pixels()?, camera, world_from_sensor, stamp, number, source })
 }
 
-pub(crate) struct SiteData {
-    pub site: String,
-    pub position: Vec3,
-    pub direction: Option<Vec3>,
-    pub weight: f64,
-    pub bias: f64,
-    pub source: u16,
-}
-
-impl SiteData {
-    /// The measured position, of the site with this index.
-    fn relation(&self, site: usize) -> PositionRelation {
-        let Self { position, weight, bias, source, .. } = *self;
-        PositionRelation { site, position, weight, bias, source }
-    }
-}
-
 /// Everything a step borrows: the views keep the arrays alive and readable.
 pub(crate) struct Borrowed<'py, 'a> {
-    clouds: Vec<(PointView<'py>, Scope, &'a CloudData)>,
-    images: DepthViews<'py, 'a>,
+    clouds: Vec<(PointView<'py>, Cloud<'static>)>,
+    pub(crate) images: DepthViews<'py, 'a>,
     positions: Vec<PositionRelation>,
     rays: Vec<RayRelation>,
     detections: Vec<(Vec<PositionRelation>, f64)>,
 }
 
 impl<'py, 'a> Borrowed<'py, 'a> {
-    /// Borrows the arrays of a frame and looks the names up in `body`.
-    pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body) -> PyResult<Self> {
-        let cloud = |cloud: &'a CloudData| {
-            let scope = match &cloud.limb {
-                Some(name) => Scope::Limb(body.limb_index(name).map_err(|error| error.into_py(py))?),
-                None if cloud.on_body => Scope::Body,
-                None => Scope::Free,
-            };
-            Ok((cloud.points.view(py), scope, cloud))
+    /// Borrows the arrays of a frame and looks the names up in `body`. The frame's sources are numbered from `first`.
+    pub(crate) fn new(py: Python<'py>, frame: &'a PyFrame, body: &Body, first: usize) -> PyResult<Self> {
+        let first = first as u16;
+        let index = |name: &str| body.site_index(name).map_err(Raise::raise);
+        let cloud = |(points, cloud, limb): &'a CloudData| {
+            let limb = limb.as_ref().map(|name| body.limb_index(name)).transpose().map_err(Raise::raise)?;
+            let (scope, source) = (limb.map_or(cloud.scope, Scope::Limb), cloud.source + first);
+            Ok((points.view(py), Cloud { scope, source, ..*cloud }))
         };
-        let (mut positions, mut rays) = (Vec::new(), Vec::new());
-        let index = |data: &SiteData| body.site_index(&data.site).map_err(|error| error.into_py(py));
-        for data in &frame.sites {
-            let site = index(data)?;
-            let SiteData { position: origin, weight, bias, source, .. } = *data;
-            match data.direction {
-                None => positions.push(data.relation(site)),
-                Some(direction) => rays.push(RayRelation { site, origin, direction, weight, bias, source }),
-            }
-        }
-        let person = |(positions, person): &(Vec<SiteData>, f64)| {
-            let positions = positions.iter().map(|data| Ok(data.relation(index(data)?)));
-            Ok((positions.collect::<PyResult<_>>()?, *person))
+        let position =
+            |(name, of): &PositionData| Ok(PositionRelation { site: index(name)?, source: of.source + first, ..*of });
+        let ray = |(name, of): &RayData| Ok(RayRelation { site: index(name)?, source: of.source + first, ..*of });
+        let person = |(positions, person): &(Vec<PositionData>, f64)| {
+            Ok((positions.iter().map(position).collect::<PyResult<_>>()?, *person))
         };
+        let positions = frame.positions.iter().map(position).collect::<PyResult<_>>()?;
+        let rays = frame.rays.iter().map(ray).collect::<PyResult<_>>()?;
         let clouds = frame.clouds.iter().map(cloud).collect::<PyResult<_>>()?;
         let detections = frame.detections.iter().map(person).collect::<PyResult<_>>()?;
         Ok(Self { clouds, images: frame.depth_views(py), positions, rays, detections })
     }
 
     pub(crate) fn clouds(&self) -> PyResult<Vec<Cloud<'_>>> {
-        let clouds = self.clouds.iter().map(|(view, scope, data)| {
-            let CloudData { world_from_sensor, weight, source, .. } = **data;
-            Ok(Cloud { points: view.points()?, world_from_sensor, weight, scope: *scope, source })
-        });
-        clouds.collect()
-    }
-
-    pub(crate) fn images(&self) -> PyResult<Vec<DepthImage<'_>>> {
-        depth_images(&self.images)
+        self.clouds.iter().map(|(view, cloud)| Ok(Cloud { points: view.points()?, ..*cloud })).collect()
     }
 
     /// The detected persons.
@@ -169,16 +135,11 @@ pub(crate) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// `first` is the index of the first source of the person's own measurements.
-    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed, first: u16) -> PyResult<Self> {
-        let clouds = own.clouds()?.into_iter().map(|cloud| Cloud { source: cloud.source + first, ..cloud });
-        let positions =
-            own.positions.iter().map(|relation| PositionRelation { source: relation.source + first, ..*relation });
-        let rays = own.rays.iter().map(|relation| RayRelation { source: relation.source + first, ..*relation });
+    pub(crate) fn new(all: &Frame<'a>, own: &'a Borrowed) -> PyResult<Self> {
         Ok(Self {
-            clouds: all.clouds.iter().copied().chain(clouds).collect(),
-            positions: all.positions.iter().copied().chain(positions).collect(),
-            rays: all.rays.iter().copied().chain(rays).collect(),
+            clouds: all.clouds.iter().copied().chain(own.clouds()?).collect(),
+            positions: [all.positions, &own.positions].concat(),
+            rays: [all.rays, &own.rays].concat(),
         })
     }
 

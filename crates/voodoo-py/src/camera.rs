@@ -1,15 +1,15 @@
-//! The core's camera: what `voodoo.Camera` asks, and what every function that takes one is given.
+//! The core's camera: what `voodoo.Camera` asks, what every function that takes one is given, and what it sees of a body.
 
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use voodoo_core::Camera;
-use voodoo_core::Lens;
 use voodoo_core::math::{Affine3, Vec3};
+use voodoo_core::{Camera, Lens, Rendering, Viewpoint};
 
-use crate::arrays::rows;
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::arrays::{limb_poses, pose, rows};
+use crate::body::PyBody;
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 
 type Arguments = (usize, usize, [f64; 4], String, Vec<f64>);
 
@@ -20,17 +20,10 @@ pub struct PyCamera(Arc<Camera>);
 #[pymethods]
 impl PyCamera {
     #[new]
-    fn new(
-        py: Python<'_>,
-        width: usize,
-        height: usize,
-        intrinsics: [f64; 4],
-        model: String,
-        coefficients: Vec<f64>,
-    ) -> PyResult<Self> {
+    fn new(width: usize, height: usize, intrinsics: [f64; 4], model: String, coefficients: Vec<f64>) -> PyResult<Self> {
         let camera = Lens::from_model(&model, &coefficients)
             .and_then(|lens| Camera::new(width, height, intrinsics, lens))
-            .map_err(|error| error.into_py(py))?;
+            .map_err(Raise::raise)?;
         Ok(Self(Arc::new(camera)))
     }
 
@@ -73,16 +66,40 @@ pub(crate) fn camera_of(camera: &Bound<'_, PyAny>) -> PyResult<Arc<Camera>> {
     core.map(|core| Arc::clone(&core.get().0)).ok_or_else(|| {
         let found = camera.get_type().name().map_or_else(|_| "something else".into(), |name| name.to_string());
         let text = format!("camera: expected a Camera, the calibration of the image, found {found}");
-        exception(camera.py(), "MeasurementError", text)
+        MeasurementError::new_err(text)
     })
 }
 
 /// The transform of a 4x4 array.
 pub(crate) fn affine(name: &str, value: &PyReadonlyArray2<'_, f64>) -> PyResult<Affine3> {
     if value.dims() != numpy::Ix2(4, 4) {
-        return Err(wrong_argument(value.py(), name, "an array of shape (4, 4)", value.as_any()));
+        return Err(wrong_argument(name, "an array of shape (4, 4)", value.as_any()));
     }
     let entries = value.as_array();
     let column = |column: usize| Vec3::new(entries[[0, column]], entries[[1, column]], entries[[2, column]]);
     Ok(Affine3::from_cols(column(0), column(1), column(2), column(3)))
+}
+
+type Images<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<i16>>);
+
+#[doc = stub!("render_depth")]
+#[pyfunction]
+#[pyo3(signature = (body, world_from_limb, *, camera, world_from_sensor=None))]
+pub(crate) fn render_depth<'py>(
+    py: Python<'py>,
+    body: &PyBody,
+    world_from_limb: Vec<Bound<'py, PyAny>>,
+    #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
+    world_from_sensor: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Images<'py>> {
+    let poses = limb_poses(&body.0, &world_from_limb)?;
+    let world_from_sensor = pose("world_from_sensor", world_from_sensor)?;
+    let view = Viewpoint { camera: &camera, world_from_sensor };
+    let mut image = Rendering::default();
+    py.detach(|| image.render(&body.0, &poses, &view, None)).map_err(Raise::raise)?;
+    let size = [camera.height(), camera.width()];
+    let depth = PyArray1::from_slice(py, image.depth()).reshape(size)?;
+    // The mark of no limb, all ones, becomes -1; no body has 32768 limbs.
+    let limb: Vec<i16> = image.limb().iter().map(|limb| *limb as i16).collect();
+    Ok((depth, PyArray1::from_vec(py, limb).reshape(size)?))
 }

@@ -5,7 +5,7 @@ use pyo3::types::PyDict;
 use voodoo_core::Config;
 use voodoo_core::{RawValue, Value};
 
-use crate::errors::{IntoPy, exception};
+use crate::errors::{ConfigError, Raise};
 
 /// One row an entry: name, documentation, unit, default, (least, greatest) or None, words to choose from.
 type FieldRow<'py> = (&'static str, String, &'static str, Bound<'py, PyAny>, Option<(f64, f64)>, Vec<&'static str>);
@@ -30,24 +30,15 @@ pub(crate) fn config_fields(py: Python<'_>) -> PyResult<Vec<FieldRow<'_>>> {
 
 /// A configuration from the values of a dictionary.
 pub(crate) fn config(values: &Bound<'_, PyDict>) -> PyResult<Config> {
-    let py = values.py();
     let mut config = Config::default();
     for (key, value) in values.iter() {
         let key: String = key.extract()?;
-        let raw = if let Ok(switch) = value.extract::<bool>() {
-            RawValue::Switch(switch)
-        } else if let Ok(number) = value.extract::<f64>() {
-            RawValue::Number(number)
-        } else if let Ok(word) = value.extract::<String>() {
-            RawValue::Word(word)
-        } else {
-            return Err(exception(
-                py,
-                "ConfigError",
-                format!("{key}: expected a number, a switch or a word, found {value}"),
-            ));
-        };
-        config.set(&key, &raw).map_err(|error| error.into_py(py))?;
+        let number = |_| value.extract().map(RawValue::Number);
+        let word = |_: PyErr| value.extract().map(RawValue::Word);
+        let raw = value.extract().map(RawValue::Switch).or_else(number).or_else(word);
+        let wrong = || format!("{key}: expected a number, a switch or a word, found {value}");
+        let raw = raw.map_err(|_: PyErr| ConfigError::new_err(wrong()))?;
+        config.set(&key, &raw).map_err(Raise::raise)?;
     }
     Ok(config)
 }

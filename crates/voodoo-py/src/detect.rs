@@ -1,5 +1,7 @@
 //! Detection of people in depth images.
 
+use std::sync::Arc;
+
 use std::path::PathBuf;
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
@@ -14,10 +16,10 @@ use voodoo_detect::crop::SIZE;
 use voodoo_detect::segmentation::Segmentation;
 use voodoo_detect::{Detector, JOINTS, LENGTHS};
 
-use crate::arrays::{contiguous, vector};
+use crate::arrays::{Row, contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
@@ -28,30 +30,25 @@ pub struct PyDetector(pub Detector);
 impl PyDetector {
     #[new]
     #[pyo3(signature = (*, weights=None))]
-    fn new(py: Python<'_>, weights: Option<PathBuf>) -> PyResult<Self> {
-        let refused = |message: String| exception(py, "MeasurementError", message);
-        let detector = match weights {
-            None => Ok(Detector::new()),
-            Some(path) => std::fs::read(&path)
-                .map_err(|error| format!("{}: expected a readable file, found {error}", path.display()))
-                .and_then(|bytes| {
-                    Detector::with_weights(&bytes).map_err(|error| format!("{}: {error}", path.display()))
-                }),
-        };
-        detector.map(Self).map_err(refused)
+    fn new(weights: Option<PathBuf>) -> PyResult<Self> {
+        let Some(path) = weights else { return Ok(Self(Detector::new())) };
+        let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
+        let bytes =
+            std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
+        Detector::with_weights(&bytes).map(Self).map_err(|error| refused(error.to_string()))
     }
 
     #[doc = stub!("Detector.detect")]
     #[pyo3(signature = (frame, *, up=None))]
     fn detect(&mut self, py: Python<'_>, frame: &PyFrame, up: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<PyDetection>> {
-        let any = Body::human(1.75, HumanModel::Full).map_err(|error| error.into_py(py))?;
+        let any = Body::human(1.75, HumanModel::Full).map_err(Raise::raise)?;
         let views = frame.depth_views(py);
         let images = depth_images(&views)?;
         let input =
             Frame::empty(frame.stamp).with_images(&images).with_ground(frame.ground).with_excluded(&frame.excluded);
-        input.check(&any, None).map_err(|error| error.into_py(py))?;
+        input.check(&any, None).map_err(Raise::raise)?;
         let direction = |up: &Bound<'_, PyAny>| {
-            let wrong = || wrong_argument(py, "up", "a vector that is not zero", up);
+            let wrong = || wrong_argument("up", "a vector that is not zero", up);
             vector("up", up)?.try_normalize().ok_or_else(wrong)
         };
         let up = up.map(direction).transpose()?;
@@ -66,7 +63,7 @@ impl PyDetector {
             }
             Ok::<_, DetectError>(found)
         });
-        let mut found = found.map_err(|error| exception(py, "MeasurementError", error.to_string()))?;
+        let mut found = found.map_err(|error| MeasurementError::new_err(error.to_string()))?;
         found.sort_by(|(a, _), (b, _)| b.person.total_cmp(&a.person));
         let source = |image: &DepthImage| frame.sources.get(usize::from(image.source)).cloned().unwrap_or_default();
         found.iter().map(|(detection, image)| PyDetection::new(py, detection, image, source(image))).collect()
@@ -78,40 +75,29 @@ impl PyDetector {
 }
 
 #[doc = stub!("Detection")]
-#[pyclass(name = "Detection", module = "voodoo", frozen)]
+#[pyclass(name = "Detection", module = "voodoo", frozen, get_all)]
 pub(crate) struct PyDetection {
     #[doc = stub!("Detection.joints")]
-    #[pyo3(get)]
     joints: Py<PyDict>,
     #[doc = stub!("Detection.joint_sigma")]
-    #[pyo3(get)]
     joint_sigma: Py<PyDict>,
     #[doc = stub!("Detection.visible")]
-    #[pyo3(get)]
     visible: Py<PyDict>,
     #[doc = stub!("Detection.lengths")]
-    #[pyo3(get)]
     lengths: Py<PyDict>,
     #[doc = stub!("Detection.length_sigma")]
-    #[pyo3(get)]
     length_sigma: Py<PyDict>,
     #[doc = stub!("Detection.stature")]
-    #[pyo3(get)]
     stature: f64,
     #[doc = stub!("Detection.facing")]
-    #[pyo3(get)]
     facing: f64,
     #[doc = stub!("Detection.confidence")]
-    #[pyo3(get)]
     confidence: f64,
     #[doc = stub!("Detection.source")]
-    #[pyo3(get)]
     source: String,
     #[doc = stub!("Detection.mask")]
-    #[pyo3(get)]
     mask: Py<PyArray2<bool>>,
     #[doc = stub!("Detection.floor")]
-    #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
 }
 
@@ -131,9 +117,8 @@ impl PyDetection {
     fn new(py: Python<'_>, found: &Detection, image: &DepthImage, source: String) -> PyResult<Self> {
         let joints = || JOINTS.iter().zip(found.joints.iter().flatten());
         let lengths = || LENGTHS.iter().zip(&found.lengths);
-        let positions = joints().map(|(name, joint)| (name, PyArray1::from_slice(py, &joint.position.to_array())));
         Ok(Self {
-            joints: positions.into_py_dict(py)?.unbind(),
+            joints: joints().map(|(name, joint)| (name, Row(joint.position))).into_py_dict(py)?.unbind(),
             joint_sigma: joints().map(|(name, joint)| (name, joint.sigma)).into_py_dict(py)?.unbind(),
             visible: joints().map(|(name, joint)| (name, joint.visible)).into_py_dict(py)?.unbind(),
             lengths: lengths().map(|(name, [length, _])| (name, *length)).into_py_dict(py)?.unbind(),
@@ -159,25 +144,19 @@ impl PyDetection {
 }
 
 #[doc = stub!("PersonCandidate")]
-#[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen)]
+#[pyclass(name = "PersonCandidate", module = "voodoo._core", frozen, get_all)]
 pub(crate) struct PyCandidate {
     #[doc = stub!("PersonCandidate.crop")]
-    #[pyo3(get)]
     crop: Py<PyArray3<f32>>,
     #[doc = stub!("PersonCandidate.mask")]
-    #[pyo3(get)]
     mask: Py<PyArray2<bool>>,
     #[doc = stub!("PersonCandidate.middle")]
-    #[pyo3(get)]
     middle: [f64; 3],
     #[doc = stub!("PersonCandidate.roll")]
-    #[pyo3(get)]
     roll: f64,
     #[doc = stub!("PersonCandidate.area")]
-    #[pyo3(get)]
     area: f64,
     #[doc = stub!("PersonCandidate.floor")]
-    #[pyo3(get)]
     floor: Option<([f64; 3], f64)>,
 }
 
@@ -187,18 +166,17 @@ pub(crate) struct PyCandidate {
 pub(crate) fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
-    camera: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
 ) -> PyResult<Vec<PyCandidate>> {
-    let wrong = || wrong_argument(py, "depth", "an array of shape (height, width) and dtype float32", depth);
+    let wrong = || wrong_argument("depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
     let view = array.readonly();
-    let camera = camera_of(camera)?;
     let [height, width] = [camera.height(), camera.width()];
     if view.as_array().dim() != (height, width) {
-        return Err(wrong_argument(py, "depth", &format!("shape ({height}, {width}), as its camera has"), depth));
+        return Err(wrong_argument("depth", &format!("shape ({height}, {width}), as its camera has"), depth));
     }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),

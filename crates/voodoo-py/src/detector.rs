@@ -11,9 +11,11 @@ use pyo3::types::{PyDict, PyString, PyTuple};
 use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
+use voodoo_detect::Detector;
 
-use crate::arrays::{contiguous, vector};
-use crate::errors::{exception, wrong_argument};
+use crate::arrays::{Row, contiguous, vector};
+use crate::detect::PyDetector;
+use crate::errors::{ConfigError, MeasurementError, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
 const SIGMA: f64 = 0.05;
@@ -22,15 +24,13 @@ const LEAST: f64 = 1e-7;
 
 /// The `detector` argument of a caller: "shipped", None, a `voodoo.Detector`, or an object with `joints` and `detect(image)`.
 pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Detect>>> {
-    let py = given.py();
     if given.is_none() {
         return Ok(None);
     }
     if given.cast::<PyString>().is_ok_and(|word| word == "shipped") {
-        return Ok(shipped());
+        return Ok(Some(Box::new(Detector::new())));
     }
-    #[cfg(feature = "detect")]
-    if let Ok(detector) = given.cast::<crate::detect::PyDetector>() {
+    if let Ok(detector) = given.cast::<PyDetector>() {
         return Ok(Some(detector.try_borrow()?.0.fresh()));
     }
     if given.hasattr("joints")? && given.hasattr("detect")? {
@@ -40,15 +40,7 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
         "detector: expected \"shipped\", None, a voodoo.Detector, or an object with joints and detect(image), found {}",
         given.repr()?
     );
-    Err(exception(py, "ConfigError", text))
-}
-
-/// The detector that ships with the library, if this build contains it.
-fn shipped() -> Option<Box<dyn Detect>> {
-    #[cfg(feature = "detect")]
-    return Some(Box::new(voodoo_detect::Detector::new()));
-    #[cfg(not(feature = "detect"))]
-    None
+    Err(ConfigError::new_err(text))
 }
 
 /// Reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like unchanged.
@@ -81,7 +73,7 @@ impl PythonDetector {
             found.extract().map_err(|_| {
                 let found = found.repr().map_or_else(|_| "something else".into(), |text| text.to_string());
                 let text = format!("detector.{attribute}: expected a sequence of names, found {found}");
-                exception(object.py(), "ConfigError", text)
+                ConfigError::new_err(text)
             })
         };
         Ok(Self { joints: names("joints")?, lengths: names("lengths")?, object: Arc::new(object.clone().unbind()) })
@@ -104,14 +96,13 @@ impl PythonDetector {
 
     /// Converts an object with the attributes of `voodoo.detectors.DetectedPerson`.
     fn detection(&self, person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Detection> {
-        let py = person.py();
         if person.getattr("joints")?.is_none() {
-            return Err(wrong_argument(py, "joints", "a mapping from names", &person.getattr("joints")?));
+            return Err(wrong_argument("joints", "a mapping from names", &person.getattr("joints")?));
         }
         let positions: HashMap<String, Bound<'_, PyAny>> = mapping(person, "joints")?;
         if let Some(name) = positions.keys().find(|name| !self.joints.contains(name)) {
             let text = format!("joints: expected some of {}, found {name:?}", self.joints.join(", "));
-            return Err(exception(py, "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         let (sigma, visible) = (of_each(person, "joint_sigma", SIGMA)?, of_each(person, "visible", 1.0)?);
         let joint = |name: &String| {
@@ -144,7 +135,7 @@ impl PythonDetector {
                     "lengths and length_sigma: expected all of {}, found none of {name}",
                     self.lengths.join(", ")
                 );
-                Err(exception(person.py(), "MeasurementError", text))
+                Err(MeasurementError::new_err(text))
             }
         };
         self.lengths.iter().map(length).collect()
@@ -182,36 +173,23 @@ fn input<'py>(
     around: &Surroundings,
     query: DetectionQuery,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (width, height, lens) = (image.camera.width(), image.camera.height(), image.camera.lens());
-    let ([fx, fy], [cx, cy]) = (image.camera.focal(), image.camera.center());
+    let [width, height] = [image.camera.width(), image.camera.height()];
+    let ([fx, fy], [cx, cy], lens) = (image.camera.focal(), image.camera.center(), image.camera.lens());
+    let distortion = PyTuple::new(py, lens.coefficients())?;
+    let camera = py.import("voodoo.model.camera")?.getattr("Camera")?;
+    let camera = camera.call1((width, height, fx, fy, cx, cy, distortion, lens.model()))?;
     let mut depth = Vec::new();
     around.open_depth(image, &mut depth);
-    let camera = PyDict::new(py);
-    camera.set_item("width", width)?;
-    camera.set_item("height", height)?;
-    for (name, value) in [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)] {
-        camera.set_item(name, value)?;
-    }
-    camera.set_item("distortion", PyTuple::new(py, lens.coefficients())?)?;
-    camera.set_item("model", lens.model())?;
-    let camera = py.import("voodoo.model.camera")?.getattr("Camera")?.call((), Some(&camera))?;
+    let depth = PyArray1::from_vec(py, depth).reshape([height, width])?;
+    let pose = PyArray1::from_slice(py, matrix(&image.world_from_sensor).as_flattened()).reshape([4, 4])?;
+    let floor = around.ground.map(|Ground { normal, offset }| (normal.to_array(), offset));
     let (query, near) = match query {
         DetectionQuery::All => ("all", None),
         DetectionQuery::Any => ("any", None),
         DetectionQuery::New => ("new", None),
-        DetectionQuery::Near(place) => ("near", Some(PyArray1::from_slice(py, &place.to_array()))),
+        DetectionQuery::Near(place) => ("near", Some(Row(place))),
     };
-    let fields = PyDict::new(py);
-    fields.set_item("depth", PyArray1::from_vec(py, depth).reshape([height, width])?)?;
-    fields.set_item("camera", camera)?;
-    fields.set_item(
-        "world_from_sensor",
-        PyArray1::from_slice(py, matrix(&image.world_from_sensor).as_flattened()).reshape([4, 4])?,
-    )?;
-    fields.set_item("floor", around.ground.map(|Ground { normal, offset }| (normal.to_array(), offset)))?;
-    fields.set_item("query", query)?;
-    fields.set_item("near", near)?;
-    py.import("voodoo.detectors")?.getattr("DetectorImage")?.call((), Some(&fields))
+    py.import("voodoo.detectors")?.getattr("DetectorImage")?.call1((depth, camera, pose, floor, query, near))
 }
 
 /// An attribute that is a mapping by names; empty where it is missing or None.
@@ -222,7 +200,7 @@ where
     let Some(found) = given(person, attribute)? else { return Ok(HashMap::new()) };
     let pairs = found.py().get_type::<PyDict>().call1((&found,));
     let found_pairs = pairs.and_then(|pairs| pairs.extract());
-    found_pairs.map_err(|_| wrong_argument(person.py(), attribute, "a mapping from names", &found))
+    found_pairs.map_err(|_| wrong_argument(attribute, "a mapping from names", &found))
 }
 
 /// An attribute; none where it is missing or None.
@@ -243,7 +221,7 @@ fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>>
     let Some(found) = given(person, attribute)? else { return Ok(None) };
     let probability = found.extract::<f64>().ok().filter(|value| (0.0..=1.0).contains(value));
     let probability = probability
-        .ok_or_else(|| wrong_argument(person.py(), attribute, "a probability, from 0 to 1", &found))?
+        .ok_or_else(|| wrong_argument(attribute, "a probability, from 0 to 1", &found))?
         .clamp(LEAST, 1.0 - LEAST);
     Ok(Some((probability / (1.0 - probability)).ln()))
 }
@@ -251,7 +229,7 @@ fn log_odds(person: &Bound<'_, PyAny>, attribute: &str) -> PyResult<Option<f64>>
 /// The attribute `floor`: normal and offset, or None.
 fn floor(person: &Bound<'_, PyAny>) -> PyResult<Option<Ground>> {
     let Some(found) = given(person, "floor")? else { return Ok(None) };
-    let wrong = |_| wrong_argument(person.py(), "floor", "a unit normal and an offset in meters", &found);
+    let wrong = |_| wrong_argument("floor", "a unit normal and an offset in meters", &found);
     let (normal, offset): (Bound<'_, PyAny>, f64) = found.extract().map_err(wrong)?;
     let normal: Vec3 = vector("floor[0]", &normal)?;
     Ok(normal.try_normalize().map(|normal| Ground { normal, offset }))
@@ -264,7 +242,7 @@ fn pixels(person: &Bound<'_, PyAny>, image: &DepthImage) -> PyResult<Vec<usize>>
     let [height, width] = [image.camera.height(), image.camera.width()];
     let array = array.filter(|array| array.shape() == [height, width]).ok_or_else(|| {
         let expected = format!("an array of shape ({height}, {width}) and dtype bool");
-        wrong_argument(person.py(), "mask", &expected, &found)
+        wrong_argument("mask", &expected, &found)
     })?;
     let view = array.readonly();
     Ok(view.as_slice()?.iter().enumerate().filter(|(_, visible)| **visible).map(|(index, _)| index).collect())

@@ -2,62 +2,59 @@
 
 use std::fmt::Display;
 
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::import_exception;
 use pyo3::prelude::*;
-use voodoo_core::ShapeError;
-use voodoo_core::{BodyError, CameraError, ConfigError, TrackError};
 
-/// An exception of `voodoo.errors` by its class name.
-pub(crate) fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
-    match py.import("voodoo.errors").and_then(|module| module.getattr(class)).and_then(|class| class.call1((message,)))
-    {
-        Ok(value) => PyErr::from_value(value),
-        Err(error) => error,
-    }
-}
+import_exception!(voodoo.errors, BodyError);
+import_exception!(voodoo.errors, CameraError);
+import_exception!(voodoo.errors, ConfigError);
+import_exception!(voodoo.errors, MeasurementError);
 
 /// Translation of a core error; a trait because both types are foreign here.
-pub(crate) trait IntoPy: Display + Sized {
-    /// Its class in `voodoo.errors`.
-    const CLASS: &'static str;
+pub(crate) trait Raise: Display + Sized {
+    /// Its exception.
+    const NEW: fn(String) -> PyErr;
 
-    fn class(&self) -> &'static str {
-        Self::CLASS
-    }
-
-    fn into_py(self, py: Python<'_>) -> PyErr {
-        exception(py, self.class(), self.to_string())
+    fn raise(self) -> PyErr {
+        Self::NEW(self.to_string())
     }
 }
 
-impl IntoPy for BodyError {
-    const CLASS: &'static str = "BodyError";
+impl Raise for voodoo_core::BodyError {
+    const NEW: fn(String) -> PyErr = BodyError::new_err;
 }
 
-impl IntoPy for CameraError {
-    const CLASS: &'static str = "CameraError";
+impl Raise for voodoo_core::CameraError {
+    const NEW: fn(String) -> PyErr = CameraError::new_err;
 }
 
-impl IntoPy for ShapeError {
-    const CLASS: &'static str = "BodyError";
+impl Raise for voodoo_core::ShapeError {
+    const NEW: fn(String) -> PyErr = BodyError::new_err;
 }
 
-impl IntoPy for ConfigError {
-    const CLASS: &'static str = "ConfigError";
+impl Raise for voodoo_core::ConfigError {
+    const NEW: fn(String) -> PyErr = ConfigError::new_err;
 }
 
-impl IntoPy for TrackError {
-    const CLASS: &'static str = "MeasurementError";
+impl Raise for voodoo_core::TrackError {
+    const NEW: fn(String) -> PyErr = MeasurementError::new_err;
 
-    fn class(&self) -> &'static str {
-        if matches!(self, Self::Body(_)) { BodyError::CLASS } else { Self::CLASS }
+    fn raise(self) -> PyErr {
+        if matches!(self, Self::Body(_)) { BodyError::new_err(self.to_string()) } else { Self::NEW(self.to_string()) }
     }
 }
 
-/// What was expected of an argument and what it is.
-pub(crate) fn wrong_argument(py: Python<'_>, name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
-    let mut found = found.repr().map_or_else(|_| "something without a repr".into(), |text| text.to_string());
-    if found.chars().count() > 120 {
-        found = found.chars().take(120).chain("...".chars()).collect();
-    }
-    exception(py, "MeasurementError", format!("{name}: expected {expected}, found {found}"))
+/// What was expected of an argument and what it is: of an array its shape and type.
+pub(crate) fn wrong(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> String {
+    let found = match found.cast::<PyUntypedArray>() {
+        Ok(array) => format!("shape {:?}, dtype {}", array.shape(), array.dtype()),
+        Err(_) => found.repr().map_or_else(|_| "something without a repr".into(), |text| text.to_string()),
+    };
+    let more = if found.chars().count() > 120 { "..." } else { "" };
+    format!("{name}: expected {expected}, found {found:.120}{more}")
+}
+
+pub(crate) fn wrong_argument(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
+    MeasurementError::new_err(wrong(name, expected, found))
 }

@@ -2,39 +2,32 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyMappingProxy, PyTuple};
+use pyo3::types::{IntoPyDict, PyMappingProxy, PyTuple};
 use pythonize::{depythonize, pythonize};
-use voodoo_core::Body;
 use voodoo_core::Estimate;
 use voodoo_core::math::{Mat3, Vec3};
+use voodoo_core::{Body, Limb};
 
-use crate::arrays::{frozen, matrices};
-use crate::errors::exception;
+use crate::arrays::{Array, frozen, matrices};
+use crate::errors::MeasurementError;
 
-/// The names for the numbers of an estimate; shared by all estimates of one body.
+/// The names for the numbers of an estimate, as Python objects that every frame reads; shared by all estimates of one body.
 pub struct Names {
-    pub limbs: Vec<String>,
-    pub sites: Vec<String>,
-    /// Name of the joint of each limb; `None` for the root.
-    pub joints: Vec<Option<String>>,
-    /// The sites as Python objects, since every frame reads them.
-    site_tuple: PyOnceLock<Py<PyTuple>>,
+    pub limbs: Py<PyTuple>,
+    pub sites: Py<PyTuple>,
+    /// Name of the joint of each limb; None for the root.
+    pub joints: Py<PyTuple>,
 }
 
 impl Names {
-    pub fn from_body(body: &Body) -> Self {
-        Self::new(
-            body.limbs().iter().map(|limb| limb.name.clone()).collect(),
-            body.sites().iter().map(|site| site.name.clone()).collect(),
-            body.limbs().iter().map(|limb| limb.parent.as_ref().map(|(_, joint)| joint.name.clone())).collect(),
-        )
-    }
-
-    fn new(limbs: Vec<String>, sites: Vec<String>, joints: Vec<Option<String>>) -> Self {
-        Self { limbs, sites, joints, site_tuple: PyOnceLock::new() }
+    pub fn from_body(py: Python<'_>, body: &Body) -> PyResult<Self> {
+        let joint = |limb: &Limb| limb.parent.as_ref().map(|(_, joint)| joint.name.clone());
+        Ok(Self {
+            limbs: PyTuple::new(py, body.limbs().iter().map(|limb| &limb.name))?.unbind(),
+            sites: PyTuple::new(py, body.sites().iter().map(|site| &site.name))?.unbind(),
+            joints: PyTuple::new(py, body.limbs().iter().map(joint))?.unbind(),
+        })
     }
 }
 
@@ -46,55 +39,45 @@ pub struct PyEstimate {
     pub sources: Vec<String>,
 }
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
-
-fn mapping<'py, 'a, T: IntoPyObject<'py>>(
+/// Values by name; none of what has no name.
+fn mapping<'py, T: IntoPyObject<'py>>(
     py: Python<'py>,
-    items: impl Iterator<Item = (&'a String, T)>,
+    names: &Py<PyTuple>,
+    values: impl IntoIterator<Item = T>,
 ) -> PyResult<Bound<'py, PyMappingProxy>> {
-    let dict = PyDict::new(py);
-    for (name, value) in items {
-        dict.set_item(name, value)?;
-    }
-    Ok(PyMappingProxy::new(py, dict.as_mapping()))
+    let named = names.bind(py).iter().zip(values).filter(|(name, _)| !name.is_none());
+    Ok(PyMappingProxy::new(py, named.into_py_dict(py)?.as_mapping()))
 }
 
 /// The rows of one array by name, as views, which are cheaper than separate arrays.
-fn rows<'py, 'a>(
-    names: impl IntoIterator<Item = &'a String>,
-    all: &Array<'py>,
-) -> PyResult<Bound<'py, PyMappingProxy>> {
-    let dict = PyDict::new(all.py());
-    for (name, row) in names.into_iter().zip(0..all.shape()[0]) {
-        dict.set_item(name, all.get_item(row)?)?;
-    }
-    Ok(PyMappingProxy::new(all.py(), dict.as_mapping()))
+fn rows<'py>(names: &Py<PyTuple>, all: &Array<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+    mapping(all.py(), names, all.try_iter()?.collect::<PyResult<Vec<_>>>()?)
 }
 
 /// The arguments of [`_estimate`]: the estimate as plain Python, and the names of limbs, sites, joints and sources.
-type Plain<'py> = (Bound<'py, PyAny>, Vec<String>, Vec<String>, Vec<Option<String>>, Vec<String>);
+type Plain<'py> = (Bound<'py, PyAny>, Py<PyTuple>, Py<PyTuple>, Py<PyTuple>, Vec<String>);
 
 #[doc = stub!("_estimate")]
 #[pyfunction]
 pub(crate) fn _estimate(
     found: &Bound<'_, PyAny>,
-    limbs: Vec<String>,
-    sites: Vec<String>,
-    joints: Vec<Option<String>>,
+    limbs: Py<PyTuple>,
+    sites: Py<PyTuple>,
+    joints: Py<PyTuple>,
     sources: Vec<String>,
 ) -> PyResult<PyEstimate> {
-    let estimate = depythonize(found).map_err(|error| {
-        exception(found.py(), "MeasurementError", format!("estimate: expected a pickled one, {error}"))
-    })?;
-    Ok(PyEstimate { estimate, names: Arc::new(Names::new(limbs, sites, joints)), sources })
+    let estimate = depythonize(found)
+        .map_err(|error| MeasurementError::new_err(format!("estimate: expected a pickled one, {error}")))?;
+    Ok(PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources })
 }
 
 #[doc = stub!("_nobody")]
 #[pyfunction]
-pub(crate) fn _nobody(stamp: f64) -> PyEstimate {
+pub(crate) fn _nobody(py: Python<'_>, stamp: f64) -> PyEstimate {
     let mut estimate = Estimate::default();
     estimate.stamp = stamp;
-    PyEstimate { estimate, names: Arc::new(Names::new(Vec::new(), Vec::new(), Vec::new())), sources: Vec::new() }
+    let [limbs, sites, joints] = [(); 3].map(|()| PyTuple::empty(py).unbind());
+    PyEstimate { estimate, names: Arc::new(Names { limbs, sites, joints }), sources: Vec::new() }
 }
 
 #[pymethods]
@@ -114,7 +97,7 @@ impl PyEstimate {
     #[doc = stub!("Estimate.limb_status")]
     #[getter]
     fn limb_status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_status.iter().map(|status| status.name())))
+        mapping(py, &self.names.limbs, self.estimate.limb_status.iter().map(|status| status.name()))
     }
 
     #[doc = stub!("Estimate.steps")]
@@ -137,15 +120,14 @@ impl PyEstimate {
 
     #[doc = stub!("Estimate.joint_names")]
     #[getter]
-    fn joint_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        let made = || PyTuple::new(py, &self.names.sites).map(Bound::unbind);
-        self.names.site_tuple.get_or_try_init(py, made).map(|names| names.bind(py).clone())
+    fn joint_names(&self) -> &Py<PyTuple> {
+        &self.names.sites
     }
 
     #[doc = stub!("Estimate.limb_names")]
     #[getter]
-    fn limb_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.names.limbs)
+    fn limb_names(&self) -> &Py<PyTuple> {
+        &self.names.limbs
     }
 
     #[doc = stub!("Estimate.joint_positions")]
@@ -212,60 +194,58 @@ impl PyEstimate {
     #[doc = stub!("Estimate.angle_covariance")]
     #[getter]
     fn angle_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let turns = self.names.joints.iter().zip(&self.estimate.covariances.turns);
-        let (names, turns): (Vec<_>, Vec<_>) = turns.filter_map(|(name, turn)| Some((name.as_ref()?, turn))).unzip();
+        let turns = &self.estimate.covariances.turns;
         // Symmetric: columns are rows.
-        let all = turns.iter().flat_map(|turn: &&Mat3| turn.to_cols_array()).collect();
-        rows(names, &frozen(py, all, &[turns.len(), 3, 3])?)
+        let all = turns.iter().flat_map(Mat3::to_cols_array).collect();
+        rows(&self.names.joints, &frozen(py, all, &[turns.len(), 3, 3])?)
     }
 
     #[doc = stub!("Estimate.length_sigma")]
     #[getter]
     fn length_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, self.names.limbs.iter().zip(self.estimate.covariances.lengths.iter().copied()))
+        mapping(py, &self.names.limbs, self.estimate.covariances.lengths.iter().copied())
     }
 
     #[doc = stub!("Estimate.girth_sigma")]
     #[getter]
     fn girth_sigma<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, self.names.limbs.iter().zip(self.estimate.covariances.girths.iter().copied()))
+        mapping(py, &self.names.limbs, self.estimate.covariances.girths.iter().copied())
     }
 
     #[doc = stub!("Estimate.limb_points")]
     #[getter]
     fn limb_points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_points.iter().copied()))
+        mapping(py, &self.names.limbs, self.estimate.limb_points.iter().copied())
     }
 
     #[doc = stub!("Estimate.limb_residual")]
     #[getter]
     fn limb_residual<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        mapping(py, self.names.limbs.iter().zip(self.estimate.limb_residual.iter().copied()))
+        mapping(py, &self.names.limbs, self.estimate.limb_residual.iter().copied())
     }
 
     #[doc = stub!("Estimate.joint_gaps")]
     #[getter]
     fn joint_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let gaps = self.names.joints.iter().zip(&self.estimate.joint_gaps);
-        mapping(py, gaps.filter_map(|(name, gap)| Some((name.as_ref()?, *gap))))
+        mapping(py, &self.names.joints, self.estimate.joint_gaps.iter().copied())
     }
 
     #[doc = stub!("Estimate.sources")]
     #[getter]
     fn sources<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
-        let reports = self.sources.iter().enumerate().map(|(index, name)| {
+        let report = |index: usize| {
             let report = self.estimate.sources.get(index).copied().unwrap_or_default();
-            let residual = if report.inliers > 0 { report.residual } else { f64::NAN };
-            (name, (report.count, report.inliers, residual))
-        });
-        mapping(py, reports)
+            (report.count, report.inliers, if report.inliers > 0 { report.residual } else { f64::NAN })
+        };
+        let reports = self.sources.iter().enumerate().map(|(index, name)| (name, report(index)));
+        Ok(PyMappingProxy::new(py, reports.into_py_dict(py)?.as_mapping()))
     }
 
     /// For pickle and copy.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Plain<'py>)> {
-        let Names { limbs, sites, joints, .. } = &*self.names;
-        let found = pythonize(py, &self.estimate)?;
-        let plain = (found, limbs.clone(), sites.clone(), joints.clone(), self.sources.clone());
+        let [limbs, sites, joints] =
+            [&self.names.limbs, &self.names.sites, &self.names.joints].map(|n| n.clone_ref(py));
+        let plain = (pythonize(py, &self.estimate)?, limbs, sites, joints, self.sources.clone());
         Ok((py.import("voodoo._core")?.getattr("_estimate")?, plain))
     }
 

@@ -1,20 +1,24 @@
 //! `Frame`: holds references to the caller's arrays until the step reads them.
 
+use std::sync::Arc;
+
 use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::Ground;
-use voodoo_core::math::{Aabb, Vec3};
+use voodoo_core::Camera;
+use voodoo_core::math::Aabb;
+use voodoo_core::{Cloud, Ground, PointSlice, PositionRelation, RayRelation, Scope};
 
 use crate::arguments;
-use crate::arrays::{ColorArray, DepthArray, PointArray, pose, unmasked, vector, wrong_array};
-use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, SiteData, number};
+use crate::arrays::{ColorArray, DepthArray, PointArray, Row, pose, unmasked, vector};
+use crate::borrowed::{CloudData, ColorData, ColorViews, DepthViews, ImageData, PositionData, RayData, number};
 use crate::camera::camera_of;
-use crate::errors::{exception, wrong_argument};
+use crate::errors::{MeasurementError, wrong_argument};
 use crate::sites::PySiteRay;
 
 #[doc = stub!("Frame")]
 #[pyclass(name = "Frame", module = "voodoo")]
+#[derive(Default)]
 pub struct PyFrame {
     #[doc = stub!("Frame.stamp")]
     #[pyo3(get)]
@@ -22,9 +26,10 @@ pub struct PyFrame {
     pub(crate) clouds: Vec<CloudData>,
     pub(crate) images: Vec<ImageData>,
     pub(crate) colors: Vec<ColorData>,
-    pub(crate) sites: Vec<SiteData>,
+    pub(crate) positions: Vec<PositionData>,
+    pub(crate) rays: Vec<RayData>,
     /// Positions of the sites of persons who were found in this instant, and log odds.
-    pub(crate) detections: Vec<(Vec<SiteData>, f64)>,
+    pub(crate) detections: Vec<(Vec<PositionData>, f64)>,
     pub(crate) ground: Option<Ground>,
     pub(crate) excluded: Vec<Aabb>,
     pub sources: Vec<String>,
@@ -51,8 +56,7 @@ impl PyFrame {
     #[new]
     #[pyo3(signature = (stamp))]
     fn new(#[pyo3(from_py_with = arguments::stamp)] stamp: f64) -> Self {
-        let (clouds, images, colors, sites, detections, excluded, sources) = Default::default();
-        Self { stamp, clouds, images, colors, sites, detections, ground: None, excluded, sources }
+        Self { stamp, ..Self::default() }
     }
 
     #[doc = stub!("Frame.add_points")]
@@ -66,15 +70,15 @@ impl PyFrame {
         on_body: bool,
         source: &str,
     ) -> PyResult<()> {
-        let data = CloudData {
-            points: PointArray::new("points", points)?,
+        let array = PointArray::new("points", points)?;
+        let cloud = Cloud {
+            points: PointSlice::F32(&[]),
             world_from_sensor: pose("world_from_sensor", world_from_sensor)?,
             weight,
-            limb,
-            on_body,
+            scope: if on_body { Scope::Body } else { Scope::Free },
             source: self.source(source),
         };
-        self.clouds.push(data);
+        self.clouds.push((array, cloud, limb));
         Ok(())
     }
 
@@ -83,24 +87,24 @@ impl PyFrame {
     fn add_depth(
         &mut self,
         image: &Bound<'_, PyAny>,
-        camera: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         #[pyo3(from_py_with = arguments::meters_per_unit)] meters_per_unit: f64,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = arguments::weight)] weight: f64,
         source: &str,
     ) -> PyResult<()> {
-        let camera = camera_of(camera)?;
         let [height, width] = [camera.height(), camera.width()];
-        let wrong = || wrong_array("image", "shape (height, width) and dtype uint16 or float32", image);
-        let array = image.cast::<PyUntypedArray>().map_err(|_| wrong())?;
+        let expected = "an array of shape (height, width) and dtype uint16 or float32";
+        let wrong = |found: &Bound<'_, PyAny>| wrong_argument("image", expected, found);
+        let array = image.cast::<PyUntypedArray>().map_err(|_| wrong(&image.get_type()))?;
         unmasked("image", image, "fill it with 0, which is no return: image.filled(0)")?;
-        let pixels = DepthArray::cast(image).ok_or_else(wrong)?;
+        let pixels = DepthArray::cast(image).ok_or_else(|| wrong(image))?;
         if array.shape() != [height, width] {
             let text = format!(
                 "image: expected {height} rows of {width} pixels, as its camera has, found shape {:?}",
                 array.shape()
             );
-            return Err(exception(image.py(), "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         let data = ImageData {
             pixels,
@@ -119,18 +123,17 @@ impl PyFrame {
     fn add_color(
         &mut self,
         image: &Bound<'_, PyAny>,
-        camera: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         world_from_sensor: Option<&Bound<'_, PyAny>>,
         stamp: Option<&Bound<'_, PyAny>>,
         source: &str,
     ) -> PyResult<()> {
-        let camera = camera_of(camera)?;
         let [height, width] = [camera.height(), camera.width()];
         let expected = format!("an array of shape ({height}, {width}, 3) or ({height}, {width}) and dtype uint8");
         unmasked("image", image, "fill it: image.filled(0)")?;
         let (pixels, _) = ColorArray::new(image)
             .filter(|(_, found)| *found == [height, width])
-            .ok_or_else(|| wrong_argument(image.py(), "image", &expected, image))?;
+            .ok_or_else(|| wrong_argument("image", &expected, image))?;
         let data = ColorData {
             pixels,
             camera,
@@ -153,7 +156,7 @@ impl PyFrame {
         source: &str,
     ) -> PyResult<()> {
         let (position, source) = (vector("position", position)?, self.source(source));
-        self.sites.push(SiteData { site, position, direction: None, weight, bias, source });
+        self.positions.push((site, PositionRelation { site: 0, position, weight, bias, source }));
         Ok(())
     }
 
@@ -168,9 +171,9 @@ impl PyFrame {
         #[pyo3(from_py_with = arguments::bias)] bias: f64,
         source: &str,
     ) -> PyResult<()> {
-        let (position, direction) = (vector("origin", origin)?, Some(vector("direction", direction)?));
+        let (origin, direction) = (vector("origin", origin)?, vector("direction", direction)?);
         let source = self.source(source);
-        self.sites.push(SiteData { site, position, direction, weight, bias, source });
+        self.rays.push((site, RayRelation { site: 0, origin, direction, weight, bias, source }));
         Ok(())
     }
 
@@ -187,7 +190,7 @@ impl PyFrame {
         let position = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
             let site = arguments::site(&name)?;
             let position = vector(&format!("joints[{site}]"), &position)?;
-            Ok(SiteData { site, position, direction: None, weight, bias: 0.0, source })
+            Ok((site, PositionRelation { site: 0, position, weight, bias: 0.0, source }))
         };
         let positions = joints.iter().map(position).collect::<PyResult<_>>()?;
         self.detections.push((positions, log_odds));
@@ -196,11 +199,12 @@ impl PyFrame {
 
     /// Mean distance of the measured positions and rays from the predicted positions of their sites, meters; infinite without any.
     fn _distance(&self, sites: &Bound<'_, PyDict>) -> PyResult<f64> {
+        let positions = self.positions.iter().map(|(site, of)| (site, of.position, None));
+        let rays = self.rays.iter().map(|(site, of)| (site, of.origin, of.direction.try_normalize()));
         let (mut sum, mut count) = (0.0, 0);
-        for data in &self.sites {
-            if let Some(place) = sites.get_item(&data.site)? {
-                let away = vector(&data.site, &place)? - data.position;
-                let along = data.direction.and_then(Vec3::try_normalize);
+        for (site, start, along) in positions.chain(rays) {
+            if let Some(place) = sites.get_item(site)? {
+                let away = vector(site, &place)? - start;
                 sum += along.map_or(away, |along| away.reject_from_normalized(along)).length();
                 count += 1;
             }
@@ -212,7 +216,6 @@ impl PyFrame {
     #[pyo3(signature = (rays, *, reference_sigma, max_weight, min_trust))]
     fn _add_site_rays(
         &mut self,
-        py: Python<'_>,
         rays: Vec<PyRef<'_, PySiteRay>>,
         reference_sigma: f64,
         max_weight: f64,
@@ -222,20 +225,20 @@ impl PyFrame {
             if sigma > 0.0 && sigma.is_finite() {
                 return Ok((reference_sigma / sigma).powi(2).min(max_weight));
             }
-            Err(exception(py, "MeasurementError", format!("sigma: expected finite meters > 0, found {sigma}")))
+            Err(MeasurementError::new_err(format!("sigma: expected finite meters > 0, found {sigma}")))
         };
-        let trusted = rays.iter().map(|ray| &ray.0).filter(|ray| ray.trust >= min_trust);
+        let trusted = rays.iter().filter(|ray| ray.trust >= min_trust);
         let mut count = 0;
         for ray in trusted {
-            let source = self.source(&ray.source);
-            let data = |position, direction, weight| {
-                let (site, weight, bias) = (ray.site.clone(), weight * ray.trust, ray.bias);
-                SiteData { site, position, direction, weight, bias, source }
-            };
-            self.sites.push(data(ray.origin, Some(ray.direction), weight(ray.sigma)?));
-            if let Some(place) = ray.place {
-                self.sites.push(data(place, None, weight(ray.place_sigma)?));
+            let (site, source, origin, direction, bias) =
+                (ray.site.clone(), self.source(&ray.source), ray.origin.0, ray.direction.0, ray.bias);
+            let weight = |sigma: f64| Ok::<_, PyErr>(weight(sigma)? * ray.trust);
+            if let Some(Row(position)) = ray.place {
+                let of = PositionRelation { site: 0, position, weight: weight(ray.place_sigma)?, bias, source };
+                self.positions.push((site.clone(), of));
             }
+            self.rays
+                .push((site, RayRelation { site: 0, origin, direction, weight: weight(ray.sigma)?, bias, source }));
             count += 1;
         }
         Ok(count)
@@ -265,7 +268,7 @@ impl PyFrame {
             self.clouds.len(),
             self.images.len(),
             self.colors.len(),
-            self.sites.len(),
+            self.positions.len() + self.rays.len(),
             self.detections.len(),
             self.sources
         )

@@ -1,6 +1,6 @@
 //! `Chain` of inverse kinematics; `voodoo.ik` validates and names inputs and outputs.
 
-use numpy::{PyArrayDyn, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use voodoo_core::Body;
@@ -10,15 +10,14 @@ use voodoo_ik::{
     SolverOptions, Trunk,
 };
 
-use crate::arrays::{frozen, limb_poses, matrices, pose};
+use crate::arrays::{Array, frozen, limb_poses, matrices, pose};
 use crate::body::PyBody;
-use crate::errors::{IntoPy, exception};
+use crate::errors::{BodyError, MeasurementError, Raise};
 use crate::ik_view::PyView;
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
-/// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, each `(N,)`; and
-/// of the last posture, poses `(P, 4, 4)` and the residual of every goal.
-type Solved<'py> = (Array<'py>, Array<'py>, Vec<Array<'py>>, Array<'py>, Bound<'py, PyTuple>);
+/// Angles `(N, n)`; sites `(N, S, 3)`; h, steps, postures tried, those compared with images, and converged as 0 or 1, `(5, N)`; and of
+/// the last posture, poses `(P, 4, 4)` and the residual of every goal.
+type Solved<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Bound<'py, PyTuple>);
 /// site, "position" or "line", position or (direction, moment), weight, level
 type GoalParts = (String, String, [f64; 6], f64, usize);
 /// site, site, radius
@@ -33,11 +32,6 @@ pub struct PyChain {
     model: ChainModel,
 }
 
-/// A solver that pulls the angles of these indices towards these values, with the lowest priority.
-fn resting(rest: &[(usize, f64)]) -> IkSolver {
-    IkSolver::with_rest(rest.iter().map(|&(unknown, angle)| Rest { unknown, angle }).collect())
-}
-
 fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) -> SolverOptions {
     let mut options = SolverOptions::default();
     (options.steps, options.tolerance, options.still) = (steps, tolerance, still);
@@ -46,20 +40,20 @@ fn options((steps, tolerance, still, gain, caution, largest_turn): OptionParts) 
 }
 
 impl PyChain {
-    fn site(&self, py: Python<'_>, name: &str) -> PyResult<(usize, Vec3)> {
-        let index = self.body.site_index(name).map_err(|error| error.into_py(py))?;
+    fn site(&self, name: &str) -> PyResult<(usize, Vec3)> {
+        let index = self.body.site_index(name).map_err(Raise::raise)?;
         let site = &self.body.sites()[index];
         self.model.link_of(site.limb).map(|link| (link, site.position)).ok_or_else(|| {
             let known = self.site_names().join(", ");
-            exception(py, "BodyError", format!("site: expected one on the chain ({known}), found {name:?}"))
+            BodyError::new_err(format!("site: expected one on the chain ({known}), found {name:?}"))
         })
     }
 
-    fn goals(&self, py: Python<'_>, parts: &[GoalParts]) -> PyResult<Vec<Goal>> {
+    fn goals(&self, parts: &[GoalParts]) -> PyResult<Vec<Goal>> {
         parts
             .iter()
             .map(|(site, kind, v, weight, level)| {
-                let (link, point) = self.site(py, site)?;
+                let (link, point) = self.site(site)?;
                 let (first, second) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]));
                 let aim = if kind == "line" { Aim::Line { n: first, m: second } } else { Aim::Position(first) };
                 Ok(Goal { link, point, aim, weight: *weight, level: *level })
@@ -67,43 +61,40 @@ impl PyChain {
             .collect()
     }
 
-    fn bones(&self, py: Python<'_>, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
+    fn bones(&self, parts: Option<Vec<SegmentParts>>, margin: f64) -> PyResult<Vec<Bone>> {
         let Some(parts) = parts else { return Ok(voodoo_ik::bones(&self.body, &self.model, margin)) };
         let bone = |(a, b, radius): &SegmentParts| {
-            Ok(Bone { ends: [self.site(py, a)?, self.site(py, b)?], radius: [*radius; 2], apart: 1.0 })
+            Ok(Bone { ends: [self.site(a)?, self.site(b)?], radius: [*radius; 2], apart: 1.0 })
         };
         parts.iter().map(bone).collect()
     }
 
     /// The trunk, and limbs of the body beside the chain with their world poses.
-    fn trunk(&self, py: Python<'_>, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
+    fn trunk(&self, others: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<Trunk>> {
         let mut found = voodoo_ik::trunk(&self.body, &self.model);
         for (name, world_from_limb) in others {
-            let limb = self.body.limb_index(name).map_err(|error| error.into_py(py))?;
+            let limb = self.body.limb_index(name).map_err(Raise::raise)?;
             if self.model.link_of(limb).is_some() {
                 let message = format!("others: expected limbs that are not on the chain, found {name:?}");
-                return Err(exception(py, "BodyError", message));
+                return Err(BodyError::new_err(message));
             }
             let carrier = Carrier::World(pose("others", Some(world_from_limb))?);
-            found.push(Trunk::new(&self.body.limbs()[limb].shape, carrier));
+            found.push(Trunk { carrier, shape: self.body.limbs()[limb].shape });
         }
         Ok(found)
     }
 
-    fn checked(&self, py: Python<'_>, angles: &[f64]) -> PyResult<()> {
+    fn checked(&self, angles: &[f64]) -> PyResult<()> {
         if angles.len() == self.model.freedoms() && angles.iter().all(|angle| angle.is_finite()) {
             return Ok(());
         }
-        let message = format!(
-            "angles: expected {} finite numbers, found {}",
-            self.model.freedoms(),
-            short(&format!("{angles:?}"))
-        );
-        Err(exception(py, "MeasurementError", message))
+        let (expected, found) = (self.model.freedoms(), format!("{angles:?}"));
+        let message = format!("angles: expected {expected} finite numbers, found {found:.120}");
+        Err(MeasurementError::new_err(message))
     }
 
-    fn place(&self, py: Python<'_>, base: &Bound<'_, PyAny>, angles: &[f64]) -> PyResult<Kinematics> {
-        self.checked(py, angles)?;
+    fn place(&self, base: &Bound<'_, PyAny>, angles: &[f64]) -> PyResult<Kinematics> {
+        self.checked(angles)?;
         let mut at = Kinematics::default();
         self.model.place(&pose("world_from_base", Some(base))?, angles, &mut at);
         Ok(at)
@@ -117,21 +108,14 @@ impl PyChain {
     }
 }
 
-fn short(text: &str) -> String {
-    text.chars().take(120).collect()
-}
-
 #[pymethods]
 impl PyChain {
     #[new]
-    fn new(py: Python<'_>, body: &PyBody, limbs: Vec<String>, free_root: bool) -> PyResult<Self> {
-        let indices = limbs
-            .iter()
-            .map(|name| body.0.limb_index(name))
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| error.into_py(py))?;
+    fn new(body: &PyBody, limbs: Vec<String>, free_root: bool) -> PyResult<Self> {
+        let indices =
+            limbs.iter().map(|name| body.0.limb_index(name)).collect::<Result<Vec<_>, _>>().map_err(Raise::raise)?;
         let root = if free_root { Root::Free } else { Root::Fixed };
-        let model = ChainModel::new(&body.0, &indices, root).map_err(|error| error.into_py(py))?;
+        let model = ChainModel::new(&body.0, &indices, root).map_err(Raise::raise)?;
         Ok(Self { body: body.0.clone(), model })
     }
 
@@ -158,7 +142,7 @@ impl PyChain {
     /// Poses `(P, 4, 4)` of the limbs and positions `(S, 3)` of the sites.
     fn forward<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>) -> PyResult<(Array<'py>, Array<'py>)> {
         let py = base.py();
-        let at = self.place(py, base, &angles)?;
+        let at = self.place(base, &angles)?;
         let sites: Vec<f64> =
             self.site_links().flat_map(|(_, link, x)| at.poses[link].transform_point(x).to_array()).collect();
         let count = sites.len() / 3;
@@ -168,8 +152,8 @@ impl PyChain {
     /// Derivative `(3, n)` of the position of a site.
     fn jacobian<'py>(&self, base: &Bound<'py, PyAny>, angles: Vec<f64>, site: &str) -> PyResult<Array<'py>> {
         let py = base.py();
-        let at = self.place(py, base, &angles)?;
-        let (link, point) = self.site(py, site)?;
+        let at = self.place(base, &angles)?;
+        let (link, point) = self.site(site)?;
         let goal = Goal { link, point, aim: Aim::Position(Vec3::ZERO), weight: 1.0, level: 0 };
         let (mut rows, mut residual) = (Vec::new(), Vec::new());
         voodoo_ik::level_rows(&self.model, &[goal], &at, &mut rows, &mut residual);
@@ -187,10 +171,10 @@ impl PyChain {
         others: Vec<(String, Bound<'py, PyAny>)>,
     ) -> PyResult<(f64, Array<'py>)> {
         let py = base.py();
-        let at = self.place(py, base, &angles)?;
-        let segments = self.bones(py, segments, depth.0)?;
+        let at = self.place(base, &angles)?;
+        let segments = self.bones(segments, depth.0)?;
         let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
-        let trunk = self.trunk(py, &others)?;
+        let trunk = self.trunk(&others)?;
         let mut gradient = vec![0.0; self.model.freedoms()];
         let h = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk }.evaluate(
             &self.model,
@@ -236,19 +220,20 @@ impl PyChain {
         let py = base.py();
         let [count, n] = [starts.shape()[0], starts.shape()[1]];
         let mut angles = starts.as_slice()?.to_vec();
-        (0..count).try_for_each(|index| self.checked(py, &angles[index * n..(index + 1) * n]))?;
+        (0..count).try_for_each(|index| self.checked(&angles[index * n..(index + 1) * n]))?;
         let base = pose("world_from_base", Some(base))?;
-        let mut goals = self.goals(py, &goals)?;
-        let segments = if views.is_empty() { Vec::new() } else { self.bones(py, segments, depth.0)? };
+        let mut goals = self.goals(&goals)?;
+        let segments = if views.is_empty() { Vec::new() } else { self.bones(segments, depth.0)? };
         let views: Vec<&SilhouetteView> = views.iter().map(|view| &view.0).collect();
-        let trunk = self.trunk(py, &others)?;
+        let trunk = self.trunk(&others)?;
         let criterion = Criterion { views: &views, segments: &segments, thin: depth.1, trunk: &trunk };
         let positions = positions.as_ref().map(|positions| positions.as_slice()).transpose()?;
         let sites: Vec<(usize, Vec3)> = self.site_links().map(|(_, link, x)| (link, x)).collect();
         let how = options(how);
         let mut points = Vec::with_capacity(3 * sites.len() * count);
-        let mut numbers = [const { Vec::new() }; 5];
-        let mut solver = resting(&rest);
+        let mut numbers = vec![0.0; 5 * count];
+        let rest = rest.into_iter().map(|(unknown, angle)| Rest { unknown, angle });
+        let mut solver = IkSolver::with_rest(rest.collect());
         let mut ordered = Vec::new();
         py.detach(|| {
             let width = 3 * goals.len();
@@ -266,7 +251,7 @@ impl PyChain {
                 let counts = [report.steps, report.tried, report.compared, usize::from(report.converged)];
                 let [steps, tried, compared, converged] = counts.map(|count| count as f64);
                 let found = [report.h, steps, tried, compared, converged];
-                numbers.iter_mut().zip(found).for_each(|(all, number)| all.push(number));
+                (0..5).for_each(|kind| numbers[kind * count + index] = found[kind]);
             }
         });
         let at = solver.kinematics();
@@ -274,7 +259,7 @@ impl PyChain {
         Ok((
             frozen(py, angles, &[count, n])?,
             frozen(py, points, &[count, sites.len(), 3])?,
-            numbers.into_iter().map(|all| frozen(py, all, &[count])).collect::<PyResult<_>>()?,
+            frozen(py, numbers, &[5, count])?,
             matrices(py, &at.poses)?,
             PyTuple::new(py, residuals)?,
         ))

@@ -1,5 +1,7 @@
 //! `View` of inverse kinematics: one silhouette with its camera.
 
+use std::sync::Arc;
+
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::Camera;
@@ -7,7 +9,7 @@ use voodoo_ik::SilhouetteView;
 
 use crate::arrays::pose;
 use crate::camera::camera_of;
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 
 #[doc = stub!("View")]
 #[pyclass(name = "View", module = "voodoo._core", frozen)]
@@ -21,18 +23,17 @@ impl PyView {
         thickness: PyReadonlyArray2<'_, f32>,
         depth: Option<PyReadonlyArray2<'_, f32>>,
         border: f64,
-        camera: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         camera_from_world: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let [height, width] = [distance.shape()[0], distance.shape()[1]];
         if width < 2 || height < 2 {
             let message = format!("silhouette: expected at least 2 x 2 pixels, found {width} x {height}");
-            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+            return Err(MeasurementError::new_err(message));
         }
-        let camera = camera_of(camera)?;
         if [camera.height(), camera.width()] != [height, width] || camera.distorts() {
             let message = format!("camera: expected a pinhole camera of {width} x {height} pixels, found {camera:?}");
-            return Err(exception(camera_from_world.py(), "MeasurementError", message));
+            return Err(MeasurementError::new_err(message));
         }
         Ok(Self(SilhouetteView {
             pixels: distance.as_slice()?.iter().zip(thickness.as_slice()?).map(|(d, t)| [*d, *t]).collect(),

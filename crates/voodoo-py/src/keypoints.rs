@@ -1,21 +1,24 @@
-//! 2-D keypoints, and points that are extrapolated with the limbs.
+//! 2-D keypoints, depth registered to their images, and points that are extrapolated with the limbs.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::keypoints::{Sensor, SiteKeypoints, SiteMeasurement, SiteObservation, nearest_person};
 
-use crate::arrays::{PointArray, rows};
+use crate::arrays::{PointArray, Row, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::IntoPy;
+use crate::errors::Raise;
 use crate::people::TrackedBody;
-use crate::sites::{PySiteGate, PySiteRay, places_of};
+use crate::sites::{ALONG_SIGMA, PySiteGate, PySiteRay, places_of};
 
 type PixelRow = ((f64, f64), f64);
 /// Site, indices and weights of its keypoints, spread, and distance behind the surface.
 type KeypointRow = (String, Vec<(usize, f64)>, f64, f64);
-type Observed<'py> = (Vec<PySiteRay>, Vec<(String, Bound<'py, PyArray1<f64>>, f64)>, Vec<String>, Vec<String>);
+type Observed = (Vec<PySiteRay>, Vec<(String, Row, f64)>, Vec<String>, Vec<String>);
 
 #[doc = stub!("KeypointLayout")]
 #[pyclass(name = "KeypointLayout", module = "voodoo._core", frozen)]
@@ -43,10 +46,9 @@ impl PyKeypointLayout {
         people: Vec<PyReadonlyArray2<'py, f64>>,
         predicted: &Bound<'py, PyAny>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         least: f64,
     ) -> PyResult<Option<usize>> {
-        let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let places = self.places(predicted)?.into_iter().map(|place| place.unwrap_or(Vec3::NAN));
         let expected: Vec<_> = places.map(|place| eye.pixel(eye.in_sensor(place))).collect();
@@ -59,13 +61,12 @@ impl PyKeypointLayout {
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn observe<'py>(
         &self,
-        py: Python<'py>,
         keypoints: PyReadonlyArray2<'py, f64>,
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
         source: &str,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         noise: f64,
         place_sigma: f64,
         least: f64,
@@ -73,18 +74,13 @@ impl PyKeypointLayout {
         gate: Option<PyRefMut<'py, PySiteGate>>,
         surface: Option<&Bound<'py, PyAny>>,
         before: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Observed<'py>> {
-        let camera = camera_of(camera)?;
+    ) -> PyResult<Observed> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (sensor, keypoints) = (Sensor { eye, source, noise, place_sigma, stamp }, rows("keypoints", &keypoints)?);
-        let found: Vec<_> = self.0.iter().map(|part| part.pixel(keypoints, least)).collect();
-        let pixels: Vec<[f64; 2]> =
-            found.iter().map(|found| found.map_or([f64::NAN; 2], |found| found.pixel)).collect();
-        let flat = pixels.iter().map(|pixel| eye.undistorted(*pixel));
         let (places, mut gate) = (self.places(predicted)?, gate);
         let (mut rays, mut points, mut unseen, mut dropped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for ((part, found), (flat, place)) in self.0.iter().zip(found).zip(flat.zip(places)) {
-            let Some(found) = found else {
+        for (part, place) in self.0.iter().zip(places) {
+            let Some(found) = part.pixel(keypoints, least) else {
                 unseen.push(part.site.clone());
                 continue;
             };
@@ -100,12 +96,21 @@ impl PyKeypointLayout {
                 Some(before) => before.call_method1("get", (&part.site,))?.extract()?,
                 None => None,
             };
+            let flat = eye.undistorted(found.pixel);
             let observation = SiteObservation { pixel: found, flat, expected, hidden: hidden.unwrap_or(0.0), surface };
             match part.measurement(&observation, &sensor, gate.as_mut().map(|gate| &mut gate.0)) {
-                SiteMeasurement::Ray(ray) => rays.push(PySiteRay(ray)),
-                SiteMeasurement::Place(place, sigma) => {
-                    points.push((part.site.clone(), PyArray1::from_slice(py, &place.to_array()), sigma));
-                }
+                SiteMeasurement::Ray(direction, sigma) => rays.push(PySiteRay {
+                    site: part.site.clone(),
+                    origin: Row(eye.origin()),
+                    direction: Row(direction),
+                    sigma,
+                    source: source.to_owned(),
+                    trust: 1.0,
+                    bias: 0.0,
+                    place: None,
+                    place_sigma: ALONG_SIGMA,
+                }),
+                SiteMeasurement::Place(place, sigma) => points.push((part.site.clone(), Row(place), sigma)),
                 SiteMeasurement::Dropped => dropped.push(part.site.clone()),
             }
         }
@@ -141,8 +146,22 @@ pub(crate) fn carried<'py>(
     let array = PointArray::new("points", points)?;
     let view = array.view(py);
     let moved = voodoo_sensors::carried::carried(view.points()?, tracker.tracker()?, elapsed, pose.as_ref());
-    let moved = moved.map_err(|error| error.into_py(py))?;
+    let moved = moved.map_err(Raise::raise)?;
     let array =
         |moved: Vec<Vec3>| PyArray1::from_iter(py, moved.iter().flat_map(Vec3::to_array)).reshape([moved.len(), 3]);
     moved.map(array).transpose()
+}
+
+#[doc = stub!("nearest_surface")]
+#[pyfunction]
+#[pyo3(signature = (pixels, depths, *, pixel, radius))]
+pub(crate) fn nearest_surface(
+    pixels: PyReadonlyArray2<'_, f64>,
+    depths: PyReadonlyArray1<'_, f64>,
+    pixel: [f64; 2],
+    radius: f64,
+) -> PyResult<Option<f64>> {
+    let found =
+        voodoo_sensors::registration::nearest_surface(rows("pixels", &pixels)?, depths.as_slice()?, pixel, radius);
+    found.map_err(Raise::raise)
 }

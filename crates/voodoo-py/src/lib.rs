@@ -14,7 +14,6 @@ mod body;
 mod borrowed;
 mod camera;
 mod config;
-#[cfg(feature = "detect")]
 mod detect;
 mod detector;
 mod errors;
@@ -24,9 +23,6 @@ mod ik;
 mod ik_view;
 mod keypoints;
 mod people;
-mod registration;
-mod render;
-mod rotations;
 mod shape;
 mod sites;
 mod skeleton;
@@ -39,44 +35,24 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use super::body::PyBody;
-    #[pymodule_export]
-    use super::camera::PyCamera;
-    #[pymodule_export]
-    use super::config::config_fields;
-    #[cfg(feature = "detect")]
-    #[pymodule_export]
-    use super::detect::{PyCandidate, PyDetection, PyDetector, person_candidates};
-    #[pymodule_export]
-    use super::estimate::{_estimate, _nobody, PyEstimate};
-    #[pymodule_export]
-    use super::frame::PyFrame;
-    #[pymodule_export]
-    use super::ik::PyChain;
-    #[pymodule_export]
-    use super::ik_view::PyView;
-    #[pymodule_export]
-    use super::keypoints::{PyKeypointLayout, carried, linear_sum_assignment};
-    #[pymodule_export]
-    use super::people::PyPeople;
-    #[pymodule_export]
-    use super::registration::nearest_surface;
-    #[pymodule_export]
-    use super::render::render_depth;
-    #[pymodule_export]
-    use super::rotations::{euler_angles, quaternions};
-    #[pymodule_export]
-    use super::shape::{PyClosestPoints, PyShape};
-    #[pymodule_export]
-    use super::sites::{PySiteGate, PySiteRay, expected_sites};
-    #[pymodule_export]
-    use super::skeleton::{cylinders, joint_angles, moved_covariances, placed, skeleton};
-    #[pymodule_export]
-    use super::skin::PySkinCue;
-    #[pymodule_export]
-    use super::template::{Template, with_numbers};
-    #[pymodule_export]
-    use super::tracker::{PyTracker, body_before};
+    use super::{
+        body::PyBody,
+        camera::{PyCamera, render_depth},
+        config::config_fields,
+        detect::{PyCandidate, PyDetection, PyDetector, person_candidates},
+        estimate::{_estimate, _nobody, PyEstimate},
+        frame::PyFrame,
+        ik::PyChain,
+        ik_view::PyView,
+        keypoints::{PyKeypointLayout, carried, linear_sum_assignment, nearest_surface},
+        people::PyPeople,
+        shape::{PyClosestPoints, PyShape},
+        sites::{PySiteGate, PySiteRay, expected_sites},
+        skeleton::{cylinders, euler_angles, joint_angles, moved_covariances, placed, quaternions, skeleton},
+        skin::PySkinCue,
+        template::{Template, with_numbers},
+        tracker::{PyTracker, body_before},
+    };
 
     #[pymodule_init]
     fn init(module: &super::Bound<'_, super::PyModule>) -> super::PyResult<()> {

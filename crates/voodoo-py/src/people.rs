@@ -9,10 +9,10 @@ use voodoo_core::math::{Aabb, Vec3};
 use voodoo_core::{BodyTracker, Frame, People};
 
 use crate::body::PyBody;
-use crate::borrowed::{Borrowed, Parts, color_image};
+use crate::borrowed::{Borrowed, Parts, color_image, depth_images};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{IntoPy, exception};
+use crate::errors::{BodyError, Raise};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::tracker::{PyTracker, site_positions};
@@ -39,14 +39,17 @@ impl TrackedBody<'_> {
         match self {
             Self::Alone(tracker) => Ok(&tracker.tracker),
             Self::Person(people, id) => {
-                let found = people.people.present().find(|(there, _)| there == id);
-                let missing = || {
-                    let text = format!("person: expected one of those who are there, found {id}");
-                    exception(people.py(), "BodyError", text)
-                };
-                found.map(|(_, tracker)| tracker).ok_or_else(missing)
+                let missing = || format!("person: expected one of those who are there, found {id}");
+                people.person(*id).ok_or_else(|| BodyError::new_err(missing()))
             }
         }
+    }
+}
+
+impl PyPeople {
+    /// The tracker of a present person.
+    fn person(&self, id: usize) -> Option<&BodyTracker> {
+        self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| tracker)
     }
 }
 
@@ -66,12 +69,11 @@ impl PyPeople {
         let region = region.map(|(low, high)| Aabb::new(Vec3::from_array(low), Vec3::from_array(high)));
         let mut options = PeopleOptions::default();
         (options.limit, options.nearest, options.forget_after, options.region) = (limit, nearest, forget_after, region);
-        let mut people =
-            People::new(body.0.clone(), config(values)?, options).map_err(|error| error.into_py(values.py()))?;
+        let mut people = People::new(body.0.clone(), config(values)?, options).map_err(Raise::raise)?;
         if let Some(found) = self::detector(detector)? {
             people = people.with_detector(found);
         }
-        let names = Arc::new(Names::from_body(people.prototype()));
+        let names = Arc::new(Names::from_body(values.py(), people.prototype())?);
         Ok(Self { people, names, detector_failures: 0 })
     }
 
@@ -84,23 +86,21 @@ impl PyPeople {
         own: Vec<(usize, PyRef<'_, PyFrame>)>,
     ) -> PyResult<Vec<(usize, PyEstimate)>> {
         let body = self.people.prototype();
-        let all = Borrowed::new(py, frame, body)?;
-        let (clouds, images) = (all.clouds()?, all.images()?);
+        let all = Borrowed::new(py, frame, body, 0)?;
+        let (clouds, images) = (all.clouds()?, depth_images(&all.images)?);
         let views = frame.color_views(py);
         let numbered = views.iter().zip(0..);
         let colors = numbered.map(|(view, camera)| color_image(view, camera)).collect::<PyResult<Vec<_>>>()?;
         let detections = all.detections();
         let input = all.frame(frame, &clouds, &images, &colors, &detections);
         // A person's own measurements follow the common ones; their sources are numbered consecutively.
-        let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body)).collect::<PyResult<Vec<_>>>()?;
-        let parts = owned
-            .iter()
-            .map(|own| Parts::new(&input, own, frame.sources.len() as u16))
-            .collect::<PyResult<Vec<_>>>()?;
+        let first = frame.sources.len();
+        let owned = own.iter().map(|(_, frame)| Borrowed::new(py, frame, body, first)).collect::<PyResult<Vec<_>>>()?;
+        let parts = owned.iter().map(|own| Parts::new(&input, own)).collect::<PyResult<Vec<_>>>()?;
         let frames: Vec<(usize, Frame)> =
             own.iter().zip(&parts).map(|((id, own), parts)| (*id, parts.frame(&input, own.stamp))).collect();
         let people = &mut self.people;
-        py.detach(|| people.step(&input, &frames)).map_err(|error| error.into_py(py))?;
+        py.detach(|| people.step(&input, &frames)).map_err(Raise::raise)?;
         self.detector_failures += usize::from(people.detector_error().is_some());
         warn_of_detector(py, self.people.detector_error())?;
         let found = self.people.present().map(|(id, tracker)| {
@@ -120,7 +120,7 @@ impl PyPeople {
     /// Adds a person at these positions; returns their id.
     fn add(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<usize> {
         let positions = site_positions(self.people.prototype(), joints)?;
-        self.people.add(&positions, fit_sizes).map_err(|error| error.into_py(joints.py()))
+        self.people.add(&positions, fit_sizes).map_err(Raise::raise)
     }
 
     /// Why a detected person is not tracked.
@@ -146,12 +146,12 @@ impl PyPeople {
 
     /// The last estimate of a present person.
     fn estimate(&self, id: usize) -> Option<PyEstimate> {
-        let (_, tracker) = self.people.present().find(|(there, _)| *there == id)?;
-        Some(PyEstimate { estimate: tracker.estimate().clone(), names: self.names.clone(), sources: Vec::new() })
+        let estimate = self.person(id)?.estimate().clone();
+        Some(PyEstimate { estimate, names: self.names.clone(), sources: Vec::new() })
     }
 
     /// The body of a present person, in their sizes.
     fn body(&self, id: usize) -> Option<PyBody> {
-        self.people.present().find(|(there, _)| *there == id).map(|(_, tracker)| PyBody(tracker.body().clone()))
+        self.person(id).map(|tracker| PyBody(tracker.body().clone()))
     }
 }

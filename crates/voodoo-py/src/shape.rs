@@ -1,13 +1,13 @@
 //! `TaperedEllipticCylinder`.
 
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use voodoo_core::math::{Points, Pose};
 use voodoo_core::{SurfaceBatch, TaperedEllipticCylinder};
 
 use crate::arguments;
-use crate::arrays::{PointArray, vector};
-use crate::errors::IntoPy;
+use crate::arrays::{PointArray, Row, vector};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 
 #[doc = stub!("TaperedEllipticCylinder")]
 #[pyclass(name = "TaperedEllipticCylinder", module = "voodoo", frozen, eq, from_py_object)]
@@ -17,27 +17,24 @@ pub struct PyShape(pub TaperedEllipticCylinder);
 #[doc = stub!("ClosestPoints")]
 #[pyclass(name = "ClosestPoints", module = "voodoo", frozen, get_all)]
 pub(crate) struct PyClosestPoints {
-    points: Py<PyAny>,
-    normals: Py<PyAny>,
-    signed_distance: Py<PyAny>,
-    region: Py<PyAny>,
+    points: Py<PyArray2<f32>>,
+    normals: Py<PyArray2<f32>>,
+    signed_distance: Py<PyArray1<f32>>,
+    region: Py<PyArray1<u8>>,
 }
-
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 #[pymethods]
 impl PyShape {
     #[new]
     #[pyo3(signature = (length, a0, b0, a1, b1))]
     fn new(
-        py: Python<'_>,
         #[pyo3(from_py_with = arguments::length)] length: f64,
         #[pyo3(from_py_with = arguments::a0)] a0: f64,
         #[pyo3(from_py_with = arguments::b0)] b0: f64,
         #[pyo3(from_py_with = arguments::a1)] a1: f64,
         #[pyo3(from_py_with = arguments::b1)] b1: f64,
     ) -> PyResult<Self> {
-        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(|error| error.into_py(py))
+        TaperedEllipticCylinder::new(length, a0, b0, a1, b1).map(Self).map_err(Raise::raise)
     }
 
     #[doc = stub!("TaperedEllipticCylinder.length")]
@@ -71,18 +68,13 @@ impl PyShape {
     }
 
     #[doc = stub!("TaperedEllipticCylinder.closest_point")]
-    fn closest_point<'py>(
-        &self,
-        py: Python<'py>,
-        point: &Bound<'py, PyAny>,
-    ) -> PyResult<(Vector<'py>, Vector<'py>, f64)> {
+    fn closest_point(&self, point: &Bound<'_, PyAny>) -> PyResult<(Row, Row, f64)> {
         let query = vector("point", point)?;
         if !query.is_finite() {
-            return Err(crate::errors::wrong_argument(py, "point", "finite meters", point));
+            return Err(wrong_argument("point", "finite meters", point));
         }
         let found = self.0.closest_point(query);
-        let array = |v: [f64; 3]| PyArray1::from_slice(py, &v);
-        Ok((array(found.point.to_array()), array(found.normal.to_array()), found.signed_distance))
+        Ok((Row(found.point), Row(found.normal), found.signed_distance))
     }
 
     #[doc = stub!("TaperedEllipticCylinder.closest_points")]
@@ -92,7 +84,7 @@ impl PyShape {
         let slice = view.points()?;
         if let Some(row) = (0..slice.len()).rfind(|row| !slice.get(*row).is_finite()) {
             let found = format!("points: expected finite meters, found {:?} in row {row}", slice.get(row).to_array());
-            return Err(crate::errors::exception(py, "MeasurementError", found));
+            return Err(MeasurementError::new_err(found));
         }
         let batch = py.detach(|| {
             let (mut queries, mut batch) = (Points::default(), SurfaceBatch::default());
@@ -102,18 +94,15 @@ impl PyShape {
             self.0.closest_points(&Pose::IDENTITY, &queries, &mut batch);
             batch
         });
-        let interleave = |points: &Points| -> PyResult<Py<PyAny>> {
-            let mut values = Vec::with_capacity(3 * points.len());
-            for ((x, y), z) in points.x.iter().zip(&points.y).zip(&points.z) {
-                values.extend([*x, *y, *z]);
-            }
-            Ok(PyArray1::from_vec(py, values).reshape([points.len(), 3])?.into_any().unbind())
+        let interleave = |Points { x, y, z }: &Points| {
+            let values = x.iter().zip(y).zip(z).flat_map(|((x, y), z)| [*x, *y, *z]).collect();
+            PyArray1::from_vec(py, values).reshape([x.len(), 3]).map(Bound::unbind)
         };
         Ok(PyClosestPoints {
             points: interleave(&batch.points)?,
             normals: interleave(&batch.normals)?,
-            signed_distance: PyArray1::from_vec(py, batch.signed_distance).into_any().unbind(),
-            region: PyArray1::from_vec(py, batch.region).into_any().unbind(),
+            signed_distance: PyArray1::from_vec(py, batch.signed_distance).unbind(),
+            region: PyArray1::from_vec(py, batch.region).unbind(),
         })
     }
 

@@ -1,36 +1,24 @@
 //! Named sites: predicted positions, gates around them, and rays on which they were detected.
 
-use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 use voodoo_core::math::Vec3;
-use voodoo_sensors::sites::{SiteGate, SiteRay};
+use voodoo_sensors::sites::SiteGate;
 
-use crate::arrays::vector;
-use crate::errors::{IntoPy, exception};
+use crate::arrays::{Row, vector};
+use crate::errors::{MeasurementError, Raise};
 use crate::people::TrackedBody;
-
-type Row<'py> = Bound<'py, PyArray1<f64>>;
-
-fn row(py: Python<'_>, place: Vec3) -> Row<'_> {
-    PyArray1::from_slice(py, &place.to_array())
-}
 
 /// Predicted positions of some sites, from a mapping of names to positions; `None` for missing ones.
 pub(crate) fn places_of<'a>(
     places: &Bound<'_, PyAny>,
     sites: impl Iterator<Item = &'a str>,
 ) -> PyResult<Vec<Option<Vec3>>> {
-    let dict = places.cast::<PyDict>().ok();
-    sites
-        .map(|site| {
-            let place = match dict {
-                Some(dict) => dict.get_item(site)?,
-                None => Some(places.call_method1("get", (site,))?).filter(|place| !place.is_none()),
-            };
-            place.map(|place| vector(site, &place)).transpose()
-        })
-        .collect()
+    let place = |site: &str| {
+        let place = places.call_method1("get", (site,))?;
+        if place.is_none() { Ok(None) } else { vector(site, &place).map(Some) }
+    };
+    sites.map(place).collect()
 }
 
 #[doc = stub!("expected_sites")]
@@ -41,12 +29,9 @@ pub(crate) fn expected_sites<'py>(
     stamp: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let tracker = tracker.tracker()?;
-    let places = tracker.expected_sites(stamp).map_err(|error| error.into_py(py))?;
-    let dict = PyDict::new(py);
-    for (site, place) in tracker.body().sites().iter().zip(places) {
-        dict.set_item(&site.name, row(py, place))?;
-    }
-    Ok(dict)
+    let places = tracker.expected_sites(stamp).map_err(Raise::raise)?;
+    let named = tracker.body().sites().iter().zip(places).map(|(site, place)| (&site.name, Row(place)));
+    named.into_py_dict(py)
 }
 
 #[doc = stub!("SiteGate")]
@@ -57,11 +42,11 @@ pub struct PySiteGate(pub SiteGate);
 impl PySiteGate {
     #[new]
     #[pyo3(signature = (radius=0.15, growth=0.5, widest=0.40))]
-    fn new(py: Python<'_>, radius: f64, growth: f64, widest: f64) -> PyResult<Self> {
+    fn new(radius: f64, growth: f64, widest: f64) -> PyResult<Self> {
         if !(radius > 0.0 && growth >= 0.0 && widest >= radius) {
             let found = format!("found radius {radius:?}, growth {growth:?}, widest {widest:?}");
             let text = format!("gate: expected 0 < radius <= widest and growth >= 0, {found}");
-            return Err(exception(py, "MeasurementError", text));
+            return Err(MeasurementError::new_err(text));
         }
         Ok(Self(SiteGate::new(radius, growth, widest)))
     }
@@ -82,8 +67,31 @@ impl PySiteGate {
 }
 
 #[doc = stub!("SiteRay")]
-#[pyclass(name = "SiteRay", module = "voodoo._core", frozen)]
-pub struct PySiteRay(pub SiteRay);
+#[pyclass(name = "SiteRay", module = "voodoo._core", frozen, get_all)]
+#[derive(Clone)]
+pub(crate) struct PySiteRay {
+    #[doc = stub!("SiteRay.site")]
+    pub(crate) site: String,
+    #[doc = stub!("SiteRay.origin")]
+    pub(crate) origin: Row,
+    #[doc = stub!("SiteRay.direction")]
+    pub(crate) direction: Row,
+    #[doc = stub!("SiteRay.sigma")]
+    pub(crate) sigma: f64,
+    #[doc = stub!("SiteRay.source")]
+    pub(crate) source: String,
+    #[doc = stub!("SiteRay.trust")]
+    pub(crate) trust: f64,
+    #[doc = stub!("SiteRay.bias")]
+    pub(crate) bias: f64,
+    #[doc = stub!("SiteRay.place")]
+    pub(crate) place: Option<Row>,
+    #[doc = stub!("SiteRay.place_sigma")]
+    pub(crate) place_sigma: f64,
+}
+
+/// Standard deviation of a position along its ray where none is given, as in the signature, meters.
+pub(crate) const ALONG_SIGMA: f64 = 0.04;
 
 #[pymethods]
 impl PySiteRay {
@@ -101,80 +109,26 @@ impl PySiteRay {
         place: Option<&Bound<'_, PyAny>>,
         place_sigma: f64,
     ) -> PyResult<Self> {
-        let (origin, direction) = (vector("origin", origin)?, vector("direction", direction)?);
-        let place = place.map(|place| vector("place", place)).transpose()?;
-        Ok(Self(SiteRay { site, origin, direction, sigma, source, trust, bias, place, place_sigma }))
-    }
-
-    #[doc = stub!("SiteRay.site")]
-    #[getter]
-    fn site(&self) -> &str {
-        &self.0.site
-    }
-
-    #[doc = stub!("SiteRay.origin")]
-    #[getter]
-    fn origin<'py>(&self, py: Python<'py>) -> Row<'py> {
-        row(py, self.0.origin)
-    }
-
-    #[doc = stub!("SiteRay.direction")]
-    #[getter]
-    fn direction<'py>(&self, py: Python<'py>) -> Row<'py> {
-        row(py, self.0.direction)
-    }
-
-    #[doc = stub!("SiteRay.sigma")]
-    #[getter]
-    fn sigma(&self) -> f64 {
-        self.0.sigma
-    }
-
-    #[doc = stub!("SiteRay.source")]
-    #[getter]
-    fn source(&self) -> &str {
-        &self.0.source
-    }
-
-    #[doc = stub!("SiteRay.trust")]
-    #[getter]
-    fn trust(&self) -> f64 {
-        self.0.trust
-    }
-
-    #[doc = stub!("SiteRay.bias")]
-    #[getter]
-    fn bias(&self) -> f64 {
-        self.0.bias
-    }
-
-    #[doc = stub!("SiteRay.place")]
-    #[getter]
-    fn place<'py>(&self, py: Python<'py>) -> Option<Row<'py>> {
-        self.0.place.map(|place| row(py, place))
-    }
-
-    #[doc = stub!("SiteRay.place_sigma")]
-    #[getter]
-    fn place_sigma(&self) -> f64 {
-        self.0.place_sigma
+        let (origin, direction) = (Row(vector("origin", origin)?), Row(vector("direction", direction)?));
+        let place = place.map(|place| vector("place", place).map(Row)).transpose()?;
+        Ok(Self { site, origin, direction, sigma, source, trust, bias, place, place_sigma })
     }
 
     #[doc = stub!("SiteRay.moved")]
     fn moved(&self, shift: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (shift, ray) = (vector("shift", shift)?, &self.0);
-        let place = ray.place.map(|place| place + shift);
-        Ok(Self(SiteRay { origin: ray.origin + shift, place, ..ray.clone() }))
+        let shift = vector("shift", shift)?;
+        let moved = |place: Row| Row(place.0 + shift);
+        Ok(Self { origin: moved(self.origin), place: self.place.map(moved), ..self.clone() })
     }
 
     #[doc = stub!("SiteRay.trusted")]
     fn trusted(&self, trust: f64) -> Self {
-        Self(SiteRay { trust, ..self.0.clone() })
+        Self { trust, ..self.clone() }
     }
 
     fn __repr__(&self) -> String {
-        let SiteRay { site, origin, direction, sigma, source, trust, .. } = &self.0;
-        let (origin, direction) = (origin.to_array(), direction.to_array());
+        let Self { site, origin, direction, sigma, source, trust, .. } = self;
+        let (origin, direction) = (origin.0.to_array(), direction.0.to_array());
         format!(
             "SiteRay({site:?}, origin={origin:.3?}, direction={direction:.3?}, sigma={sigma:.4}, source={source:?}, trust={trust})"
         )

@@ -1,16 +1,15 @@
-//! Poses of many frames, or of persons of one instant, as files and live outputs need them.
+//! Rotations and poses of many frames, or of persons of one instant, as files and live outputs need them.
 
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::f64::consts::PI;
 use voodoo_core::math::{self, Mat3, Vec3};
 use voodoo_core::{Body, Limb};
 
+use crate::arrays::{Array, array};
 use crate::body::{PyBody, at_rest};
-use crate::errors::exception;
-use crate::rotations::are_axes;
+use crate::errors::MeasurementError;
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 type Given<'py> = PyReadonlyArrayDyn<'py, f64>;
 /// A table of numbers, which is read faster than tuples.
 type Plan<'py> = PyReadonlyArray2<'py, i64>;
@@ -20,7 +19,7 @@ fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>
     let shape = array.shape();
     if shape.len() < 2 || shape[2..].iter().product::<usize>() != N || !array.is_c_contiguous() {
         let text = format!("contiguous frames of rows of {N} numbers, found shape {shape:?}");
-        return Err(wrong(array.py(), name, &text));
+        return Err(wrong(name, &text));
     }
     let rows = array.as_slice()?.as_chunks::<N>().0;
     Ok((0..shape[0]).map(|frame| rows.get(frame * shape[1]..(frame + 1) * shape[1]).unwrap_or_default()).collect())
@@ -30,7 +29,7 @@ fn frames<'a, const N: usize>(name: &str, array: &'a PyReadonlyArrayDyn<'_, f64>
 fn plan<'a, const N: usize>(plan: &'a Plan<'_>) -> PyResult<&'a [[i64; N]]> {
     match plan.shape()[1] {
         columns if columns == N && plan.is_c_contiguous() => Ok(plan.as_slice()?.as_chunks().0),
-        columns => Err(wrong(plan.py(), "plan", &format!("{N} columns, found {columns}"))),
+        columns => Err(wrong("plan", &format!("{N} columns, found {columns}"))),
     }
 }
 
@@ -39,16 +38,12 @@ fn entry<T>(entries: &[T], number: i64) -> Option<&T> {
     entries.get(usize::try_from(number).ok()?)
 }
 
-fn wrong(py: Python<'_>, name: &str, expected: &str) -> PyErr {
-    exception(py, "MeasurementError", format!("{name}: expected {expected}"))
+fn wrong(name: &str, expected: &str) -> PyErr {
+    MeasurementError::new_err(format!("{name}: expected {expected}"))
 }
 
-fn unplanned(py: Python<'_>) -> PyErr {
-    wrong(py, "plan", "numbers of limbs, joints and frames that are there, and axes that differ")
-}
-
-fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
-    PyArray1::from_vec(py, values).reshape(shape)
+fn unplanned() -> PyErr {
+    wrong("plan", "numbers of limbs, joints and frames that are there, and axes that differ")
 }
 
 fn rotation(rows: &[f64; 9]) -> Mat3 {
@@ -143,7 +138,7 @@ pub(crate) fn skeleton<'py>(
     let (poses, joints, own) = (frames("poses", &poses)?, frames("joints", &joints)?, plan(&own)?);
     let (mut turns, mut heads) = (Vec::new(), Vec::new());
     for ((poses, joints), body) in poses.iter().zip(&joints).zip(each(&bodies)) {
-        let found = bones(body, poses, joints, own).ok_or_else(|| unplanned(py))?;
+        let found = bones(body, poses, joints, own).ok_or_else(unplanned)?;
         turns.extend(found.0.iter().flat_map(rows_of));
         heads.extend(found.1.iter().flat_map(Vec3::to_array));
     }
@@ -165,7 +160,7 @@ pub(crate) fn placed<'py>(
     for (rotations, points) in rotations.iter().zip(&points) {
         let turns: Vec<_> = rotations.iter().map(rotation).collect();
         let points: Vec<_> = points.iter().copied().map(Vec3::from_array).collect();
-        let found = placed_frames(&turns, &points, plan).ok_or_else(|| unplanned(py))?;
+        let found = placed_frames(&turns, &points, plan).ok_or_else(unplanned)?;
         places.extend(found.0.iter().flat_map(Vec3::to_array));
         rows.extend(found.1.into_iter().flatten());
     }
@@ -180,7 +175,7 @@ pub(crate) fn joint_angles<'py>(py: Python<'py>, rotations: Given<'py>, plan: Pl
     let mut all = Vec::new();
     for rotations in &rotations {
         let turns: Vec<_> = rotations.iter().map(rotation).collect();
-        all.extend(angles(&turns, plan).ok_or_else(|| unplanned(py))?);
+        all.extend(angles(&turns, plan).ok_or_else(unplanned)?);
     }
     array(py, all, &[rotations.len(), plan.len()])
 }
@@ -196,7 +191,7 @@ pub(crate) fn moved_covariances<'py>(
     let mut moved = Vec::new();
     for (covariance, across) in covariances.iter().zip(across.as_array().rows()) {
         let (Ok(covariance), &[x, y, z]) = ((*covariance).try_into(), &across.to_vec()[..]) else {
-            return Err(wrong(py, "covariances", "shapes (F, 6, 6) and (F, 3)"));
+            return Err(wrong("covariances", "shapes (F, 6, 6) and (F, 3)"));
         };
         moved.extend(moved_covariance(covariance, Vec3::new(x, y, z)).into_iter().flatten());
     }
@@ -224,4 +219,42 @@ pub(crate) fn cylinders<'py>(
         }
     }
     array(py, rows, &[poses.len(), limbs * 12])
+}
+
+/// The leading axes of an array that ends with the given ones.
+fn leading<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, last: &[usize]) -> PyResult<&'a [usize]> {
+    array.shape().strip_suffix(last).ok_or_else(|| {
+        let text = format!("rotations: expected shape (..., {last:?}), found {:?}", array.shape());
+        MeasurementError::new_err(text)
+    })
+}
+
+#[doc = stub!("quaternions")]
+#[pyfunction]
+pub(crate) fn quaternions<'py>(py: Python<'py>, rotations: Given<'py>) -> PyResult<(Array<'py>, bool)> {
+    let shape = [leading(&rotations, &[3, 3])?, &[4]].concat();
+    let (mut found, mut skewed) = (Vec::with_capacity(shape.iter().product()), false);
+    for rows in rotations.as_slice()?.as_chunks::<9>().0 {
+        let matrix = Mat3::from_cols_array(rows).transpose();
+        found.extend(math::quaternion(&matrix));
+        skewed |= math::is_skewed(&matrix);
+    }
+    Ok((array(py, found, &shape)?, skewed))
+}
+
+/// Whether Euler angles can be about these axes.
+fn are_axes(order: [usize; 3]) -> bool {
+    order[0] != order[1] && order[1] != order[2] && order.iter().all(|axis| *axis < 3)
+}
+
+#[doc = stub!("euler_angles")]
+#[pyfunction]
+pub(crate) fn euler_angles<'py>(py: Python<'py>, quaternions: Given<'py>, order: [usize; 3]) -> PyResult<Array<'py>> {
+    let shape = [leading(&quaternions, &[4])?, &[3]].concat();
+    if !are_axes(order) {
+        return Err(MeasurementError::new_err(format!("order: expected axes that differ, found {order:?}")));
+    }
+    let rows = quaternions.as_slice()?.as_chunks::<4>().0;
+    let found = rows.iter().flat_map(|row| math::euler_angles(row, order)).collect();
+    array(py, found, &shape)
 }

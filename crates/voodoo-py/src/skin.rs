@@ -4,29 +4,29 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use voodoo_core::Camera;
 use voodoo_core::math::Vec3;
 use voodoo_sensors::eye::Eye;
 use voodoo_sensors::skin::colors::CHROMA_BINS;
 use voodoo_sensors::skin::cue::{Expected, SkinCue, SkinInput, SkinSettings};
 use voodoo_sensors::skin::depth::DepthBeside;
 
-use crate::arrays::{DepthArray, rows};
+use crate::arrays::{DepthArray, Row, rows};
 use crate::camera::{affine, camera_of};
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
-type Row<'py> = Bound<'py, PyArray1<f64>>;
 type CandidatePlace = ((f64, f64), usize, usize);
 /// Index of a site, direction of its ray, its position, and its predicted depth.
-type Ray<'py> = (usize, Row<'py>, Option<Row<'py>>, f64);
+type Ray = (usize, Row, Option<Row>, f64);
 /// Image, meters per unit, camera and pose of a depth camera.
 type DepthArguments<'py> = (Bound<'py, PyAny>, f64, Bound<'py, PyAny>, PyReadonlyArray2<'py, f64>);
 
 fn colors_of<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<&'a [[u8; 3]]> {
     if image.dims()[2] != 3 {
         let text = format!("image: expected shape (height, width, 3), found {:?}", image.shape());
-        return Err(exception(image.py(), "MeasurementError", text));
+        return Err(MeasurementError::new_err(text));
     }
     Ok(image.as_slice()?.as_chunks().0)
 }
@@ -103,12 +103,11 @@ impl PySkinCue {
         predicted: &Bound<'py, PyAny>,
         stamp: f64,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
         depth: Option<DepthArguments<'py>>,
         tracker: Option<TrackedBody<'py>>,
         others: Vec<TrackedBody<'py>>,
-    ) -> PyResult<Vec<Ray<'py>>> {
-        let camera = camera_of(camera)?;
+    ) -> PyResult<Vec<Ray>> {
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let mut expected = Vec::new();
         for (site, names) in self.names.iter().enumerate() {
@@ -119,25 +118,22 @@ impl PySkinCue {
         let names: Vec<String> =
             predicted.call_method0("keys")?.try_iter()?.map(|name| name?.extract()).collect::<PyResult<_>>()?;
         let joints: Vec<Vec3> = places_of(predicted, names.iter().map(String::as_str))?.into_iter().flatten().collect();
-        let depth_camera = depth.as_ref().map(|(_, _, camera, _)| camera_of(camera)).transpose()?;
-        let mut view = None;
-        if let Some((image, ..)) = &depth {
+        let depth = depth.map(|(image, per_unit, camera, pose)| {
             let expected = "an array of shape (height, width) and dtype uint16 or float32";
-            let array = DepthArray::cast(image).ok_or_else(|| wrong_argument(py, "depth", expected, image))?;
-            view = Some(array.view(py));
-        }
-        let mut beside = None;
-        if let (Some((_, per_unit, _, pose)), Some(camera), Some(view)) = (&depth, &depth_camera, &view) {
-            let depth = Eye { world_from_sensor: affine("world_from_depth", pose)?, camera };
-            let found = DepthBeside::new(view.pixels()?, *per_unit, depth, eye);
-            beside = Some(found.map_err(|error| error.into_py(py))?);
-        }
+            let array = DepthArray::cast(&image).ok_or_else(|| wrong_argument("depth", expected, &image))?;
+            Ok::<_, PyErr>((array.view(py), per_unit, camera_of(&camera)?, affine("world_from_depth", &pose)?))
+        });
+        let depth = depth.transpose()?;
+        let beside = depth.as_ref().map(|(view, per_unit, camera, pose)| {
+            let depth = Eye { world_from_sensor: *pose, camera };
+            DepthBeside::new(view.pixels()?, *per_unit, depth, eye).map_err(Raise::raise)
+        });
         let others = others.iter().map(TrackedBody::tracker).collect::<PyResult<Vec<_>>>()?;
         let input = SkinInput {
             image: colors_of(&image)?,
             stamp,
             eye,
-            depth: beside,
+            depth: beside.transpose()?,
             joints: &joints,
             expected: &expected,
             tracker: tracker.as_ref().map(TrackedBody::tracker).transpose()?,
@@ -145,9 +141,8 @@ impl PySkinCue {
         };
         self.size = [camera.height(), camera.width()];
         let cue = &mut self.cue;
-        let found = py.detach(|| cue.observe(&input)).map_err(|error| error.into_py(py))?;
-        let row = |place: Vec3| PyArray1::from_slice(py, &place.to_array());
-        Ok(found.iter().map(|site| (site.site, row(site.direction), site.place.map(row), site.depth)).collect())
+        let found = py.detach(|| cue.observe(&input)).map_err(Raise::raise)?;
+        Ok(found.iter().map(|site| (site.site, Row(site.direction), site.place.map(Row), site.depth)).collect())
     }
 
     #[doc = stub!("SkinCue.learn")]
@@ -159,15 +154,14 @@ impl PySkinCue {
         joints: PyReadonlyArray2<'py, f64>,
         sites: PyReadonlyArray2<'py, f64>,
         world_from_sensor: PyReadonlyArray2<'py, f64>,
-        camera: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = camera_of)] camera: Arc<Camera>,
     ) -> PyResult<()> {
-        let camera = camera_of(camera)?;
         let eye = Eye { world_from_sensor: affine("world_from_sensor", &world_from_sensor)?, camera: &camera };
         let (image, joints) = (colors_of(&image)?, vectors("joints", &joints)?);
         let sites = vectors("sites", &sites)?;
         let sites: Vec<Option<Vec3>> =
             sites.into_iter().map(|place| Some(place).filter(|place| !place.is_nan())).collect();
         let cue = &mut self.cue;
-        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(|error| error.into_py(py))
+        py.detach(|| cue.learn(image, &eye, &joints, &sites)).map_err(Raise::raise)
     }
 }

@@ -4,7 +4,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::exception;
+use crate::errors::MeasurementError;
 
 #[doc = stub!("Template")]
 #[pyclass(module = "voodoo._core", frozen)]
@@ -37,11 +37,19 @@ fn put_number(messages: &mut [u8], at: usize, number: f64, single: bool) {
     }
 }
 
+/// So many numbers of arrays in their order, however they are stored.
+fn all<'a>(parts: &'a [PyReadonlyArrayDyn<'_, f64>], expected: usize) -> PyResult<impl Iterator<Item = &'a f64>> {
+    let found: usize = parts.iter().map(|part| part.len()).sum();
+    if found != expected {
+        return Err(MeasurementError::new_err(format!("numbers: expected {expected}, found {found}")));
+    }
+    Ok(parts.iter().flat_map(|part| part.as_array().into_iter()))
+}
+
 #[pymethods]
 impl Template {
     #[new]
     fn new(
-        py: Python<'_>,
         messages: Vec<Bound<'_, PyBytes>>,
         numbers: PyReadonlyArray1<'_, f64>,
         single: bool,
@@ -63,9 +71,8 @@ impl Template {
             Some(last)
         };
         let places: Option<Vec<usize>> = numbers.as_slice()?.iter().map(place).collect();
-        let places = places.ok_or_else(|| {
-            exception(py, "MeasurementError", "numbers: expected those in the messages, found another".into())
-        })?;
+        let places = places
+            .ok_or_else(|| MeasurementError::new_err("numbers: expected those in the messages, found another"))?;
         let stamps = found(&messages, stamp).collect();
         Ok(Self { messages, ends, places, stamps, single })
     }
@@ -78,13 +85,7 @@ impl Template {
         stamp: &[u8],
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let mut messages = self.messages.clone();
-        let given: usize = numbers.iter().map(|part| part.len()).sum();
-        if given != self.places.len() {
-            let text = format!("numbers: expected {}, found {given}", self.places.len());
-            return Err(exception(py, "MeasurementError", text));
-        }
-        // In their order, however they are stored.
-        for (place, number) in self.places.iter().zip(numbers.iter().flat_map(|part| part.as_array().into_iter())) {
+        for (place, number) in self.places.iter().zip(all(&numbers, self.places.len())?) {
             put_number(&mut messages, *place, *number, self.single);
         }
         for at in &self.stamps {
@@ -98,13 +99,8 @@ impl Template {
 
 #[doc = stub!("with_numbers")]
 #[pyfunction]
-pub(crate) fn with_numbers(py: Python<'_>, text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
-    let places = text.matches('\0').count();
-    let given: usize = numbers.iter().map(|part| part.len()).sum();
-    if places != given {
-        return Err(exception(py, "MeasurementError", format!("numbers: expected {places}, found {given}")));
-    }
-    let all = numbers.iter().flat_map(|part| part.as_array().into_iter());
+pub(crate) fn with_numbers(text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
+    let all = all(&numbers, text.matches('\0').count())?;
     let whole = all.map(|number| (number.round_ties_even() as i64).to_string());
     Ok(text
         .split('\0')

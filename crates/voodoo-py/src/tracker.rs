@@ -3,19 +3,18 @@
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use voodoo_core::math::Vec3;
-use voodoo_core::{Body, Frame, Tracker};
+use voodoo_core::math::{Pose, Vec3};
+use voodoo_core::{Body, Frame, TrackError, Tracker};
 use voodoo_core::{ColorImage, RegionLine};
 
 use crate::arrays::{ColorArray, PointArray, limb_poses, rows, vector};
 use crate::body::{JointParts, PyBody, joint};
-use crate::borrowed::{Borrowed, ColorViews, color_image, number};
+use crate::borrowed::{Borrowed, ColorData, ColorViews, color_image, depth_images, number};
 use crate::config::config;
 use crate::detector::{detector, warn_of_detector};
-use crate::errors::{IntoPy, exception, wrong_argument};
+use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::estimate::{Names, PyEstimate};
 use crate::frame::PyFrame;
 use crate::people::TrackedBody;
@@ -37,7 +36,7 @@ pub struct PyTracker {
 pub(crate) fn site_positions(body: &Body, joints: &Bound<'_, PyDict>) -> PyResult<Vec<(usize, Vec3)>> {
     let place = |(name, position): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let name: String = name.extract()?;
-        let site = body.site_index(&name).map_err(|error| error.into_py(joints.py()))?;
+        let site = body.site_index(&name).map_err(Raise::raise)?;
         Ok((site, vector(&format!("joints[{name}]"), &position)?))
     };
     joints.iter().map(place).collect()
@@ -53,31 +52,43 @@ pub(crate) fn body_before<'py>(
     let py = sites.py();
     let places: Vec<Vec3> = rows("sites", &sites)?.iter().map(|place| Vec3::from_array(*place)).collect();
     let found = tracker.tracker()?.body_before(&places, Vec3::from_array(camera));
-    Ok(PyArray1::from_vec(py, found.map_err(|error| error.into_py(py))?))
+    Ok(PyArray1::from_vec(py, found.map_err(Raise::raise)?))
 }
 
 impl PyTracker {
     /// The color images of a frame, whose cameras are identified by name.
-    fn pictures<'a>(
-        &mut self,
-        py: Python<'_>,
-        frame: &PyFrame,
-        views: &'a ColorViews,
-    ) -> PyResult<Vec<ColorImage<'a>>> {
+    fn pictures<'a>(&mut self, frame: &PyFrame, views: &'a ColorViews) -> PyResult<Vec<ColorImage<'a>>> {
         let mut colors = Vec::with_capacity(views.len());
         for view in views {
             let name = &frame.sources[usize::from(view.1.source)];
             if view.1.camera.distorts() {
                 let text = format!("color[{name}].camera: expected no distortion: undistort the picture, found some");
-                return Err(exception(py, "MeasurementError", text));
+                return Err(MeasurementError::new_err(text));
             }
             colors.push(color_image(view, number(&mut self.cameras, name))?);
         }
         Ok(colors)
     }
 
-    fn body_changed(&mut self) {
-        self.names = Arc::new(Names::from_body(self.tracker.body()));
+    /// What the tracker makes of a frame's color images at given poses; releases the GIL.
+    fn ask<T: Send>(
+        &mut self,
+        py: Python<'_>,
+        frame: &PyFrame,
+        poses: Option<Vec<Bound<'_, PyAny>>>,
+        question: impl FnOnce(&mut Tracker, &Frame, Option<&[Pose]>) -> Result<T, TrackError> + Send,
+    ) -> PyResult<T> {
+        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
+        let views = frame.color_views(py);
+        let colors = self.pictures(frame, &views)?;
+        let input = Frame::empty(frame.stamp).with_colors(&colors);
+        let tracker = &mut self.tracker;
+        py.detach(|| question(tracker, &input, poses.as_deref())).map_err(Raise::raise)
+    }
+
+    fn body_changed(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.names = Arc::new(Names::from_body(py, self.tracker.body())?);
+        Ok(())
     }
 }
 
@@ -85,11 +96,11 @@ impl PyTracker {
 impl PyTracker {
     #[new]
     fn new(body: &PyBody, values: &Bound<'_, PyDict>, detector: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(|error| error.into_py(values.py()))?;
+        let mut tracker = Tracker::new(body.0.clone(), config(values)?).map_err(Raise::raise)?;
         if let Some(found) = self::detector(detector)? {
             tracker = tracker.with_detector(found);
         }
-        let names = Arc::new(Names::from_body(tracker.body()));
+        let names = Arc::new(Names::from_body(values.py(), tracker.body())?);
         Ok(Self { tracker, names, sources: Vec::new(), cameras: Vec::new(), detector_failures: 0 })
     }
 
@@ -108,17 +119,16 @@ impl PyTracker {
 
     #[pyo3(signature = (joints, *, fit_sizes=true))]
     fn _reset(&mut self, joints: &Bound<'_, PyDict>, fit_sizes: bool) -> PyResult<PyEstimate> {
-        let py = joints.py();
         let positions = site_positions(self.tracker.body(), joints)?;
-        self.tracker.reset(&positions, fit_sizes).map_err(|error| error.into_py(py))?;
-        self.body_changed();
+        self.tracker.reset(&positions, fit_sizes).map_err(Raise::raise)?;
+        self.body_changed(joints.py())?;
         self.sources.clear();
         Ok(self.estimate())
     }
 
-    fn _reset_pose(&mut self, py: Python<'_>, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
+    fn _reset_pose(&mut self, world_from_limb: Vec<Bound<'_, PyAny>>) -> PyResult<PyEstimate> {
         let poses = limb_poses(self.tracker.body(), &world_from_limb)?;
-        self.tracker.reset_pose(&poses).map_err(|error| error.into_py(py))?;
+        self.tracker.reset_pose(&poses).map_err(Raise::raise)?;
         self.sources.clear();
         Ok(self.estimate())
     }
@@ -142,14 +152,14 @@ impl PyTracker {
 
     /// Processes one frame; releases the GIL.
     fn step(&mut self, py: Python<'_>, frame: &PyFrame) -> PyResult<PyEstimate> {
-        let borrowed = Borrowed::new(py, frame, self.tracker.body())?;
-        let (clouds, images) = (borrowed.clouds()?, borrowed.images()?);
+        let borrowed = Borrowed::new(py, frame, self.tracker.body(), 0)?;
+        let (clouds, images) = (borrowed.clouds()?, depth_images(&borrowed.images)?);
         let views = frame.color_views(py);
-        let colors = self.pictures(py, frame, &views)?;
+        let colors = self.pictures(frame, &views)?;
         let detections = borrowed.detections();
         let input = borrowed.frame(frame, &clouds, &images, &colors, &detections);
         let tracker = &mut self.tracker;
-        py.detach(|| tracker.step(&input).map(|_| ())).map_err(|error| error.into_py(py))?;
+        py.detach(|| tracker.step(&input).map(|_| ())).map_err(Raise::raise)?;
         self.sources.clone_from(&frame.sources);
         self.detector_failures += usize::from(self.tracker.detector_error().is_some());
         warn_of_detector(py, self.tracker.detector_error())?;
@@ -161,13 +171,13 @@ impl PyTracker {
         let mut pictures = Vec::with_capacity(images.len());
         for (index, image) in images.iter().enumerate() {
             let expected = "an array of shape (height, width, 3) or (height, width) and dtype uint8";
-            let wrong = || wrong_argument(py, &format!("images[{index}]"), expected, image);
+            let wrong = || wrong_argument(&format!("images[{index}]"), expected, image);
             pictures.push(ColorArray::new(image).ok_or_else(wrong)?);
         }
         let views: Vec<_> = pictures.iter().map(|(pixels, size)| (pixels.view(py), *size)).collect();
         let pixels = views.iter().map(|(view, size)| Ok((view.pixels()?, *size))).collect::<PyResult<Vec<_>>>()?;
         let camera = number(&mut self.cameras, source);
-        self.tracker.set_background(camera, &pixels).map_err(|error| error.into_py(py))
+        self.tracker.set_background(camera, &pixels).map_err(Raise::raise)
     }
 
     /// Probability of each pixel of a frame's images to show the body at given poses: name of the camera -> (height, width).
@@ -178,19 +188,11 @@ impl PyTracker {
         frame: &PyFrame,
         poses: Option<Vec<Bound<'py, PyAny>>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let views = frame.color_views(py);
-        let colors = self.pictures(py, frame, &views)?;
-        let input = Frame::empty(frame.stamp).with_colors(&colors);
-        let tracker = &mut self.tracker;
-        let found = py.detach(|| tracker.segment(&input, poses.as_deref())).map_err(|error| error.into_py(py))?;
+        let found = self.ask(py, frame, poses, |tracker, input, poses| tracker.segment(input, poses))?;
         let likely = PyDict::new(py);
-        for ((pixels, picture), (_, data)) in found.into_iter().zip(&colors).zip(&views) {
-            let name = &frame.sources[usize::from(data.source)];
-            likely.set_item(
-                name,
-                PyArray1::from_vec(py, pixels).reshape([picture.camera.height(), picture.camera.width()])?,
-            )?;
+        for (pixels, ColorData { camera, source, .. }) in found.into_iter().zip(&frame.colors) {
+            let pixels = PyArray1::from_vec(py, pixels).reshape([camera.height(), camera.width()])?;
+            likely.set_item(&frame.sources[usize::from(*source)], pixels)?;
         }
         Ok(likely)
     }
@@ -203,25 +205,19 @@ impl PyTracker {
         frame: &PyFrame,
         poses: Option<Vec<Bound<'py, PyAny>>>,
     ) -> PyResult<()> {
-        let poses = poses.map(|poses| limb_poses(self.tracker.body(), &poses)).transpose()?;
-        let views = frame.color_views(py);
-        let colors = self.pictures(py, frame, &views)?;
-        let input = Frame::empty(frame.stamp).with_colors(&colors);
-        let tracker = &mut self.tracker;
-        py.detach(|| tracker.learn_colors(&input, poses.as_deref())).map_err(|error| error.into_py(py))
+        self.ask(py, frame, poses, |tracker, input, poses| tracker.learn_colors(input, poses))
     }
 
     /// The contour lines of the last step in the images of a camera: limb, pixel (2), outward normal (2), offset, sigma, row by
     /// row.
-    fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn _region_lines<'py>(&self, py: Python<'py>, source: &str) -> Bound<'py, PyArray1<f32>> {
         let camera = self.cameras.iter().position(|known| known == source);
         let lines = camera.into_iter().flat_map(|camera| self.tracker.region_lines(camera as u16));
         let row = |line: RegionLine| {
             let ([u, v], [nu, nv]) = (line.place, line.normal);
-            vec![line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
+            [line.limb as f32, u, v, nu, nv, line.offset, line.sigma]
         };
-        let rows: Vec<Vec<f32>> = lines.map(row).collect();
-        PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
+        PyArray1::from_vec(py, lines.flat_map(row).collect())
     }
 
     /// Signed distance of world points `(N, 3)` to the posed body, meters, negative inside.
@@ -229,7 +225,7 @@ impl PyTracker {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.distance(slice)).map_err(|error| error.into_py(py))?;
+        let distances = py.detach(|| self.tracker.distance(slice)).map_err(Raise::raise)?;
         Ok(PyArray1::from_vec(py, distances))
     }
 
@@ -238,16 +234,16 @@ impl PyTracker {
         let array = PointArray::new("points", points)?;
         let view = array.view(py);
         let slice = view.points()?;
-        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(|error| error.into_py(py))?;
-        PyArray2::from_vec2(py, &distances).map_err(|error| PyValueError::new_err(error.to_string()))
+        let distances = py.detach(|| self.tracker.limb_distances(slice)).map_err(Raise::raise)?;
+        Ok(PyArray2::from_vec2(py, &distances)?)
     }
 
-    fn scale(&mut self, py: Python<'_>, factor: f64) -> PyResult<()> {
-        self.tracker.scale(factor).map_err(|error| error.into_py(py))
+    fn scale(&mut self, factor: f64) -> PyResult<()> {
+        self.tracker.scale(factor).map_err(Raise::raise)
     }
 
-    fn set_shape(&mut self, py: Python<'_>, limb: &str, shape: &PyShape) -> PyResult<()> {
-        self.tracker.set_shape(limb, shape.0).map_err(|error| error.into_py(py))
+    fn set_shape(&mut self, limb: &str, shape: &PyShape) -> PyResult<()> {
+        self.tracker.set_shape(limb, shape.0).map_err(Raise::raise)
     }
 
     fn _add_limb(
@@ -260,22 +256,20 @@ impl PyTracker {
         sites: Vec<(String, [f64; 3])>,
     ) -> PyResult<()> {
         let sites = sites.into_iter().map(|(name, position)| (name, Vec3::from_array(position))).collect();
-        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(|error| error.into_py(py))?;
-        self.body_changed();
-        Ok(())
+        self.tracker.add_limb(name, parent, shape.0, joint(parts), sites).map_err(Raise::raise)?;
+        self.body_changed(py)
     }
 
     fn remove_limb(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.tracker.remove_limb(name).map_err(|error| error.into_py(py))?;
-        self.body_changed();
-        Ok(())
+        self.tracker.remove_limb(name).map_err(Raise::raise)?;
+        self.body_changed(py)
     }
 
     fn __repr__(&self) -> String {
         format!(
             "Tracker(body={:?}, limbs={}, last={})",
             self.tracker.body().name(),
-            self.names.limbs.len(),
+            self.tracker.body().limbs().len(),
             self.estimate().__repr__()
         )
     }

@@ -1,7 +1,7 @@
 //! A color camera and its pose.
 
-use voodoo_core::Camera;
 use voodoo_core::math::{Affine3, Mat3, Vec3};
+use voodoo_core::{Camera, TrackError};
 
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +17,15 @@ impl Eye<'_> {
     pub fn focal(&self) -> f64 {
         let [fx, fy] = self.camera.focal();
         (fx * fy).sqrt()
+    }
+
+    /// Checks that an image has as many pixels as the camera.
+    pub(crate) fn check(&self, name: &str, expected: &'static str, pixels: usize) -> Result<(), TrackError> {
+        if pixels == self.camera.pixels() {
+            return Ok(());
+        }
+        let found = format!("{pixels} for {} pixels", self.camera.pixels());
+        Err(TrackError::measurement(name, expected, found))
     }
 
     /// Focal point in the world, meters.

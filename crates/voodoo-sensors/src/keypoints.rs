@@ -1,11 +1,9 @@
 //! Converts the 2-D keypoints of a network into measurements of body sites.
 
 use crate::eye::Eye;
-use crate::sites::{SiteGate, SiteRay};
+use crate::sites::SiteGate;
 use voodoo_core::math::Vec3;
 
-/// Standard deviation of a 3-D site position along its ray where none is given, meters.
-const ALONG_SIGMA: f64 = 0.04;
 /// Standard deviation added for each meter of the person's own body before the site, beyond half a limb: the network guesses such
 /// a site.
 /// site.
@@ -31,23 +29,6 @@ pub struct SitePixel {
     pub pixel: [f64; 2],
     /// The least confidence of its keypoints, at most 1.
     pub confidence: f64,
-}
-
-impl SiteKeypoints {
-    /// Pixel of a site from keypoints (column, row, confidence); `None` if one of them is missing or has a confidence below
-    /// `least`.
-    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
-        let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
-        for (index, weight) in &self.weights {
-            let [u, v, reliability] = *keypoints.get(*index)?;
-            pixel = [pixel[0] + weight * u, pixel[1] + weight * v];
-            total += reliability;
-            confidence = if reliability < confidence { reliability } else { confidence };
-        }
-        // Missing keypoints are not finite, which makes the sums not finite.
-        let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
-        known.then_some(SitePixel { pixel, confidence })
-    }
 }
 
 /// The camera of an image, and how its keypoints become measurements.
@@ -81,10 +62,10 @@ pub struct SiteObservation {
 }
 
 /// The measurement that a detected site becomes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SiteMeasurement {
-    /// A ray.
-    Ray(SiteRay),
+    /// The unit direction of a ray in the world frame, and its standard deviation at the site, meters.
+    Ray(Vec3, f64),
     /// A 3-D position in the world frame and its standard deviation, meters.
     Place(Vec3, f64),
     /// Rejected: it is too far from the prediction, or the lens model has no ray for the pixel.
@@ -92,6 +73,21 @@ pub enum SiteMeasurement {
 }
 
 impl SiteKeypoints {
+    /// Pixel of a site from keypoints (column, row, confidence); `None` if one of them is missing or has a confidence below
+    /// `least`.
+    pub fn pixel(&self, keypoints: &[[f64; 3]], least: f64) -> Option<SitePixel> {
+        let (mut pixel, mut total, mut confidence) = ([0.0; 2], 0.0, 1.0_f64);
+        for (index, weight) in &self.weights {
+            let [u, v, reliability] = *keypoints.get(*index)?;
+            pixel = [pixel[0] + weight * u, pixel[1] + weight * v];
+            total += reliability;
+            confidence = if reliability < confidence { reliability } else { confidence };
+        }
+        // Missing keypoints are not finite, which makes the sums not finite.
+        let known = (pixel[0] + pixel[1] + total).is_finite() && confidence >= least && confidence > 0.0;
+        known.then_some(SitePixel { pixel, confidence })
+    }
+
     /// Returns a 3-D position where the measured surface passes the gate, else a ray where that passes the gate.
     pub fn measurement(
         &self,
@@ -122,17 +118,8 @@ impl SiteKeypoints {
             return SiteMeasurement::Dropped;
         }
         let hidden = observation.hidden - self.behind;
-        SiteMeasurement::Ray(SiteRay {
-            site: self.site.clone(),
-            origin: eye.origin(),
-            direction,
-            sigma: if hidden > 0.0 { sigma.hypot(GUESSED * hidden) } else { sigma },
-            source: sensor.source.to_owned(),
-            trust: 1.0,
-            bias: 0.0,
-            place: None,
-            place_sigma: ALONG_SIGMA,
-        })
+        let sigma = if hidden > 0.0 { sigma.hypot(GUESSED * hidden) } else { sigma };
+        SiteMeasurement::Ray(direction, sigma)
     }
 }
 
@@ -205,7 +192,7 @@ mod tests {
         let wrist = part(&[(0, 1.0)]);
         let mut gate = SiteGate::new(0.1, 0.0, 0.1);
         let sigma = |measured: SiteMeasurement| match measured {
-            SiteMeasurement::Ray(ray) => ray.sigma,
+            SiteMeasurement::Ray(_, sigma) => sigma,
             _ => f64::NAN,
         };
         let clear = sigma(wrist.measurement(&observation, &sensor, Some(&mut gate)));
@@ -219,7 +206,7 @@ mod tests {
         assert!(place.distance(Vec3::new(0.0, 0.0, 1.98)) < 1e-12 && least == 0.03);
         let before = SiteObservation { surface: Some(1.0), ..observation };
         assert!(
-            matches!(wrist.measurement(&before, &sensor, Some(&mut gate)), SiteMeasurement::Ray(_)),
+            matches!(wrist.measurement(&before, &sensor, Some(&mut gate)), SiteMeasurement::Ray(..)),
             "what hides it is refused"
         );
         let far = SiteObservation { expected: Vec3::new(0.2, 0.0, 2.0), ..observation };

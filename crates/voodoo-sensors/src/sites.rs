@@ -1,8 +1,6 @@
-//! Named sites from frame to frame: gating of their measurements, and the rays on which they were observed.
+//! Named sites from frame to frame: gating of their measurements.
 
 use std::collections::BTreeMap;
-
-use voodoo_core::math::Vec3;
 
 /// Accepts measurements near predicted sites. The gate widens slowly while no measurement is accepted.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,29 +46,6 @@ impl SiteGate {
     fn remember(&mut self, site: &str, source: &str, stamp: f64) {
         self.last.entry(source.to_owned()).or_default().insert(site.to_owned(), stamp);
     }
-}
-
-/// A named site that was observed along a ray.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SiteRay {
-    /// Its name.
-    pub site: String,
-    /// Focal point in the world, meters.
-    pub origin: Vec3,
-    /// Unit vector in the world.
-    pub direction: Vec3,
-    /// Standard deviation perpendicular to the ray at the site, meters.
-    pub sigma: f64,
-    /// Name of the source.
-    pub source: String,
-    /// Factor of the weight, in [0, 1].
-    pub trust: f64,
-    /// Bias, meters: the measurement may have a constant error of this size.
-    pub bias: f64,
-    /// Distance of the site along the ray, if a depth camera measured it, meters.
-    pub place: Option<Vec3>,
-    /// Standard deviation of that distance, meters.
-    pub place_sigma: f64,
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use super::{IkProblem, IkSolver, SETTLED};
 use voodoo_core::math::dot;
 
 impl IkSolver {
-    /// Takes the whole step, or as much of it as leaves no level worse than the levels above it require.
+    /// Takes the whole step, or as much of it as leaves no level worse than the levels above it require. Without the image there is
+    /// at least one level.
     pub(super) fn advance(
         &mut self,
         problem: &IkProblem,
@@ -14,10 +15,7 @@ impl IkSolver {
         angles: &mut [f64],
     ) -> f64 {
         let n = angles.len();
-        let last = if image { count } else { count.saturating_sub(1) };
-        if count == 0 && !image {
-            return 0.0;
-        }
+        let last = if image { count } else { count - 1 };
         self.propose(problem, angles, last, 1.0);
         self.evaluate(problem);
         let Some(failed) = self.first_failure(n, count, image, slack, last) else {

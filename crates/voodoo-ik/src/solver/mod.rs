@@ -82,9 +82,12 @@ pub struct IkSolver {
     /// Current fraction of the image step.
     gain: f64,
     phase_start: Vec<f64>,
-    /// The state before a perturbation.
-    saved: Saved,
-    trials: ImageTrials,
+    /// Angles and costs before a perturbation.
+    saved_angles: Vec<f64>,
+    saved_cost: Vec<f64>,
+    report: Report,
+    /// Whether the current phase compares with the images.
+    comparing: bool,
     /// Rest values that pull the angles below all other levels; empty: none.
     rest: Vec<Rest>,
     /// Gradients of the criterion where the images rejected a step to rest.
@@ -124,22 +127,6 @@ struct LinearSystem {
     part: Vec<f64>,
 }
 
-/// Angles and their costs.
-#[derive(Clone, Debug, Default)]
-struct Saved {
-    angles: Vec<f64>,
-    cost: Vec<f64>,
-}
-
-/// Number of evaluated postures, number of those compared with the images, and whether the current phase compares with the
-/// images.
-#[derive(Clone, Debug, Default)]
-struct ImageTrials {
-    tried: usize,
-    compared: usize,
-    comparing: bool,
-}
-
 struct IkProblem<'a> {
     model: &'a ChainModel,
     base: &'a Pose,
@@ -166,38 +153,35 @@ impl IkSolver {
         let problem = IkProblem { model, base: world_from_base, goals, criterion, options };
         self.start(&problem, angles);
         let count = self.levels.ranges.len();
-        let mut report = Report { converged: true, ..Report::default() };
         // Levels join one after the other, the image last. Thus the result of a level does not depend on those below it.
         for phase in 0..count + usize::from(criterion.is_some()) {
             // The images are evaluated only in their own phase, so that the levels above do not depend on them.
-            self.trials.comparing = phase == count;
-            if self.trials.comparing {
+            self.comparing = phase == count;
+            if self.comparing {
                 self.evaluate_here(&problem, angles);
             }
-            self.phase_start.clear();
-            self.phase_start.extend_from_slice(angles);
-            self.phase(&problem, phase, true, angles, &mut report);
+            angles.clone_into(&mut self.phase_start);
+            self.phase(&problem, phase, true, angles);
             if phase > 0 && !self.correct_upper_levels(&problem, phase.min(count), angles) {
                 // Finite steps along curved null spaces led to another local minimum: repeat, with no rise allowed at all.
                 angles.copy_from_slice(&self.phase_start);
                 self.evaluate_here(&problem, angles);
-                self.phase(&problem, phase, false, angles, &mut report);
+                self.phase(&problem, phase, false, angles);
             }
             if phase < count {
                 self.levels.best.push(self.here.cost[phase].sqrt());
             }
         }
         if !self.rest.is_empty() {
-            self.pull_to_rest(&problem, angles, &mut report);
+            self.pull_to_rest(&problem, angles);
         }
-        report.h = self.here.h;
-        (report.tried, report.compared) = (self.trials.tried, self.trials.compared);
-        report
+        self.report.h = self.here.h;
+        self.report
     }
 
     /// Steps with the first `phase + 1` levels, or with all levels and the image. With `slack`, levels above may rise by the
     /// second-order effect of a step, which the next step corrects.
-    fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64], report: &mut Report) {
+    fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64]) {
         let (count, options) = (self.levels.ranges.len(), problem.options);
         let image = phase == count;
         let active = if image { count } else { phase + 1 };
@@ -210,7 +194,7 @@ impl IkSolver {
                 rest = true;
                 break;
             }
-            report.steps += 1;
+            self.report.steps += 1;
             let before = self.here.h;
             let moved = self.step(problem, active, image, slack, angles);
             idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
@@ -227,18 +211,18 @@ impl IkSolver {
             self.nudge(problem, angles);
         }
         if nudged && self.worse_than_saved() {
-            angles.copy_from_slice(&self.saved.angles);
+            angles.copy_from_slice(&self.saved_angles);
             self.evaluate_here(problem, angles);
             rest = true;
         }
-        report.converged &= rest;
+        self.report.converged &= rest;
     }
 
     /// Steps with the upper levels alone (at most as many as a phase has), to correct errors from the lower levels' finite steps.
     /// Returns true when the upper levels are as good as before the phase.
     fn correct_upper_levels(&mut self, problem: &IkProblem, levels: usize, angles: &mut [f64]) -> bool {
-        let comparing = self.trials.comparing;
-        self.trials.comparing = false;
+        let comparing = self.comparing;
+        self.comparing = false;
         let mut moved = false;
         for active in (1..=levels).rev() {
             for _ in 0..problem.options.steps {
@@ -252,7 +236,7 @@ impl IkSolver {
                 }
             }
         }
-        self.trials.comparing = comparing;
+        self.comparing = comparing;
         if comparing && moved {
             self.evaluate_here(problem, angles);
         }
@@ -284,7 +268,7 @@ impl IkSolver {
         self.stages.clear();
         self.stages.resize((count + 1) * n, 0.0);
         self.levels.best.clear();
-        (self.trials.tried, self.trials.compared, self.trials.comparing) = (0, 0, false);
+        (self.report, self.comparing) = (Report { converged: true, ..Report::default() }, false);
         self.gain = problem.options.gain;
         self.evaluate_here(problem, angles);
     }
@@ -297,14 +281,14 @@ impl IkSolver {
 
     /// Computes costs and kinematics at the trial angles, and the criterion in the image phase.
     fn evaluate(&mut self, problem: &IkProblem) {
-        self.trials.tried += 1;
+        self.report.tried += 1;
         problem.model.place(problem.base, &self.trial_angles, &mut self.trial.at);
         self.trial.cost.clear();
         let costs = self.levels.ranges.iter().map(|level| level_cost(&problem.goals[level.clone()], &self.trial.at));
         self.trial.cost.extend(costs);
         self.trial.h = match problem.criterion {
-            Some(criterion) if self.trials.comparing => {
-                self.trials.compared += 1;
+            Some(criterion) if self.comparing => {
+                self.report.compared += 1;
                 criterion.evaluate(problem.model, &self.trial.at, &mut self.trial.gradient)
             }
             _ => 0.0,
@@ -316,10 +300,8 @@ impl IkSolver {
     }
 
     fn nudge(&mut self, problem: &IkProblem, angles: &mut [f64]) {
-        self.saved.angles.clear();
-        self.saved.angles.extend_from_slice(angles);
-        self.saved.cost.clear();
-        self.saved.cost.extend_from_slice(&self.here.cost);
+        angles.clone_into(&mut self.saved_angles);
+        self.saved_cost.clone_from(&self.here.cost);
         for (i, (angle, [low, high])) in angles.iter_mut().zip(problem.model.limits()).enumerate() {
             // Unequal perturbations break the symmetry of symmetric chains; each moves away from the nearer limit.
             let at_limit = *angle <= *low || *angle >= *high;
@@ -331,14 +313,8 @@ impl IkSolver {
     }
 
     fn worse_than_saved(&self) -> bool {
-        for (now, saved) in self.here.cost.iter().zip(&self.saved.cost) {
-            if *now > saved + 1e-13 {
-                return true;
-            }
-            if *now < saved - 1e-13 {
-                return false;
-            }
-        }
-        false
+        let mut pairs = self.here.cost.iter().zip(&self.saved_cost);
+        let differ = |(now, saved): &(&f64, &f64)| **now > **saved + 1e-13 || **now < **saved - 1e-13;
+        pairs.find(differ).is_some_and(|(now, saved)| now > saved)
     }
 }

@@ -2,7 +2,7 @@
 
 use super::super::goal::level_rows;
 use super::super::linear::largest;
-use super::{IkProblem, IkSolver, Report};
+use super::{IkProblem, IkSolver};
 
 /// Allowed rise of the image criterion, pixels: rounding.
 const LEVEL: f64 = 1e-9;
@@ -28,27 +28,26 @@ impl IkSolver {
     /// rejected. Few solves have a rest posture, so the function is marked cold.
     #[cold]
     #[inline(never)]
-    pub(super) fn pull_to_rest(&mut self, problem: &IkProblem, angles: &mut [f64], report: &mut Report) {
+    pub(super) fn pull_to_rest(&mut self, problem: &IkProblem, angles: &mut [f64]) {
         // Improvements that lower levels made in higher ones also count.
         self.levels.best.clear();
         self.levels.best.extend(self.here.cost.iter().map(|cost| cost.sqrt()));
         let most = self.here.h + LEVEL;
         let mut rest = false;
         for _ in 0..problem.options.steps {
-            report.steps += 1;
+            self.report.steps += 1;
             if self.pull_once(problem, most, angles) < problem.options.still {
                 rest = true;
                 break;
             }
         }
-        report.converged &= rest;
+        self.report.converged &= rest;
     }
 
     /// Takes one step with `h` at most `most`. Returns the largest change of an unknown; zero if no step is accepted.
     fn pull_once(&mut self, problem: &IkProblem, most: f64, angles: &mut [f64]) -> f64 {
         let (n, count, limits) = (angles.len(), self.levels.ranges.len(), problem.model.limits());
-        self.phase_start.clear();
-        self.phase_start.extend_from_slice(angles);
+        angles.clone_into(&mut self.phase_start);
         let off = self.rest_error(angles);
         self.objections.clear();
         self.objections.reserve((n + 1) * n);
@@ -62,13 +61,13 @@ impl IkSolver {
                     angles[i] = (self.phase_start[i] + fraction * self.stages[count * n + i]).clamp(*low, *high);
                 }
                 problem.model.normalize(angles);
-                self.trials.comparing = false;
+                self.comparing = false;
                 self.evaluate_here(problem, angles);
                 let kept = self.correct_upper_levels(problem, count, angles);
                 self.objections.truncate(refused * n);
                 if kept && self.rest_error(angles) < off {
                     if problem.criterion.is_some() {
-                        self.trials.comparing = true;
+                        self.comparing = true;
                         self.evaluate_here(problem, angles);
                     }
                     if self.here.h <= most {
@@ -83,7 +82,7 @@ impl IkSolver {
                     break;
                 }
             }
-            self.trials.comparing = problem.criterion.is_some();
+            self.comparing = problem.criterion.is_some();
             self.evaluate_here(problem, angles);
             // If the images rejected even the smallest step, continues along the border of the region where they are satisfied.
             if self.objections.len() == refused * n {

@@ -53,8 +53,7 @@ impl IkSolver {
             if self.linear.taken.is_empty() {
                 self.linear.damped.solve(&self.linear.jacobian, &self.linear.target, damping, &mut self.linear.part);
             } else {
-                self.linear.projected.clear();
-                self.linear.projected.extend_from_slice(&self.linear.jacobian);
+                self.linear.projected.clone_from(&self.linear.jacobian);
                 self.linear.projected.chunks_exact_mut(n).for_each(|row| self.linear.taken.project(row));
                 self.linear.damped.solve(&self.linear.projected, &self.linear.target, damping, &mut self.linear.part);
             }

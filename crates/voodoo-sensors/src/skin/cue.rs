@@ -177,7 +177,7 @@ impl SkinCue {
     /// # Errors
     /// [`TrackError`] when the image is not of the camera's size, or a tracker has no pose.
     pub fn observe(&mut self, input: &SkinInput) -> Result<Vec<FoundSite>, TrackError> {
-        check(input.image, &input.eye)?;
+        input.eye.check("image", "a color for every pixel of the camera", input.image.len())?;
         let depth = |site: &Expected| input.eye.in_sensor(site.place).z;
         let sites: Vec<Expected> = input.expected.iter().filter(|site| depth(site) > NEAREST).copied().collect();
         self.candidates.clear();
@@ -378,7 +378,7 @@ impl SkinCue {
         joints: &[Vec3],
         sites: &[Option<Vec3>],
     ) -> Result<(), TrackError> {
-        check(image, eye)?;
+        eye.check("image", "a color for every pixel of the camera", image.len())?;
         let (mut faces, mut shown) = (Vec::new(), Vec::new());
         for (site, place) in sites.iter().enumerate() {
             let Some(inside) = place.map(|place| eye.in_sensor(place)).filter(|inside| inside.z > NEAREST) else {
@@ -407,14 +407,6 @@ impl SkinCue {
 fn smallest(input: &SkinInput, site: &Expected) -> f64 {
     let palm = PALM * input.eye.focal() / input.eye.in_sensor(site.place).z;
     SMALLEST[usize::from(input.depth.is_none())] * PI * palm * palm
-}
-
-fn check(image: &[[u8; 3]], eye: &Eye) -> Result<(), TrackError> {
-    if image.len() == eye.camera.pixels() {
-        return Ok(());
-    }
-    let found = format!("{} for {} pixels", image.len(), eye.camera.pixels());
-    Err(TrackError::measurement("image", "a color for every pixel of the camera", found))
 }
 
 /// Rows and columns of the image that show the surroundings of positions in front of the camera, to this distance in meters.

@@ -26,10 +26,7 @@ impl<'a> DepthBeside<'a> {
         depth: Eye<'a>,
         color: Eye<'a>,
     ) -> Result<Self, TrackError> {
-        if depth.camera.pixels() != image.len() {
-            let found = format!("{} for {} pixels", image.len(), depth.camera.pixels());
-            return Err(TrackError::measurement("depth", "a depth for every pixel of the camera", found));
-        }
+        depth.check("depth", "a depth for every pixel of the camera", image.len())?;
         Ok(Self { image, meters_per_unit, depth, color })
     }
 
