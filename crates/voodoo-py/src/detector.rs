@@ -11,10 +11,8 @@ use pyo3::types::{PyDict, PyString, PyTuple};
 use voodoo_core::math::{Vec3, matrix};
 use voodoo_core::{DepthImage, Ground};
 use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery, Surroundings};
-use voodoo_detect::Detector;
 
 use crate::arrays::{Row, contiguous, vector};
-use crate::detect::PyDetector;
 use crate::errors::{ConfigError, MeasurementError, wrong_argument};
 
 /// Standard deviation of a joint for which a detector reports none, meters.
@@ -28,9 +26,10 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
         return Ok(None);
     }
     if given.cast::<PyString>().is_ok_and(|word| word == "shipped") {
-        return Ok(Some(Box::new(Detector::new())));
+        return Ok(shipped());
     }
-    if let Ok(detector) = given.cast::<PyDetector>() {
+    #[cfg(feature = "detect")]
+    if let Ok(detector) = given.cast::<crate::detect::PyDetector>() {
         return Ok(Some(detector.try_borrow()?.0.fresh()));
     }
     if given.hasattr("joints")? && given.hasattr("detect")? {
@@ -41,6 +40,14 @@ pub(crate) fn detector(given: &Bound<'_, PyAny>) -> PyResult<Option<Box<dyn Dete
         given.repr()?
     );
     Err(ConfigError::new_err(text))
+}
+
+/// The detector that ships with the library, if this build contains it.
+fn shipped() -> Option<Box<dyn Detect>> {
+    #[cfg(feature = "detect")]
+    return Some(Box::new(voodoo_detect::Detector::new()));
+    #[cfg(not(feature = "detect"))]
+    None
 }
 
 /// Reports that a detector failed in a step, which continued without it: a warning, or KeyboardInterrupt and the like unchanged.
