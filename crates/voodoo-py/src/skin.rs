@@ -17,7 +17,6 @@ use crate::errors::{MeasurementError, Raise, wrong_argument};
 use crate::people::TrackedBody;
 use crate::sites::places_of;
 
-type CandidatePlace = ((f64, f64), usize, usize);
 /// Index of a site, direction of its ray, its position, and its predicted depth.
 type Ray = (usize, Row, Option<Row>, f64);
 /// Image, meters per unit, camera and pose of a depth camera.
@@ -83,9 +82,8 @@ impl PySkinCue {
     }
 
     #[getter]
-    fn candidates(&self) -> Vec<CandidatePlace> {
-        let found = self.cue.candidates.iter();
-        found.map(|item| (item.pixel.into(), item.region, item.area)).collect()
+    fn candidates(&self) -> Vec<(f64, f64)> {
+        self.cue.candidates.iter().map(|item| item.pixel.into()).collect()
     }
 
     #[getter]

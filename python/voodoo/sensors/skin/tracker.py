@@ -67,7 +67,7 @@ class SkinTracker:
     @property
     def candidates(self) -> list[tuple[float, float]]:
         """Pixels (u, v) in the last image where a head or hand may be."""
-        return [pixel for pixel, *_ in self._cue.candidates]
+        return self._cue.candidates
 
     @property
     def assigned(self) -> dict[str, tuple[float, float]]:
