@@ -97,7 +97,11 @@ impl Hypotheses {
             if !self.is_due(at) {
                 continue;
             }
-            self.propose(at, detection, &mut detected);
+            self.propose(at, detection, detected);
+            if self.pool.body.found {
+                // It is the same for every leg.
+                detected = &[];
+            }
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);
             steps += taken;
             if better {
@@ -158,7 +162,7 @@ impl Hypotheses {
     }
 
     /// Fills the pool with alternative configurations of one arm or leg.
-    fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &mut &[Pose]) {
+    fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
         let Self { rough, clusters, color_directions, pool, .. } = self;
         rough.score.begin(at);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);

@@ -4,11 +4,11 @@ use super::{Pool, Propose};
 use crate::hypotheses::rough::{Extremity, RoughSearch};
 use crate::math::{Pose, shifted};
 
-/// Poses of all limbs, fitted to the detections in this frame, world frame; empty without detections, and once proposed.
+/// Poses of all limbs, fitted to the detections in this frame, world frame; empty without detections.
 #[derive(Debug)]
-pub(in crate::hypotheses) struct DetectedBody<'a, 'b>(pub(in crate::hypotheses) &'a mut &'b [Pose]);
+pub(in crate::hypotheses) struct DetectedBody<'a>(pub(in crate::hypotheses) &'a [Pose]);
 
-impl Propose for DetectedBody<'_, '_> {
+impl Propose for DetectedBody<'_> {
     fn propose(&mut self, at: Extremity, _rough: &mut RoughSearch, pool: &mut Pool) {
         // A wrong arm is no evidence against the rest of the body.
         if !at.chain().leg || self.0.len() != at.matched.poses.len() {
@@ -18,7 +18,6 @@ impl Propose for DetectedBody<'_, '_> {
         pool.body.poses.clear();
         pool.body.poses.extend(self.0.iter().map(|pose| shifted(pose, origin)));
         pool.body.found = true;
-        *self.0 = &[];
     }
 }
 
@@ -40,12 +39,12 @@ mod tests {
             let mut observation = context.observation;
             observation.views.origin = origin;
             let fit = Fit::new(&config).unwrap();
-            let proposed = |leg: bool, mut detected: &[Pose]| {
+            let proposed = |leg: bool, detected: &[Pose]| {
                 let index = model.extremities.iter().position(|chain| chain.leg == leg).unwrap();
                 let context = Context { observation, ..context };
                 let at = Extremity { context, matched: fit.matched(&poses), regions: None, index };
                 let (mut rough, mut pool) = (RoughSearch::default(), Pool::default());
-                DetectedBody(&mut detected).propose(at, &mut rough, &mut pool);
+                DetectedBody(detected).propose(at, &mut rough, &mut pool);
                 let found: Vec<_> = pool.found().map(|proposal| proposal.poses.clone()).collect();
                 found
             };
