@@ -3,6 +3,7 @@
     python lab/experiments/live.py realsense [--rate 90]      a device of software, 640x480 (needs pyrealsense2)
     python lab/experiments/live.py overload [--seconds 60]    four times as many images as can be tracked
     python lab/experiments/live.py ros2 --peer PYTHON         depth from a node by rclpy, skeletons back (needs cyclonedds)
+    python lab/experiments/live.py robot                      the same from a robot with odometry of 50 Hz, by voodoo's own node
     python lab/experiments/live.py faults                     frames from good data to the right pose, for every kind of fault
 
 Prints JSON. Memory is that of the process that tracks, after ten seconds and at the end. The person is rendered, the noise is
@@ -104,29 +105,19 @@ def overload(seconds: float) -> dict[str, object]:
         return {"source_hz": rate} | observed(Session(live, follower), seconds)
 
 
-def ros2(peer: str, rate: float, seconds: float, queue: int) -> dict[str, object]:
+def ros2(command: list[str], words: list[str], rate: float, seconds: float) -> dict[str, object]:
     folder = Path(os.environ.get("TMPDIR", "/tmp"))
     images, report = folder / "voodoo-bench-images.npz", folder / "voodoo-bench-report.json"
     k = np.array([CAMERA.fx, 0, CAMERA.cx, 0, CAMERA.fy, CAMERA.cy, 0, 0, 1.0])
     np.savez(images, images=np.array(pictures()), k=k)
     here = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "93"}
     code = "import sys; from voodoo.cli import main; sys.argv[0] = 'voodoo'; main()"
-    words = ["live", "ros2:/camera/depth/image_raw", "--report", str(report)]
+    words = ["live", "ros2:/camera/depth/image_raw", *words, "--report", str(report)]
     ours = subprocess.Popen([sys.executable, "-c", code, *words], env=here)
     time.sleep(4.0)
-    without = {name: value for name, value in here.items() if name != "PYTHONPATH"}
-    command = [
-        peer,
-        str(PEERS / "ros_peer.py"),
-        str(images),
-        "--rate",
-        str(rate),
-        "--count",
-        str(round(rate * seconds)),
-        "--queue",
-        str(queue),
-    ]
-    theirs = subprocess.Popen(command, env=without, stdout=subprocess.PIPE, text=True)
+    options = {"--rate": rate, "--count": round(rate * seconds)}
+    command += [str(images), *(str(word) for option in options.items() for word in option)]
+    theirs = subprocess.Popen(command, env=here, stdout=subprocess.PIPE, text=True)
     time.sleep(min(60.0, seconds / 2))
     settled = memory_mb(ours.pid)
     answer = json.loads(theirs.communicate()[0])
@@ -170,7 +161,7 @@ def faults() -> dict[str, int]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("realsense", "overload", "ros2", "faults"))
+    parser.add_argument("what", choices=("realsense", "overload", "ros2", "robot", "faults"))
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--peer", help="a Python with rclpy")
@@ -186,7 +177,14 @@ def main() -> None:
     elif chosen.what == "overload":
         found = overload(chosen.seconds)
     else:
-        found = ros2(chosen.peer or sys.executable, chosen.rate, chosen.seconds, chosen.queue)
+        peer = [chosen.peer or sys.executable]
+        if chosen.what == "robot":
+            command, words = [*peer, str(PEERS / "ros_robot.py")], ["--frame", "odom"]
+        else:
+            # Its own libraries, not voodoo's.
+            without = ["env", "-u", "PYTHONPATH", *peer]
+            command, words = [*without, str(PEERS / "ros_peer.py"), "--queue", str(chosen.queue)], []
+        found = ros2(command, words, chosen.rate, chosen.seconds)
     print(json.dumps(found, indent=2))
 
 

@@ -27,6 +27,11 @@ const COMPONENT_SAMPLES: usize = 48;
 const MOST_COMPONENTS: usize = 40;
 /// No label.
 const NONE: u32 = u32::MAX;
+/// Bits of the neighbors to which a pixel may be connected.
+const LEFT: u8 = 1;
+const UP: u8 = 2;
+const LEFT_BY_TWO: u8 = 4;
+const UP_BY_TWO: u8 = 8;
 
 /// A connected component; camera frame, meters.
 #[derive(Clone, Copy, Debug)]
@@ -131,6 +136,8 @@ pub(crate) struct Components {
     again: Vec<u8>,
     /// Bit mask for each pixel: which of its neighbors it is connected to.
     linked: Vec<u8>,
+    /// The same without connections that follow from others.
+    needed: Vec<u8>,
 }
 
 impl Components {
@@ -177,11 +184,15 @@ impl Components {
         let width = view.width;
         let mut before = NONE;
         for index in 0..self.labels.len() {
-            let linked = self.linked[index];
+            let linked = self.needed[index];
+            if linked == LEFT {
+                self.labels[index] = before;
+                continue;
+            }
             // No earlier pixel has this pixel as its root, and the root of the pixel to the left was resolved just before.
-            let mut root = if linked & 1 != 0 { before } else { index as u32 };
-            for (bit, back) in [(1, width), (2, 2), (3, 2 * width)] {
-                if linked & (1 << bit) == 0 || self.labels[index - back] == root {
+            let mut root = if linked & LEFT != 0 { before } else { index as u32 };
+            for (bit, back) in [(UP, width), (LEFT_BY_TWO, 2), (UP_BY_TWO, 2 * width)] {
+                if linked & bit == 0 || self.labels[index - back] == root {
                     continue;
                 }
                 let other = self.root((index - back) as u32);
@@ -209,14 +220,15 @@ impl Components {
     /// Computes a bit mask for each pixel: whether it is connected to the pixel on the left, above, two to the left and two
     /// above.
     fn link(&mut self, view: &ThinnedImage, finer: f32) {
-        let Self { linked, again, .. } = self;
+        let Self { linked, needed, again, .. } = self;
         let width = view.width;
         linked.clear();
         linked.resize(view.depth.len(), 0);
+        needed.clear();
         widest(
             #[inline(always)]
             || {
-                for (bit, back) in [1, width, 2, 2 * width].into_iter().enumerate() {
+                for (bit, back) in [(LEFT, 1), (UP, width), (LEFT_BY_TWO, 2), (UP_BY_TWO, 2 * width)] {
                     let across = back < width;
                     // Row by row, so that the first pixels of a row are not connected to the end of the row before.
                     for start in (0..view.depth.len()).step_by(width.max(1)) {
@@ -231,10 +243,23 @@ impl Components {
                         for (linked, (((z, other), again), again_other)) in linked[from..to].iter_mut().zip(pairs) {
                             let near = (z - other).abs() < finer * (STEP[0] + STEP[1] * z.min(*other));
                             let valid = (*z > 0.0) & (*other > 0.0);
-                            *linked |= (u8::from(near & valid) & again & again_other) << bit;
+                            *linked |= bit * (u8::from(near & valid) & again & again_other);
                         }
                     }
                 }
+                // The first two rows have no neighbors above by two.
+                let first = linked.len().min(2 * width.max(1));
+                needed.extend_from_slice(&linked[..first]);
+                let above = linked[first - first / 2..].iter().zip(&linked[..]);
+                let pairs = linked[first..].iter().zip(linked[first - first.min(1)..].iter().zip(above));
+                needed.extend(pairs.map(|(own, (left, (up, up_by_two)))| {
+                    let is = |mask: &u8, bit: u8| u8::from(mask & bit != 0);
+                    let [to_left, to_up] = [is(own, LEFT), is(own, UP)];
+                    let up_follows = to_left & is(left, UP) & is(up, LEFT);
+                    let left_by_two_follows = to_left & is(left, LEFT);
+                    let up_by_two_follows = to_up & is(up, UP) | to_left & is(left, UP_BY_TWO) & is(up_by_two, LEFT);
+                    own & !(UP * up_follows | LEFT_BY_TWO * left_by_two_follows | UP_BY_TWO * up_by_two_follows)
+                }));
             },
         );
     }

@@ -35,22 +35,25 @@ impl ThinnedImage {
         while (width.div_ceil(step)) * (height.div_ceil(step)) > MOST_PIXELS {
             step += 1;
         }
-        (self.width, self.height, self.step) = (width.div_ceil(step), height.div_ceil(step), step);
-        self.camera = Some(image.camera.clone());
+        if self.camera.as_ref() != Some(image.camera) {
+            (self.width, self.height, self.step) = (width.div_ceil(step), height.div_ceil(step), step);
+            self.camera = Some(image.camera.clone());
+            let ray = |row, column| image.camera.pixel_ray(column, row).map(|value| value as f32);
+            let rows = (0..height).step_by(step);
+            self.slopes.clear();
+            self.slopes.extend(rows.flat_map(|row| (0..width).step_by(step).map(move |column| ray(row, column))));
+        }
         self.depth.clear();
-        self.slopes.clear();
-        for row in (0..height).step_by(step) {
-            for column in (0..width).step_by(step) {
+        for (row, slopes) in (0..height).step_by(step).zip(self.slopes.chunks(self.width.max(1))) {
+            for (column, slope) in (0..width).step_by(step).zip(slopes) {
                 let index = row * width + column;
-                let slope = image.camera.pixel_ray(column, row).map(|value| value as f32);
                 let z = image.pixels.get(index) * image.meters_per_unit as f32;
                 let returned = z > RANGE[0] && z < RANGE[1] && !slope[0].is_nan();
                 let place = |[x, y]: [f32; 2]| f64::from(z) * Vec3::new(f64::from(x), f64::from(y), 1.0);
                 let excluded =
-                    || !around.excluded.is_empty() && around.excludes(image.world_from_sensor * place(slope));
+                    || !around.excluded.is_empty() && around.excludes(image.world_from_sensor * place(*slope));
                 let kept = returned && !around.explains(index, z) && !excluded();
                 self.depth.push(if kept { z } else { 0.0 });
-                self.slopes.push(slope);
             }
         }
     }

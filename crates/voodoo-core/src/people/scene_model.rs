@@ -17,6 +17,8 @@ const NEW_DEPTH: f32 = 0.1;
 const STILL_FRAMES: [u8; 2] = [4, 60];
 /// Least fraction of the pixels that somebody new covers: far away, or at the border of the image.
 const NEW_SHARE: f64 = 0.005;
+/// Least width of somebody new, meters. The rim of a person whose body is somewhat thinner or lags behind is narrower.
+const NEW_WIDTH: f64 = 0.1;
 /// Time after which a camera's background has been searched for persons, seconds.
 const OLD: f64 = 3.0;
 /// Largest difference between equal depths, meters.
@@ -105,9 +107,17 @@ impl SceneModel {
             }
             for row in (self.row..image.camera.height()).step_by(LEARNED_ROWS) {
                 self.learned += image.camera.width();
+                let (mut new, mut width) = (0, 0.0);
                 for index in row * image.camera.width()..(row + 1) * image.camera.width() {
-                    let Some(z) = meters(image, index).filter(|_| owners[index] == NO_OWNER) else { continue };
-                    self.unexplained += usize::from(is_new(known[index], tentative.depth[index], z));
+                    let seen = meters(image, index).filter(|_| owners[index] == NO_OWNER);
+                    match seen.filter(|z| is_new(known[index], tentative.depth[index], *z)) {
+                        Some(z) => (new, width) = (new + 1, width + f64::from(z) / image.camera.focal()[0]),
+                        None => (new, width) = (0, 0.0),
+                    }
+                    if width >= NEW_WIDTH {
+                        self.unexplained += std::mem::take(&mut new);
+                    }
+                    let Some(z) = seen else { continue };
                     learn_pixel(&mut known[index], &mut tentative.depth[index], &mut tentative.frames[index], z);
                 }
             }
