@@ -46,7 +46,7 @@ impl People {
         });
         let tracked = self.persons.iter().any(Person::is_tracked);
         let wait = match tracked {
-            true if self.everybody || self.scene.shows_something_new() => DETECT_EVERY,
+            true if self.searches_everywhere(frame) || self.scene.shows_something_new() => DETECT_EVERY,
             true => f64::INFINITY,
             false => 0.0,
         };
@@ -59,6 +59,12 @@ impl People {
         }
         self.last_detection = Some(frame.stamp);
         self.detect(frame, if tracked { DetectionQuery::New } else { DetectionQuery::Any });
+    }
+
+    /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
+    fn searches_everywhere(&self, frame: &Frame) -> bool {
+        let searched = (0..frame.images.len()).all(|number| self.scene.is_old(number, frame.stamp));
+        self.everybody && (!searched || self.persons.iter().any(|person| person.present && !person.is_tracked()))
     }
 
     /// Whether a detection may be of somebody new or lost, and not of a person whose given start nothing confirmed yet.

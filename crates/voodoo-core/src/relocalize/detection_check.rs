@@ -7,7 +7,7 @@ use crate::math::{Pose, Vec3};
 /// Time for which a track is new, seconds. It is also the interval between detections for a suspect limb.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;
 /// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two.
-const EVERY: f64 = 0.09;
+const EVERY: f64 = 0.12;
 /// A detection is elsewhere when its trunk or legs have at least this mean distance from the tracked ones, meters. Other
 /// skeletons have hips and ankles 10 cm from those that a detector reports. It is also the largest distance of detected ankles
 /// from the floor under a person.
@@ -185,10 +185,10 @@ mod tests {
             let reasons = Reasons { limb_suspect, pose_uncertain, anywhere, unlike: false };
             let mut check = DetectionCheck::default();
             check.is_due(0.0, Reasons::default());
-            (1..=27).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
+            (1..=28).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
         };
         let none = [false; 3];
-        assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [9; 3]);
+        assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [7; 3]);
         assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [1, 0]);
     }
 
