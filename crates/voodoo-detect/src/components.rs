@@ -255,10 +255,12 @@ impl Components {
                 needed.extend(pairs.map(|(own, (left, (up, up_by_two)))| {
                     let is = |mask: &u8, bit: u8| u8::from(mask & bit != 0);
                     let [to_left, to_up] = [is(own, LEFT), is(own, UP)];
-                    let up_follows = to_left & is(left, UP) & is(up, LEFT);
-                    let left_by_two_follows = to_left & is(left, LEFT);
-                    let up_by_two_follows = to_up & is(up, UP) | to_left & is(left, UP_BY_TWO) & is(up_by_two, LEFT);
-                    own & !(UP * up_follows | LEFT_BY_TWO * left_by_two_follows | UP_BY_TWO * up_by_two_follows)
+                    let follows = [
+                        UP * (to_left & is(left, UP) & is(up, LEFT)),
+                        LEFT_BY_TWO * (to_left & is(left, LEFT)),
+                        UP_BY_TWO * ((to_up & is(up, UP)) | (to_left & is(left, UP_BY_TWO) & is(up_by_two, LEFT))),
+                    ];
+                    own & !(follows[0] | follows[1] | follows[2])
                 }));
             },
         );

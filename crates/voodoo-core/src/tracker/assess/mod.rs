@@ -150,7 +150,8 @@ impl Assessor {
     }
 
     /// Writes the status of the body and its limbs into an estimate, whose sources must have been filled in; no other function
-    /// does. A body with too many limbs not measured, or far from a source's measurements, is not reported as tracked.
+    /// does. A body with too many limbs not measured, far from a source's measurements, or without any that match, is not
+    /// reported as tracked.
     pub(super) fn report_status(&self, model: &Model, estimate: &mut Estimate) {
         let statuses = &mut estimate.limb_status;
         statuses.clear();
@@ -172,7 +173,10 @@ impl Assessor {
             }
         }
         let status = if self.is_by_edges_alone() { overall(statuses, |_| true) } else { self.status };
-        let missed = estimate.sources.iter().any(|source| source.residual > MISSED);
+        // Nothing may match a pose that was set, however much was measured.
+        let sources = &estimate.sources;
+        let missed = sources.iter().any(|source| source.residual > MISSED)
+            || !sources.is_empty() && sources.iter().all(|source| source.inliers == 0);
         let doubtful = missed || measured_fraction(statuses) < 1.0 - SOME;
         estimate.status = if status == Status::Tracking && doubtful { Status::Degraded } else { status };
     }
@@ -293,6 +297,7 @@ fn overall(limbs: &[LimbStatus], is_visible: impl Fn(usize) -> bool) -> Status {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
+    use super::super::estimate::SourceReport;
     use super::*;
     use crate::association::correspondence::Correspondences;
     use crate::body::LimbRole;
@@ -347,6 +352,22 @@ mod tests {
             }
             assert_eq!((*status, assessor.is_reliable(limb)), (LimbStatus::Measured, true), "{}", own.name);
         }
+    }
+
+    #[test]
+    fn a_body_far_from_a_source_or_without_any_match_is_not_tracked() {
+        let (model, poses) = standing();
+        let mut assessor = trusting();
+        assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+        let with = |sources: &[(usize, f64)]| {
+            let source = |&(inliers, residual)| SourceReport { count: 9, inliers, residual, ..SourceReport::default() };
+            let mut estimate = Estimate { sources: sources.iter().map(source).collect(), ..Estimate::default() };
+            assessor.report_status(&model, &mut estimate);
+            estimate.status
+        };
+        let (near, far, none) = ((5, 0.02), (5, 0.2), (0, f64::NAN));
+        assert_eq!([with(&[near]), with(&[near, none])], [Status::Tracking; 2]);
+        assert_eq!([with(&[near, far]), with(&[none, none])], [Status::Degraded; 2]);
     }
 
     #[test]
