@@ -442,6 +442,49 @@ mod tests {
     }
 
     #[test]
+    fn components_are_those_that_a_search_from_pixel_to_pixel_finds() {
+        let size = before_wall(&standing().0, &standing().1).len();
+        let mut state = 7_u64;
+        // Depths of few levels, some of which are connected, with holes.
+        let mut pixels = vec![0; size];
+        for pixel in &mut pixels {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *pixel = [0, 0, 1000, 1020, 1060, 1500, 1500, 1540][(state >> 61) as usize];
+        }
+        let (mut view, mut parts) = (ThinnedImage::default(), Components::default());
+        view.read(&image(&pixels), &Surroundings::default());
+        parts.find(&view, &mut Vec::new());
+        parts.labels.iter_mut().zip(0..).filter(|(label, _)| **label != NONE).for_each(|(label, index)| *label = index);
+        parts.again.fill(1);
+        parts.join(&view, 1.0);
+        let (depth, width) = (&view.depth, view.width);
+        let connected = |a: usize, b: usize| {
+            let [a, b] = [depth[a], depth[b]];
+            a > 0.0 && b > 0.0 && (a - b).abs() < STEP[0] + STEP[1] * a.min(b)
+        };
+        let mut expected = vec![NONE; depth.len()];
+        for first in (0..depth.len()).filter(|index| depth[*index] > 0.0) {
+            let mut open = if expected[first] == NONE { vec![first] } else { Vec::new() };
+            while let Some(index) = open.pop() {
+                if std::mem::replace(&mut expected[index], first as u32) == first as u32 {
+                    continue;
+                }
+                let (row, column) = (index / width, index % width);
+                let near = [1, 2].into_iter().flat_map(|step| {
+                    let across =
+                        [(column >= step).then(|| index - step), (column + step < width).then(|| index + step)];
+                    let down = index + step * width;
+                    across
+                        .into_iter()
+                        .chain([(row >= step).then(|| index - step * width), (down < depth.len()).then_some(down)])
+                });
+                open.extend(near.flatten().filter(|other| expected[*other] == NONE && connected(index, *other)));
+            }
+        }
+        assert!(parts.labels == expected && parts.distinct.len() > 100);
+    }
+
+    #[test]
     fn nothing_and_what_is_flat_small_or_too_large_are_no_candidates() {
         let size = before_wall(&standing().0, &standing().1).len();
         assert_eq!(candidates(&vec![0; size]), []);
