@@ -57,8 +57,12 @@ impl People {
         {
             return;
         }
-        self.last_detection = Some(frame.stamp);
-        self.detect(frame, if tracked { DetectionQuery::New } else { DetectionQuery::Any });
+        let query = match (tracked, self.last_detection.replace(frame.stamp)) {
+            (false, _) => DetectionQuery::Any,
+            (true, None) => DetectionQuery::All,
+            (true, Some(_)) => DetectionQuery::New,
+        };
+        self.detect(frame, query);
     }
 
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
@@ -173,10 +177,15 @@ impl People {
         for ((track, known), own) in confirmed.iter().zip(known).zip(numbers) {
             let others = self.tracked_except(known);
             let Some(leaves) = self.options.room(frame, track.place, &others) else { continue };
-            let came = match known {
+            let mut came = match known {
                 Some(number) => self.reactivate(frame, track, number, own.unwrap_or(number)),
                 None => own.is_some_and(|own| self.spawn(frame, track, own)),
             };
+            if !came && known.is_some_and(|number| self.persons[number].is_tracked()) {
+                // That person stays where they are, and it is somebody else.
+                let own = self.assign_to_newcomers(frame, std::slice::from_ref(track), &[None]);
+                came = own[0].is_some_and(|own| self.spawn(frame, track, own));
+            }
             if !came {
                 self.refusal = Some(Refusal::Unsupported);
             }

@@ -118,6 +118,11 @@ impl DetectionCheck {
         self.compares
     }
 
+    /// Notes that the track is right.
+    pub(super) fn confirm(&mut self) {
+        self.confirmed = true;
+    }
+
     /// Counts a frame and returns whether the detector is due.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons) -> bool {
         let Reasons { limb_suspect, pose_uncertain, anywhere, unlike } = reasons;

@@ -112,6 +112,11 @@ impl Relocalizer {
         self.check.is_confirmed(stamp)
     }
 
+    /// Notes that a detection elsewhere is somebody else.
+    pub(crate) fn confirm(&mut self) {
+        self.check.confirm();
+    }
+
     /// Whether the track was started less than a second ago.
     pub(crate) fn is_new(&self, stamp: f64) -> bool {
         self.check.is_new(stamp)
@@ -219,8 +224,9 @@ impl Relocalizer {
         }
         let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
         // Depth is nearly symmetric front to back, so a detection may override a slightly better cost.
-        let better =
-            self.trials.try_at(at, fit, &fitted, &place, REVERSAL_MARGIN) && (first || self.trials.explains_most(at));
+        let better = self.trials.try_at(at, fit, &fitted, &place, REVERSAL_MARGIN)
+            && (first || self.trials.explains_most(at))
+            && !self.trials.is_somebody_else(at, &fitted);
         fit.swap_matches(&mut self.matched);
         better
     }

@@ -7,6 +7,9 @@ use crate::visibility::EXPLAINED;
 
 /// Maximum fraction of the points that a body found elsewhere may leave far from it.
 const STRAY: f64 = 0.15;
+/// Minimum fractions that a body explains alone, if it is somebody else than the one found elsewhere: of what it explains, and of
+/// what either explains. A body that was put behind the person explains little.
+const SOMEBODY_ELSE: [f64; 2] = [0.25, 0.1];
 
 /// Working memory of a trial.
 #[derive(Debug, Default)]
@@ -49,6 +52,24 @@ impl Trials {
         let stray = self.stray_fraction(context, &poses);
         self.poses = poses;
         stray < STRAY
+    }
+
+    /// Whether the body at `present` is somebody else than at the poses of the last trial: it explains much that is far from these.
+    pub(super) fn is_somebody_else(&mut self, context: Context, present: &[Pose]) -> bool {
+        let poses = std::mem::take(&mut self.poses);
+        self.stray_fraction(context, present);
+        let here = self.nearest.clone();
+        self.stray_fraction(context, &poses);
+        self.poses = poses;
+        let (mut alone, mut own, mut either) = (0.0, 0.0, 0.0);
+        for ((here, there), weight) in here.iter().zip(&self.nearest).zip(&self.sample.weights) {
+            let [here, there] = [here, there].map(|distance| f64::from(*distance) <= 2.0 * EXPLAINED);
+            alone += if here && !there { *weight } else { 0.0 };
+            own += if here { *weight } else { 0.0 };
+            either += if here || there { *weight } else { 0.0 };
+        }
+        let [of_own, of_either] = SOMEBODY_ELSE;
+        alone > of_own * own && alone > of_either * either
     }
 
     /// Returns the fraction of a sample of the candidates that lies far from the body.

@@ -270,7 +270,8 @@ impl BodyTracker {
                     self.assessor.moved();
                 }
                 Some(DetectionVerdict::Consistent) => self.update_sizes(),
-                Some(_) => {}
+                Some(DetectionVerdict::Elsewhere) => self.relocalizer.confirm(),
+                Some(DetectionVerdict::Inconsistent) => {}
                 None => self.move_to_segment(frame, ownership),
             }
         }
