@@ -33,7 +33,7 @@ use scene_model::SceneModel;
 use tentative_tracks::{SAME_PERSON, TentativeTracks};
 
 /// Two tracks whose roots are nearer than this are duplicates, meters.
-const ONE_BODY: f64 = 0.3;
+const ONE_BODY: f64 = 0.2;
 /// A track that lasted for less than this is not remembered, seconds.
 const KNOWN_AFTER: f64 = 1.0;
 
