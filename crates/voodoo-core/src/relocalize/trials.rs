@@ -57,9 +57,9 @@ impl Trials {
     /// Whether the body at `present` is somebody else than at the poses of the last trial: it explains much that is far from these.
     pub(super) fn is_somebody_else(&mut self, context: Context, present: &[Pose]) -> bool {
         let poses = std::mem::take(&mut self.poses);
-        self.stray_fraction(context, present);
+        self.measure_distances(context, present);
         let here = self.nearest.clone();
-        self.stray_fraction(context, &poses);
+        self.measure_distances(context, &poses);
         self.poses = poses;
         let (mut alone, mut own, mut either) = (0.0, 0.0, 0.0);
         for ((here, there), weight) in here.iter().zip(&self.nearest).zip(&self.sample.weights) {
@@ -74,6 +74,14 @@ impl Trials {
 
     /// Returns the fraction of a sample of the candidates that lies far from the body.
     pub(super) fn stray_fraction(&mut self, context: Context, poses: &[Pose]) -> f64 {
+        self.measure_distances(context, poses);
+        let Self { sample, nearest, .. } = self;
+        let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > 2.0 * EXPLAINED);
+        stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
+    }
+
+    /// Samples the candidates and measures their distances to the body.
+    fn measure_distances(&mut self, context: Context, poses: &[Pose]) {
         let Self { sample, nearest, distances, .. } = self;
         let candidates = context.observation.candidates;
         sample.assign(&candidates.points, &candidates.weight);
@@ -83,8 +91,6 @@ impl Trials {
         for limb in 0..poses.len() {
             explain(&context.model.body, limb, poses, &sample.points, nearest, distances);
         }
-        let stray = nearest.iter().zip(&sample.weights).filter(|(distance, _)| f64::from(**distance) > 2.0 * EXPLAINED);
-        stray.map(|(_, weight)| weight).sum::<f64>() / sample.total().max(f64::MIN_POSITIVE)
     }
 
     /// Refines `place` by a few ICP steps and returns its cost; `poses` and `fit` then hold the refined pose and its matches.
