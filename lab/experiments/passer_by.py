@@ -1,6 +1,6 @@
 """A passer-by in front of a tracked person: how often the tracker says that it tracks while it follows the wrong one.
 
-    python lab/experiments/passer_by.py D/rendered/dev_0*
+    python lab/experiments/passer_by.py D/rendered/dev_0* [--speed 0.3 0.6 1.2]
 
 A made-up body walks by 0.8 m in front of the person, in depth and color, and the person is tracked from the recording's own
 start by one tracker, and found by `voodoo.People`. For the frames in which the passer-by is in the scene: those in which the
@@ -12,6 +12,7 @@ import argparse
 import sys
 from collections import Counter
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -83,17 +84,18 @@ def among_others(recording: WithPasserBy) -> list[voodoo.Estimate | None]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path, help="recordings of one person with exact truth")
-    parser.add_argument("--speed", type=float, default=0.6, help="of the passer-by, m/s (default 0.6)")
+    parser.add_argument("--speed", type=float, nargs="+", default=[0.6], help="of the passer-by, m/s (default 0.6)")
     options = parser.parse_args()
     print(
-        "| recording | frames | tracker: wrong | far | greatest, m | no pose | People: wrong | far | greatest, m | no pose |"
+        "| recording | m/s | frames | tracker: wrong | far | greatest, m | no pose "
+        "| People: wrong | far | greatest, m | no pose |"
     )
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for path in options.recordings:
-        recording = WithPasserBy(voodoo.open_recording(path), speed=options.speed)
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    for path, speed in product(options.recordings, options.speed):
+        recording = WithPasserBy(voodoo.open_recording(path), speed=speed)
         one, several = (passed(recording, follow(recording)) for follow in (alone, among_others))
         cells = [f"{each.wrong} | {each.far} | {each.greatest:.2f} | {each.without}" for each in (one, several)]
-        print(f"| {recording.name} | {one.frames} | " + " | ".join(cells) + " |", flush=True)
+        print(f"| {recording.name} | {speed:g} | {one.frames} | " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":
