@@ -38,6 +38,7 @@ from voodoo.pipeline.start import start_tracker
 from voodoo.sensors.settings import FrontEndSettings
 
 IN_TIME = 5
+FRAMES_PER_SECOND = 30
 LATER = 10
 ENOUGH = 6
 """So many of the twelve joints in the image are somebody in view."""
@@ -177,6 +178,7 @@ def centimeters(value: float) -> str:
 def cells(results: Sequence[Result]) -> list[str]:
     """What a group of recordings gave, without its name."""
     late = sum(result.frame is None or result.frame > IN_TIME for result in results)
+    in_second = sum(result.frame is not None and result.frame <= FRAMES_PER_SECOND for result in results)
     firsts, means = (np.array([getattr(result, what) for result in results]) for what in ("first", "mean"))
     turned = [sum(result.swapped[when] for result in results) for when in (0, 1)]
     lost = sum(result.tracking_class == 0 for result in results)
@@ -184,6 +186,7 @@ def cells(results: Sequence[Result]) -> list[str]:
     return [
         f"{len(results)}",
         f"{late}",
+        f"{100 * in_second / len(results):.0f}",
         centimeters(metrics.mean_or_nan(firsts)),
         centimeters(metrics.mean_or_nan(means)),
         f"{turned[0]}; {turned[1]}",
@@ -250,8 +253,8 @@ def main() -> None:
             *sizes,
         ]
         print("| " + " | ".join(values) + " |")
-    print("\n| group | recordings | late | first pose, cm | mean, cm | exchanged: first; later | end lost | class |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("\n| group | recordings | late | found in 1 s, % | first pose, cm | mean, cm | exchanged: first; later | end lost | class |")
+    print("|---|---|---|---|---|---|---|---|---|")
     print("| " + " | ".join(["all", *cells(results)]) + " |")
     if all(result.about.get("camera_tilt_deg") is not None for result in results):
         grouped(
@@ -279,6 +282,8 @@ def main() -> None:
         grouped(results, "sensor", lambda about: about["sensor"].split()[0])
         grouped(results, "floor", lambda about: "known" if about["floor_known"] else "not known")
         grouped(results, "person", lambda about: about["person"])
+    if any("group" in result.about for result in results):
+        grouped(results, "group", lambda about: about.get("group", "adult"))
     sizes_table(results)
 
 

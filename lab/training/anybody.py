@@ -72,9 +72,9 @@ def resized(body: Body, length: Mapping[str, float], girth: float, stature: floa
     )
 
 
-def child(rng: Rng, body: Body) -> Body:
-    """A child of a stature between 0.8 and 1.5 m, with a child's proportions."""
-    stature = rng.uniform(0.8, 1.5)
+def child(rng: Rng, body: Body, low: float = 0.8, high: float = 1.5) -> Body:
+    """A child of a stature between these [m], with a child's proportions."""
+    stature = rng.uniform(low, high)
     of = {k: float(np.interp(stature, STATURES, v)) * (1 + rng.normal(0, 0.03)) for k, v in CHILD.items()}
     return resized(body, of, of.pop("girth"), stature)
 
@@ -121,10 +121,10 @@ def pose(rng: Rng, poses: list[Pose], which: frozenset[str]) -> Pose:
                 out = walk
     else:
         out = sample(rng, poses)
-    return _apart(out) if "heavy" in which else out
+    return apart(out) if "heavy" in which else out
 
 
-def _apart(pose: Pose) -> Pose:
+def apart(pose: Pose) -> Pose:
     """The arms of heavy people hang beside the belly."""
     limbs = pose.limbs.copy()
     for k, outward in enumerate((pose.chest[:, 1], -pose.chest[:, 1])):
@@ -152,10 +152,16 @@ def holding(rng: Rng, pose: Pose, what: str) -> Pose:
 Meshes = list[shapes.Mesh]
 
 
-def garments(rng: Rng, points: Array, joints: Joints, pose: Pose, body: Body) -> tuple[Meshes, Meshes]:
-    """A long skirt, a coat, a hat; and a bag on the back. The first are the person's surface, the others its things."""
+def garments(
+    rng: Rng, points: Array, joints: Joints, pose: Pose, body: Body, *, upright: bool | None = None
+) -> tuple[Meshes, Meshes]:
+    """A long skirt, a coat, a hat; and a bag on the back. The first are the person's surface, the others its things.
+
+    Only who is upright has a skirt or a coat; told by the pose by default.
+    """
     size, worn, things = body.stature / 1.7, [], []
-    upright = (pose.limbs[:, THIGH, 2] < -0.75).all() and pose.pelvis[2, 2] > 0.85 and not pose.lying
+    if upright is None:
+        upright = bool((pose.limbs[:, THIGH, 2] < -0.75).all() and pose.pelvis[2, 2] > 0.85 and not pose.lying)
     x = rng.random()
     if upright and x < 0.6:
         top = joints["humanoid_root"][2] + 0.08 * size if x < 0.35 else joints["vc7"][2] - 0.12 * size

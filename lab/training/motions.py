@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.training import poses
+from lab.training import anybody, poses, shapes
 from lab.training.bodies import JOINTS, Body
-from lab.training.poses import Pose
+from lab.training.poses import THIGH, Pose
 from lab.training.rotations import about, part, shortest, unit
+from lab.training.shapes import Mesh
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
@@ -28,7 +30,24 @@ class Motion:
     surfaces: list[Array]
     joints: Array
     words: str
+    poses: list[Pose]
     seat: float | None = None
+    things: list[list[Mesh]] = field(default_factory=list)
+
+    def moved(self, turn: Array, shifts: Array) -> Motion:
+        """The motion turned by (F, 3, 3) or (3, 3), then shifted by (F, 3) or (3,)."""
+        count = len(self.surfaces)
+        turns, shifts = np.broadcast_to(turn, (count, 3, 3)), np.broadcast_to(shifts, (count, 3))
+        each = list(zip(turns, shifts, strict=True))
+        return replace(
+            self,
+            surfaces=[points @ r.T + t for points, (r, t) in zip(self.surfaces, each, strict=True)],
+            joints=np.einsum("fij,fkj->fki", turns, self.joints) + shifts[:, None],
+            things=[
+                [(points @ r.T + t, faces, closed) for points, faces, closed in parts]
+                for parts, (r, t) in zip(self.things, each, strict=False)
+            ],
+        )
 
 
 def clips_of(data: Path) -> Clips:
@@ -51,8 +70,8 @@ def clips_of(data: Path) -> Clips:
     return found
 
 
-def walk(rng: Rng, body: Body, dress: int, clips: Clips) -> Motion:
-    """A part of a captured clip; in turn to and fro where it is short."""
+def walk(rng: Rng, body: Body, dress: int, clips: Clips, change: Callable[[Pose], Pose] = lambda pose: pose) -> Motion:
+    """A part of a captured clip, of which each pose is changed; in turn to and fro where it is short."""
     clip = str(rng.choice(sorted(clips)))
     made, roots = clips[clip]
     count = min(len(made), int(rng.integers(90, 160)))
@@ -63,7 +82,7 @@ def walk(rng: Rng, body: Body, dress: int, clips: Clips) -> Motion:
         part_of, places = [pose.mirrored() for pose in part_of], places * [1.0, -1.0, 1.0]
     if count < 90:
         part_of, places = part_of + part_of[-2::-1], np.concatenate([places, places[-2::-1]])
-    surfaces, joints = [], []
+    surfaces, joints, part_of = [], [], [change(pose) for pose in part_of]
     for pose, place in zip(part_of, places, strict=True):
         surface, at = body.posed(pose, np.random.default_rng(dress))
         surfaces.append(surface + place)
@@ -72,18 +91,32 @@ def walk(rng: Rng, body: Body, dress: int, clips: Clips) -> Motion:
     # Legs of another length would sink into the floor; who jumps stays in the air.
     lift = np.maximum(-np.median(lowest), -lowest)
     surfaces = [surface + [0, 0, up] for surface, up in zip(surfaces, lift, strict=True)]
-    return Motion(surfaces, np.array(joints) + lift[:, None, None] * [0, 0, 1.0], f"clip {clip}")
+    return Motion(surfaces, np.array(joints) + lift[:, None, None] * [0, 0, 1.0], f"clip {clip}", part_of)
 
 
-def story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
-    """From pose to pose by rule and from motion capture, with the feet at one place; at times on a chair."""
+def story(
+    rng: Rng,
+    body: Body,
+    dress: int,
+    still: list[Pose],
+    change: Callable[[Pose], Pose] = lambda pose: pose,
+    posture: str | None = None,
+) -> Motion:
+    """From pose to pose by rule and from motion capture, with the feet at one place; at times on a chair.
+
+    `posture` may be "sit" or "stand" throughout.
+    """
     kinds = [
         str(rng.choice(["squat", "bend", "kneel", "lunge", "kick", "captured", "captured", "stand"])) for _ in range(3)
     ]
-    sits = rng.random() < 0.25
+    sits = rng.random() < 0.25 if posture is None else posture == "sit"
     if sits:
         kinds = ["sit", "sit", "sit"]
+    elif posture:
+        kinds = ["stand", "stand", "stand"]
     turn = rng.normal(0, 0.2, 4)
+    if posture == "sit":
+        turn[:] = turn[0]
     keys = [poses.standing(rng)]
     for kind in kinds:
         if kind == "stand":
@@ -95,14 +128,15 @@ def story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
     if sits:  # one seat, of which the arms and the trunk move
         keys = [keys[1], *(_legs_of(keys[1], key) for key in keys[2:])]
     keys = [key.turned(about("z", float(angle))) for key, angle in zip(keys, turn, strict=False)]
-    surfaces, joints = [], []
+    surfaces, joints, made = [], [], []
     seat = None
     for number, key in enumerate(keys):
         other = keys[min(number + 1, len(keys) - 1)]
         rest, move = int(rng.integers(6, 20)), int(rng.integers(18, 38))
         for step in range(rest + (move if other is not key else 0)):
             fraction = max(step - rest, 0) / move
-            pose = _between(key, other, fraction * fraction * (3 - 2 * fraction))
+            pose = change(_between(key, other, fraction * fraction * (3 - 2 * fraction)))
+            made.append(pose)
             surface, at = body.posed(pose, np.random.default_rng(dress))
             feet = 0.5 * (at["l_ankle"] + at["r_ankle"])
             shift = -np.array([feet[0], feet[1], surface[:, 2].min()])
@@ -110,7 +144,77 @@ def story(rng: Rng, body: Body, dress: int, still: list[Pose]) -> Motion:
             joints.append([at[name] + shift for name in JOINTS])
     if sits:
         seat = float(joints[0][2][2] - 0.09 * body.stature / 1.7)
-    return Motion(surfaces, np.array(joints), "story " + " ".join(kinds), seat)
+    return Motion(surfaces, np.array(joints), "story " + " ".join(kinds), made, seat)
+
+
+GROUPS = ("child", "heavy", "wheelchair", "seated", "desk", "clothes", "carrying")
+"""Groups of `anybody.GROUPS` of whom there are motions."""
+
+
+def of_group(rng: Rng, group: str, body: Body, dress: int, clips: Clips, still: list[Pose], *, clip: bool) -> Motion:
+    """A motion of somebody of a group, whose body is `body`, with the things that belong to it."""
+    what = str(rng.choice(anybody.HOLDS)) if group == "carrying" else ""
+
+    def change(pose: Pose) -> Pose:
+        if group == "carrying":
+            return anybody.holding(np.random.default_rng(dress), pose, what)
+        return anybody.apart(pose) if group == "heavy" else pose
+
+    if group in ("wheelchair", "seated"):
+        motion = story(rng, body, dress, still, change, "sit")
+    elif group == "desk":
+        motion = story(rng, body, dress, still, change, "sit" if rng.random() < 0.6 else "stand")
+    elif clip:
+        motion = walk(rng, body, dress, clips, change)
+    else:
+        motion = story(rng, body, dress, still, change, "stand" if group in ("clothes", "carrying") else None)
+    upright = all((pose.limbs[:, THIGH, 2] < -0.5).all() and pose.pelvis[2, 2] > 0.8 for pose in motion.poses)
+    things = [
+        _things(np.random.default_rng(dress), group, what, (points, dict(zip(JOINTS, at, strict=True)), pose, body), upright)
+        for points, at, pose in zip(motion.surfaces, motion.joints, motion.poses, strict=True)
+    ]
+    fixed = things[:1] * len(things) if group in ("wheelchair", "desk") else things
+    seat = None if group == "wheelchair" else motion.seat
+    motion = replace(motion, seat=seat, things=fixed, words=" ".join([group, what, motion.words]).replace("  ", " "))
+    return _rolled(rng, motion) if group == "wheelchair" else motion
+
+
+def _things(
+    rng: Rng, group: str, what: str, person: tuple[Array, anybody.Joints, Pose, Body], upright: bool
+) -> list[Mesh]:
+    """What somebody of a group wears, holds, sits in or stands behind."""
+    points, joints, pose, body = person
+    root, size = joints["humanoid_root"], body.stature / 1.7
+    yaw = float(np.arctan2(pose.pelvis[1, 0], pose.pelvis[0, 0]))
+    ahead = np.array([np.cos(yaw), np.sin(yaw)])
+    if group == "clothes":
+        worn, things = anybody.garments(rng, points, joints, pose, body, upright=upright)
+        return worn + things
+    if group == "carrying":
+        return anybody.held(rng, joints, pose, what, body)
+    if group == "wheelchair":
+        chair = shapes.wheelchair(rng, float(root[2] - 0.09 * size), size)
+        return shapes.moved(chair, (root[0] - 0.05 * ahead[0], root[1] - 0.05 * ahead[1]), yaw)
+    if group == "desk":
+        sits = (pose.limbs[:, THIGH, 2] > -0.75).all()
+        height = root[2] + rng.uniform(0.1, 0.3) * size if sits else rng.uniform(0.9, 1.15) * min(size, 1.0)
+        gap = rng.uniform(0.4, 0.75)
+        place = root[:2] + gap * ahead
+        return shapes.moved(shapes.desk(rng, float(height)), (place[0], place[1]), yaw)
+    return []
+
+
+def _rolled(rng: Rng, motion: Motion) -> Motion:
+    """A motion in a wheelchair that rolls to and fro and turns."""
+    time = np.arange(len(motion.surfaces)) / RATE
+    far, wide = rng.uniform(0.1, 0.5), rng.uniform(0.1, 0.8)
+    phase, pace = rng.uniform(0, 2 * np.pi, 2), rng.uniform(0.8, 2.0, 2)
+    yaw, along = wide * np.sin(pace[0] * time + phase[0]), far * np.sin(pace[1] * time + phase[1])
+    turns = np.stack([about("z", float(angle)) for angle in yaw])
+    pelvis = motion.poses[0].pelvis[:, 0] * [1.0, 1.0, 0.0]
+    middle = motion.joints[0, 2] * [1.0, 1.0, 0.0]
+    ahead = turns @ unit(pelvis)
+    return motion.moved(turns, along[:, None] * ahead + middle - turns @ middle)
 
 
 def _legs_of(pose: Pose, other: Pose) -> Pose:

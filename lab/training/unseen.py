@@ -2,6 +2,7 @@
 
     python -m lab.training.unseen OUT --count 40 --seed 1
     python -m lab.training.unseen OUT --count 8 --seed 1 --height 2.3 --tilt 25
+    python -m lab.training.unseen OUT --count 14 --group child wheelchair desk --stature 0.85 1.05
 
 Writes folders `OUT/look/NAME` and `OUT/report/NAME` by turns: what is mended is mended by looking at the first half, the second
 half is measured only. A folder holds depth/, calibration.toml, truth.csv, init.json (the first pose, which `--init auto` leaves
@@ -27,9 +28,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.training import poses, raster, sensors, shapes
+from lab.training import anybody, poses, raster, sensors, shapes
 from lab.training.bodies import BONES, JOINTS, Bodies, Body
-from lab.training.motions import MILLIMETER, RATE, Clips, Motion, clips_of, story, walk
+from lab.training.motions import GROUPS, MILLIMETER, RATE, Clips, Motion, clips_of, of_group, story, walk
 from lab.training.poses import Pose
 from lab.training.rotations import about, unit
 
@@ -61,14 +62,15 @@ class NotToBeHadError(Exception):
 
 @dataclass(frozen=True)
 class Plan:
-    """What a recording shall be: camera's height [m], kind of sensor, from a captured clip or not, floor told or not, and whether
-    the person is "whole", "hidden" behind furniture in part, or "cut" by the image's border."""
+    """What a recording shall be: camera's height [m], kind of sensor, from a captured clip or not, floor told or not, whether the
+    person is "whole", "hidden" behind furniture in part, or "cut" by the image's border, and who it is of `motions.GROUPS`."""
 
     height: float
     kind: str
     clip: bool
     floor: bool
     person: str
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -91,10 +93,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--height", type=float, help="of the camera above the floor [m]; drawn by default")
     parser.add_argument("--tilt", type=float, help="of the camera, downwards [degrees]; drawn by default")
+    parser.add_argument("--group", nargs="+", choices=GROUPS, default=[], help="of persons by turns; adults by default")
+    parser.add_argument("--stature", type=float, nargs=2, help="of children [m]; drawn between these")
     a = parser.parse_args()
     bodies = Bodies(a.data / "bodies", held_out=True)
     # Each half has all heights, sensors and kinds of people, in orders of their own.
-    plans = {half: _plan(np.random.default_rng([a.seed, which]), a.count) for which, half in enumerate(HALVES)}
+    plans = {half: _plan(np.random.default_rng([a.seed, which]), a.count, a.group) for which, half in enumerate(HALVES)}
     clips, still = clips_of(a.data), poses.load(a.data / "mocap", held_out=True)
     for number in range(a.count):
         half = HALVES[number % 2]
@@ -102,7 +106,9 @@ def main() -> None:
         for attempt in range(ATTEMPTS):
             rng = np.random.default_rng([a.seed, number, attempt] if attempt else [a.seed, number])
             try:
-                words = make(place, rng, plan, bodies, clips, still, height=a.height, tilt=a.tilt)
+                words = make(
+                    place, rng, plan, bodies, clips, still, height=a.height, tilt=a.tilt, stature=a.stature
+                )
             except NotToBeHadError as error:
                 print(f"{half}/{place.name}: {error}; another motion is drawn", flush=True)
             else:
@@ -112,7 +118,7 @@ def main() -> None:
             raise SystemExit(f"{place.name}: expected one of {ATTEMPTS} motions to be had as {plan}, found none")
 
 
-def _plan(rng: Rng, count: int) -> list[Plan]:
+def _plan(rng: Rng, count: int, groups: Sequence[str]) -> list[Plan]:
     """What the recordings of a half shall be."""
 
     def order(values: Sequence[T]) -> list[T]:
@@ -124,8 +130,9 @@ def _plan(rng: Rng, count: int) -> list[Plan]:
         order((True, False, False)),
         order((True, True, False)),
     )
-    people = order(("whole", "whole", "hidden", "cut"))
-    return [Plan(*row) for row in zip(heights, kinds, clips, floors, people, strict=False)]
+    people = order(("whole",) if groups else ("whole", "whole", "hidden", "cut"))
+    who = order(groups or ("",))
+    return [Plan(*row) for row in zip(heights, kinds, clips, floors, people, who, strict=False)]
 
 
 def make(
@@ -138,12 +145,20 @@ def make(
     *,
     height: float | None,
     tilt: float | None,
+    stature: Sequence[float] | None = None,
 ) -> str:
     """Write one recording; what it is, in words."""
     index = int(rng.integers(len(bodies)))
     body = bodies[index]
     dress = int(rng.integers(2**31))
-    motion = walk(rng, body, dress, clips) if plan.clip else story(rng, body, dress, still)
+    if plan.group:
+        if plan.group == "child":
+            body = anybody.child(rng, body, *(stature or ()))
+        elif plan.group == "heavy":
+            body = anybody.heavy(rng, body)
+        motion = of_group(rng, plan.group, body, dress, clips, still, clip=plan.clip)
+    else:
+        motion = walk(rng, body, dress, clips) if plan.clip else story(rng, body, dress, still)
     motion, view = _view(rng, motion, plan, bodies.faces, height=height, tilt=tilt)
     away = float(np.linalg.norm(motion.joints[:, 2, :2], axis=1).min())
     room = _room(rng, motion, view, plan)
@@ -156,6 +171,8 @@ def make(
     for frame, surface in enumerate(motion.surfaces):
         depth, labels = empty[0].copy(), empty[1].copy()
         _draw(view, surface, bodies.faces, 1, depth, labels)
+        for points, faces, closed in motion.things[frame] if motion.things else ():
+            _draw(view, points, faces, 2, depth, labels, closed)
         image = np.rint(noise(depth) * MILLIMETER).astype(np.uint16)
         cv2.imwrite(str(out / "depth" / f"{frame / RATE:.6f}.png"), image)
     _write_calibration(out, view, root_from_camera, plan.floor)
@@ -174,6 +191,7 @@ def make(
         "nearest_m": away,
         "floor_known": plan.floor,
         "person": plan.person,
+        "group": plan.group or "adult",
         "stature_m": body.stature,
         "lengths_m": dict(zip(BONES, body.lengths.tolist(), strict=False)),
         "radii_m": _radii(body, dress),
@@ -218,8 +236,7 @@ def _view(
         fraction = _inside(view, joints)
         far = np.linalg.norm(joints[:, 2, :2], axis=1)
         if expected[0] <= fraction < expected[1] and 1.0 <= far.min() and far.max() <= 4.7:
-            surfaces = [(surface - middle) @ turn.T + shift for surface in motion.surfaces]
-            return Motion(surfaces, joints, motion.words, motion.seat), view
+            return motion.moved(turn, shift - turn @ middle), view
     raise NotToBeHadError(f"{motion.words}: expected a view of it from {drawn_height} m, {plan.person}, found none")
 
 
