@@ -7,10 +7,9 @@ use crate::body::Body;
 use crate::math::{Pose, Vec3};
 use crate::visibility::FEW;
 
-/// Factor on the information of a detected joint relative to that of surface points, whose errors are alike; and what is added to
-/// it where the detection doubts the pose, see [`Detected::doubt`].
-const ALIKE_JOINTS: f64 = 3.0;
-const DOUBTED: f64 = 50.0;
+/// By how many times its own a detected joint's information grows where the detection doubts the pose, see [`Detected::doubt`]:
+/// a surface that is not the body's has hundreds of points.
+const DOUBTED: f64 = 15.0;
 /// Distance of a limb's points, root mean square, from which on its surface is not that of the person, meters.
 const UNLIKE_SURFACE: f64 = 0.03;
 
@@ -55,7 +54,7 @@ impl Detected<'_> {
         joints.extend((0..self.detection.joints.len()).filter_map(found).map(|(site, joint)| {
             let limb = body.sites()[site].limb;
             let parent = body.limbs()[limb].parent.as_ref().map_or(limb, |(parent, _)| *parent);
-            let factor = ALIKE_JOINTS + DOUBTED * doubt * off(limb).max(off(parent));
+            let factor = 1.0 + DOUBTED * doubt * off(limb).max(off(parent));
             let DetectedJoint { position, sigma, visible } = *joint;
             MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
         }));
@@ -103,7 +102,7 @@ mod tests {
     #[test]
     fn a_detection_counts_more_where_it_is_farther_than_its_deviations() {
         let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma)[0].information * sigma * sigma;
-        assert!((factor(0.0, 0.03) - ALIKE_JOINTS).abs() < 1e-9 && (factor(0.1, 0.1) - ALIKE_JOINTS).abs() < 1e-9);
-        assert!((factor(0.2, 0.03) - ALIKE_JOINTS - DOUBTED).abs() < 1e-9);
+        assert!((factor(0.0, 0.03) - 1.0).abs() < 1e-9 && (factor(0.1, 0.1) - 1.0).abs() < 1e-9);
+        assert!((factor(0.2, 0.03) - 1.0 - DOUBTED).abs() < 1e-9);
     }
 }

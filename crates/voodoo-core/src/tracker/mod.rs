@@ -297,11 +297,9 @@ impl BodyTracker {
         observer.gather(frame, *origin, &body_box(&model.body, poses, config.body_box_margin), ownership, config);
         let observation = observer.observation(frame, *origin, ownership);
         let setting = Setting { config, observation, previous, time_scale };
-        // In the first second detections verify the track. One with the trunk elsewhere is another person's, or the
-        // track is wrong.
+        // One with the trunk elsewhere is another person's, or the track is wrong.
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
-        let measures = ownership.alone && hypotheses.unlike() && !relocalizer.is_new(frame.stamp);
-        let detected = relocalizer.detected().filter(|detected| measures && here(detected));
+        let detected = relocalizer.detected().filter(here);
         fit.set_detected(detected, &model.body, poses, *origin);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;

@@ -229,9 +229,7 @@ impl Assessor {
 
     /// Updates arms and legs with the evidence of this frame's images and of a detection, if there is one.
     fn weigh_images(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
-        let Matched { correspondences, poses } = matched;
-        // A pose that was fitted to the detection is not confirmed by it.
-        let most = if correspondences.detected.is_empty() { f64::INFINITY } else { 0.0 };
+        let poses = matched.poses;
         let Self { limbs, supports, .. } = self;
         let (model, origin) = (context.model, context.observation.origin());
         for chain in &model.extremities {
@@ -254,7 +252,7 @@ impl Assessor {
                 }
                 let log_odds = detected
                     .map(|detected| detection_log_odds(detected, &model.body, poses, origin, [Some(limb), next]));
-                limbs[limb].observe(evidence, log_odds.unwrap_or_default().min(most), unexpected);
+                limbs[limb].observe(evidence, log_odds.unwrap_or_default(), unexpected);
             }
         }
     }
