@@ -253,7 +253,9 @@ def main() -> None:
             *sizes,
         ]
         print("| " + " | ".join(values) + " |")
-    print("\n| group | recordings | late | found in 1 s, % | first pose, cm | mean, cm | exchanged: first; later | end lost | class |")
+    print(
+        "\n| group | recordings | late | within 1 s, % | first pose, cm | mean, cm | exchanged: first; later | end lost | class |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     print("| " + " | ".join(["all", *cells(results)]) + " |")
     if all(result.about.get("camera_tilt_deg") is not None for result in results):

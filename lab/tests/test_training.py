@@ -120,10 +120,11 @@ def test_a_toy_learns_and_its_weights_come_back(store, tmp_path):
         assert (getattr(a, name) - getattr(b, name)).abs().max() < 0.05, name
 
 
+@pytest.mark.parametrize("group", [[], ["--group", "wheelchair"], ["--group", "clothes"]], ids=" ".join)
 def test_a_recording_that_nothing_was_tuned_on_has_its_joints_inside_what_the_camera_sees(
-    voodoo_data, tmp_path, monkeypatch
+    voodoo_data, tmp_path, monkeypatch, group
 ):
-    command = ["unseen", str(tmp_path), "--data", str(voodoo_data), "--count", "1", "--seed", "3"]
+    command = ["unseen", str(tmp_path), "--data", str(voodoo_data), "--count", "1", "--seed", "3", *group]
     monkeypatch.setattr(sys, "argv", command)
     unseen.main()
     recording = voodoo.open_recording(next((tmp_path / "look").iterdir()))

@@ -44,7 +44,7 @@ def test_the_bundled_recording_starts_at_once(unseen, monkeypatch, capsys):
     assert result.swapped == (False, False) and np.isnan(result.girths).all()
     assert result.lengths.shape == (3, 8) and np.abs(result.lengths).mean() < 0.03
     cells = unseen.cells([result])
-    assert cells[:2] == ["1", "0"] and cells[4:6] == ["0; 0", "0"]
+    assert cells[:3] == ["1", "0", "100"] and cells[5:7] == ["0; 0", "0"]
     monkeypatch.setattr(sys, "argv", ["unseen_people.py", str(BUNDLED), "--jobs", "1", "--init", "given"])
     unseen.main()
     printed = capsys.readouterr().out

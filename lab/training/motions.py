@@ -170,7 +170,9 @@ def of_group(rng: Rng, group: str, body: Body, dress: int, clips: Clips, still: 
         motion = story(rng, body, dress, still, change, "stand" if group in ("clothes", "carrying") else None)
     upright = all((pose.limbs[:, THIGH, 2] < -0.5).all() and pose.pelvis[2, 2] > 0.8 for pose in motion.poses)
     things = [
-        _things(np.random.default_rng(dress), group, what, (points, dict(zip(JOINTS, at, strict=True)), pose, body), upright)
+        _things(
+            np.random.default_rng(dress), group, what, (points, dict(zip(JOINTS, at, strict=True)), pose, body), upright
+        )
         for points, at, pose in zip(motion.surfaces, motion.joints, motion.poses, strict=True)
     ]
     fixed = things[:1] * len(things) if group in ("wheelchair", "desk") else things

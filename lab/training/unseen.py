@@ -106,9 +106,7 @@ def main() -> None:
         for attempt in range(ATTEMPTS):
             rng = np.random.default_rng([a.seed, number, attempt] if attempt else [a.seed, number])
             try:
-                words = make(
-                    place, rng, plan, bodies, clips, still, height=a.height, tilt=a.tilt, stature=a.stature
-                )
+                words = make(place, rng, plan, bodies, clips, still, height=a.height, tilt=a.tilt, stature=a.stature)
             except NotToBeHadError as error:
                 print(f"{half}/{place.name}: {error}; another motion is drawn", flush=True)
             else:
