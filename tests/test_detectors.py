@@ -76,7 +76,7 @@ def test_a_function_that_sees_five_joints_starts_a_tracker_from_nothing(someone)
     for name in FIVE:
         assert np.linalg.norm(found[-1].joints[name] - someone[1].joints[name]) < 0.08, name
     first = asked[0]
-    assert isinstance(first, DetectorImage) and (first.query, first.near) == ("any", None)
+    assert isinstance(first, DetectorImage) and (first.query, first.near) == ("all", None)
     assert first.depth.dtype == np.float32 and first.depth.shape == (120, 160) and first.camera.fx == 120.0
     assert np.array_equal(first.world_from_sensor, WORLD_FROM_SENSOR)
     world = first.to_world(first.points())[first.depth > 4.0]

@@ -57,12 +57,8 @@ impl People {
         {
             return;
         }
-        let query = match (tracked, self.last_detection.replace(frame.stamp)) {
-            (false, _) => DetectionQuery::Any,
-            (true, None) => DetectionQuery::All,
-            (true, Some(_)) => DetectionQuery::New,
-        };
-        self.detect(frame, query);
+        let first = self.last_detection.replace(frame.stamp).is_none();
+        self.detect(frame, if tracked && !first { DetectionQuery::New } else { DetectionQuery::All });
     }
 
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
