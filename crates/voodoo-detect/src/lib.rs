@@ -95,7 +95,8 @@ impl Detector {
         let mut order: Vec<usize> = (0..self.segmentation.candidates().len()).collect();
         let at = |number: usize| &self.segmentation.candidates()[number];
         match query {
-            DetectionQuery::All => order.sort_by_key(|number| self.rejections.last_rejection(at(*number))),
+            DetectionQuery::All => {}
+            DetectionQuery::Any => order.sort_by_key(|number| self.rejections.last_rejection(at(*number))),
             DetectionQuery::New => {
                 order.retain(|number| !self.rejections.is_rejected(at(*number)));
                 order.sort_by_key(|number| self.rejections.last_rejection(at(*number)));

@@ -192,6 +192,7 @@ fn input<'py>(
     let floor = around.ground.map(|Ground { normal, offset }| (normal.to_array(), offset));
     let (query, near) = match query {
         DetectionQuery::All => ("all", None),
+        DetectionQuery::Any => ("any", None),
         DetectionQuery::New => ("new", None),
         DetectionQuery::Near(place) => ("near", Some(Row(place))),
     };

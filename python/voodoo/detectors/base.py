@@ -38,7 +38,7 @@ class DetectorImage:
         camera: its calibration.
         world_from_sensor: (4, 4) pose of its optical frame (x right, y down, z forward).
         floor: unit normal (3,) upwards and height along it [m], in the world frame, if known.
-        query: "all": all persons; "new": one person suffices; "near": the person at `near`. A detector may always
+        query: "all": all persons; "any" or "new": one person suffices; "near": the person at `near`. A detector may always
             return all persons.
         near: (3,) position in the world frame [m] at which a person is expected, with the query "near".
     """
@@ -47,7 +47,7 @@ class DetectorImage:
     camera: Camera
     world_from_sensor: npt.NDArray[np.float64]
     floor: tuple[Sequence[float], float] | None = None
-    query: Literal["all", "new", "near"] = "all"
+    query: Literal["all", "any", "new", "near"] = "all"
     near: npt.NDArray[np.float64] | None = None
 
     def points(self) -> npt.NDArray[np.float64]:

@@ -119,8 +119,8 @@ pub trait Detect: Debug + Send + Sync {
         1.0
     }
 
-    /// Reports that the detection with this index in the last image is not followed. [`DetectionQuery::New`]
-    /// may then evaluate other candidates first.
+    /// Reports that the detection with this index in the last image is not followed. [`DetectionQuery::Any`] and
+    /// [`DetectionQuery::New`] may then evaluate other candidates first.
     fn reject(&mut self, _index: usize) {}
 }
 
@@ -129,7 +129,9 @@ pub trait Detect: Debug + Send + Sync {
 pub enum DetectionQuery {
     /// All persons in the image.
     All,
-    /// Any person: one candidate per image is enough, without candidates that were rejected within the last few images.
+    /// Any person: one candidate per image is enough. Candidates that were not rejected in earlier images come first.
+    Any,
+    /// Any person, without candidates that were rejected within the last few images.
     New,
     /// The person at this position, world frame, meters.
     Near(Vec3),

@@ -58,7 +58,13 @@ impl People {
             return;
         }
         let first = self.last_detection.replace(frame.stamp).is_none();
-        self.detect(frame, if tracked && !first { DetectionQuery::New } else { DetectionQuery::All });
+        // Of several persons who touch, those who are found first show where the others are.
+        let query = match tracked {
+            true if !first => DetectionQuery::New,
+            false if self.everybody => DetectionQuery::Any,
+            _ => DetectionQuery::All,
+        };
+        self.detect(frame, query);
     }
 
     /// Whether somebody may be in what does not move: before every view was searched, and while somebody is lost.
@@ -159,14 +165,16 @@ impl People {
             self.detect(frame, DetectionQuery::All);
             self.tentative.discard(confirmed);
         }
-        let cost = |track: &TentativeTrack| {
+        let cost = |(rank, track): (usize, &TentativeTrack)| {
             let clothes = self.clothes_of_track(frame, track);
             let size = |number: usize| self.persons[number].stature_cost(self.detected(track));
             let cost =
                 |number: &usize| person_cost(&self.persons[*number], size(*number), track, &clothes, frame.stamp);
+            let cost = |number: &usize| cost(number) + FIRST * rank as f64;
             absent.iter().map(cost).collect()
         };
-        let costs: Vec<Vec<f64>> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).map(cost).collect();
+        let costs: Vec<Vec<f64>> =
+            confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).enumerate().map(cost).collect();
         let known: Vec<Option<usize>> =
             assign::assign(&costs, NEW).into_iter().map(|column| column.map(|column| absent[column])).collect();
         let numbers = self.assign_to_newcomers(frame, confirmed, &known);
@@ -316,6 +324,8 @@ fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
     positions.iter().map(|relation| (relation.site, relation.position)).collect()
 }
 
+/// Cost of each track that comes before, nats: of equal ones the first is taken.
+const FIRST: f64 = 1e-6;
 /// Cost of a new person in the assignment, nats.
 pub(super) const NEW: f64 = 4.0;
 /// Distance that a person may move, meters: at once, and in addition per second.

@@ -1,5 +1,7 @@
 //! Tentative tracks: persons that were detected and are not tracked yet.
 
+use std::cmp::Reverse;
+
 use crate::detect::{Detection, PlacedDetection};
 use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, PositionRelation};
@@ -56,9 +58,11 @@ impl TentativeTracks {
     pub(super) fn update(&mut self, mut found: TentativeTrack, static_odds: Option<f64>) {
         found.sum -= static_odds.unwrap_or(DETECTION_COST);
         let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
-        let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track.sum)));
-        found.sum = (before.unwrap_or(0.0) + found.sum).max(0.0);
-        self.tracks.push(found);
+        let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track)));
+        let sum = (before.as_ref().map_or(0.0, |before| before.sum) + found.sum).max(0.0);
+        // Positions that came with the frame are not replaced by what the detector says of the same person.
+        let given = before.filter(|before| before.stamp == found.stamp && !before.positions.is_empty());
+        self.tracks.push(TentativeTrack { sum, ..given.unwrap_or(found) });
     }
 
     /// Returns the tracks that were detected in the frame with this stamp.
@@ -77,9 +81,12 @@ impl TentativeTracks {
         self.tracks.retain(|track| !others.iter().any(|other| same(track, other)));
     }
 
-    /// Removes and returns the tracks that were detected in the frame with this stamp and are confirmed.
+    /// Removes and returns the tracks that were detected in the frame with this stamp and are confirmed: those that came with the
+    /// frame first, then those who fill most of the image.
     pub(super) fn take_confirmed(&mut self, stamp: f64) -> Vec<TentativeTrack> {
         let sure = |track: &mut TentativeTrack| track.stamp == stamp && track.sum >= ENOUGH_ODDS;
-        self.tracks.extract_if(.., sure).collect()
+        let mut confirmed: Vec<TentativeTrack> = self.tracks.extract_if(.., sure).collect();
+        confirmed.sort_by_key(|track| (track.positions.is_empty(), Reverse(track.detection.pixels.len())));
+        confirmed
     }
 }
