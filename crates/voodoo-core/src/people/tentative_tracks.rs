@@ -59,10 +59,13 @@ impl TentativeTracks {
         found.sum -= static_odds.unwrap_or(DETECTION_COST);
         let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
         let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track)));
-        let sum = (before.as_ref().map_or(0.0, |before| before.sum) + found.sum).max(0.0);
-        // Positions that came with the frame are not replaced by what the detector says of the same person.
-        let given = before.filter(|before| before.stamp == found.stamp && !before.positions.is_empty());
-        self.tracks.push(TentativeTrack { sum, ..given.unwrap_or(found) });
+        // Of one frame the first detection counts: one that came with the frame, else the most confident one of an image.
+        if before.as_ref().is_some_and(|before| before.stamp == found.stamp) {
+            self.tracks.extend(before);
+            return;
+        }
+        found.sum = (before.map_or(0.0, |before| before.sum) + found.sum).max(0.0);
+        self.tracks.push(found);
     }
 
     /// Returns the tracks that were detected in the frame with this stamp.
