@@ -204,6 +204,27 @@ def _hung(points: Array, top: float, hem: float, off: float, flare: float) -> sh
     return shapes.sheet(np.concatenate([grid, grid[:, :1]], 1))
 
 
+def wheelchair(rng: Rng, root: Array, pose: Pose, size: float) -> Meshes:
+    """The wheelchair in which somebody sits whose pelvis is at `root`; `size` is relative to an adult's."""
+    ahead, yaw = _ahead(pose)
+    at = root[:2] - 0.05 * ahead
+    return shapes.moved(shapes.wheelchair(rng, float(root[2] - 0.09 * size), size), (at[0], at[1]), yaw)
+
+
+def desk(rng: Rng, root: Array, pose: Pose, size: float, *, sits: bool, near: float) -> Meshes:
+    """The desk or counter before somebody whose body reaches `near` meters ahead of the pelvis at `root`."""
+    height = root[2] + rng.uniform(0.1, 0.3) * size if sits else rng.uniform(0.9, 1.15) * min(size, 1.0)
+    ahead, yaw = _ahead(pose)
+    at = root[:2] + (near + rng.uniform(0.2, 0.55)) * ahead
+    return shapes.moved(shapes.desk(rng, float(height)), (at[0], at[1]), yaw)
+
+
+def _ahead(pose: Pose) -> tuple[Array, float]:
+    """The level direction (2,) that the pelvis faces, and its angle."""
+    yaw = float(np.arctan2(pose.pelvis[1, 0], pose.pelvis[0, 0]))
+    return np.array([np.cos(yaw), np.sin(yaw)]), yaw
+
+
 def held(rng: Rng, joints: Joints, pose: Pose, what: str, body: Body) -> Meshes:
     """What is held by arms that `holding` has placed: on the floor z = 0."""
     left, right = joints["l_hand"], joints["r_hand"]

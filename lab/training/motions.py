@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.training import anybody, poses, shapes
+from lab.training import anybody, poses
 from lab.training.bodies import JOINTS, Body
 from lab.training.poses import THIGH, Pose
 from lab.training.rotations import about, part, shortest, unit
@@ -187,22 +187,16 @@ def _things(
     """What somebody of a group wears, holds, sits in or stands behind."""
     points, joints, pose, body = person
     root, size = joints["humanoid_root"], body.stature / 1.7
-    yaw = float(np.arctan2(pose.pelvis[1, 0], pose.pelvis[0, 0]))
-    ahead = np.array([np.cos(yaw), np.sin(yaw)])
     if group == "clothes":
         worn, things = anybody.garments(rng, points, joints, pose, body, upright=upright)
         return worn + things
     if group == "carrying":
         return anybody.held(rng, joints, pose, what, body)
     if group == "wheelchair":
-        chair = shapes.wheelchair(rng, float(root[2] - 0.09 * size), size)
-        return shapes.moved(chair, (root[0] - 0.05 * ahead[0], root[1] - 0.05 * ahead[1]), yaw)
+        return anybody.wheelchair(rng, root, pose, size)
     if group == "desk":
-        sits = (pose.limbs[:, THIGH, 2] > -0.75).all()
-        height = root[2] + rng.uniform(0.1, 0.3) * size if sits else rng.uniform(0.9, 1.15) * min(size, 1.0)
-        gap = rng.uniform(0.4, 0.75)
-        place = root[:2] + gap * ahead
-        return shapes.moved(shapes.desk(rng, float(height)), (place[0], place[1]), yaw)
+        sits = bool((pose.limbs[:, THIGH, 2] > -0.75).all())
+        return anybody.desk(rng, root, pose, size, sits=sits, near=0.2)
     return []
 
 

@@ -162,16 +162,14 @@ class Scenes:
         yaw = float(np.arctan2(pose.pelvis[1, 0], pose.pelvis[0, 0]))
         ahead = np.array([np.cos(yaw), np.sin(yaw)])
         if "wheelchair" in which and pose.seat:
-            chair = shapes.wheelchair(rng, root[2] - 0.09 * size, size)
-            world.add(shapes.moved(chair, (root[0] - 0.05 * ahead[0], root[1] - 0.05 * ahead[1]), yaw), own)
+            world.add(anybody.wheelchair(rng, root, pose, size), own)
         elif "seated" in which and rng.random() < 0.15:
             edge = root[:2] - rng.uniform(0.2, 0.5) * ahead  # across the side of a bed
             world.add(shapes.moved(shapes.bed(rng, root[2] - 0.09 * size), (edge[0], edge[1]), yaw + np.pi / 2))
         if "desk" in which:
-            height = root[2] + rng.uniform(0.1, 0.3) * size if pose.seat else rng.uniform(0.9, 1.15) * min(size, 1.0)
             belly = points[np.abs(points[:, 2] - root[2] - 0.15) < 0.1, :2]
-            gap = min(float(((belly - root[:2]) @ ahead).max(initial=0.1)), 0.35) + rng.uniform(0.2, 0.55)
-            world.add(shapes.moved(shapes.desk(rng, height), (root[0] + gap * ahead[0], root[1] + gap * ahead[1]), yaw))
+            near = min(float(((belly - root[:2]) @ ahead).max(initial=0.1)), 0.35)
+            world.add(anybody.desk(rng, root, pose, size, sits=pose.seat, near=near))
         if pose.lying and (low := float(points[:, 2].min())) > 0.3:
             axis = unit(joints["head_center"] - root)
             make, turn = (shapes.bed, 0.0) if rng.random() < 0.65 else (shapes.sofa, np.pi / 2)

@@ -2,7 +2,7 @@
 
     python -m lab.training.unseen OUT --count 40 --seed 1
     python -m lab.training.unseen OUT --count 8 --seed 1 --height 2.3 --tilt 25
-    python -m lab.training.unseen OUT --count 14 --group child wheelchair desk --stature 0.85 1.05
+    python -m lab.training.unseen OUT --count 14 --group child wheelchair desk
 
 Writes folders `OUT/look/NAME` and `OUT/report/NAME` by turns: what is mended is mended by looking at the first half, the second
 half is measured only. A folder holds depth/, calibration.toml, truth.csv, init.json (the first pose, which `--init auto` leaves
@@ -96,6 +96,8 @@ def main() -> None:
     parser.add_argument("--group", nargs="+", choices=GROUPS, default=[], help="of persons by turns; adults by default")
     parser.add_argument("--stature", type=float, nargs=2, help="of children [m]; drawn between these")
     a = parser.parse_args()
+    if a.stature and a.group != ["child"]:
+        parser.error(f"--stature: expected --group child alone, found {a.group}")
     bodies = Bodies(a.data / "bodies", held_out=True)
     # Each half has all heights, sensors and kinds of people, in orders of their own.
     plans = {half: _plan(np.random.default_rng([a.seed, which]), a.count, a.group) for which, half in enumerate(HALVES)}
@@ -150,10 +152,8 @@ def make(
     body = bodies[index]
     dress = int(rng.integers(2**31))
     if plan.group:
-        if plan.group == "child":
-            body = anybody.child(rng, body, *(stature or ()))
-        elif plan.group == "heavy":
-            body = anybody.heavy(rng, body)
+        which = frozenset({plan.group})
+        body = anybody.child(rng, body, *stature) if stature else anybody.shaped(rng, body, which)
         motion = of_group(rng, plan.group, body, dress, clips, still, clip=plan.clip)
     else:
         motion = walk(rng, body, dress, clips) if plan.clip else story(rng, body, dress, still)

@@ -170,8 +170,7 @@ impl People {
             let size = |number: usize| self.persons[number].stature_cost(self.detected(track));
             let cost =
                 |number: &usize| person_cost(&self.persons[*number], size(*number), track, &clothes, frame.stamp);
-            let cost = |number: &usize| cost(number) + FIRST * rank as f64;
-            absent.iter().map(cost).collect()
+            absent.iter().map(|number| cost(number) + FIRST * rank as f64).collect()
         };
         let costs: Vec<Vec<f64>> =
             confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).enumerate().map(cost).collect();
