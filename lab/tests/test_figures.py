@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from lab.figures import PAGES, load, rendered, updated
+from lab.figures import PAGES, load, measure, rendered, updated
 from lab.figures.pages import BLOCK, HERE, ROOT, VALUE
 
 MACHINES, RUNS = load()
@@ -57,3 +57,26 @@ def test_commits_and_scripts_of_the_runs_are_there():
     for run in RUNS.values():
         displayed = subprocess.run([*git, "show", "-s", "--format=%as", run.commit], capture_output=True, text=True)
         assert displayed.stdout.strip() == run.date, f"{run.id}: {run.commit} {displayed.stderr}"
+
+
+def test_values_are_read_from_what_the_commands_print(tmp_path):
+    assert set(measure.RUNS) <= set(RUNS)
+    printed = {
+        "disturbed": "mean 2.02 cm; 1 of 64 runs end with a joint lost\n76 limbs off by 10 cm: 97.4 % not called measured\n"
+        "9000 limbs nearer: 4.0 % not called measured\n",
+        "wrong-start-kinect": "| all | 0.1 | 97 % | 99 % | 2 | 192 | 98 % | 3 |\n",
+        "missing-noise": "missing: mean 3.0 mm\nnoise: mean 2.0 mm, 99 % 21 mm, greatest 918 mm, within 5 mm 94.4%, poses in the "
+        "mean 92.5%; from the truth 20.7 mm, 20.8 mm as it is\n",
+    }
+    expected = {
+        "disturbed": {"mean_cm": 2.02, "lost": 1, "runs": 64, "recall": 97.4, "false_alarm": 4.0},
+        "wrong-start-kinect": {"right": 99, "never": 2, "cases": 192},
+        "missing-noise": {
+            "mean_mm": 2.0, "p99_mm": 21, "most_mm": 918, "within_5mm": 94.4, "poses": 92.5, "truth_mm": 20.7
+        },
+    }  # fmt: skip
+    for name, text in printed.items():
+        read = measure.RUNS[name][1]
+        assert read(measure.Output(text, tmp_path)) == expected[name]
+        with pytest.raises(ValueError, match="expected"):
+            read(measure.Output("", tmp_path))
