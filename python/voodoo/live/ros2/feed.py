@@ -10,7 +10,7 @@ from functools import partial
 from voodoo.errors import RecordingError, reading
 from voodoo.export.ros2 import STORE
 from voodoo.live.clock import Clock
-from voodoo.live.source import Arrival, Fault, Faults, faulty
+from voodoo.live.source import Arrival, Faults, faulty
 from voodoo.measurements import FloatArray, Measurement
 from voodoo.model.camera import Camera
 from voodoo.recordings.ros_messages import (
@@ -142,7 +142,7 @@ class RosFeed:
             try:
                 with faulty("calibration unusable"):
                     self._cameras[image] = camera_of(message, image, topic)
-            except Fault:
+            except RecordingError:
                 self._cameras.pop(image, None)
                 raise
 
@@ -187,7 +187,7 @@ class RosFeed:
         camera = self._cameras.get(topic)
         if camera is None and kind in IMAGES:
             expected = f"a calibration on {info_topic(topic)}"
-            raise Fault("calibration missing", f"{where}: expected {expected}, found none")
+            raise RecordingError(f"{where}: expected {expected}, found none", reason="calibration missing")
         with faulty("damaged picture" if kind == COMPRESSED else _cut(message)):
             return measured(sensed, message, where, (topic, stamp), pose, camera, self._units)
 
@@ -196,7 +196,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     """Kind of measurement of a message: "depth", "color", "points" or "scan".
 
     Raises:
-        Fault: an image of neither depth nor color.
+        RecordingError: an image of neither depth nor color.
     """
     if kind in (CLOUD, SCAN):
         return "points" if kind == CLOUD else "scan"
@@ -207,7 +207,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     if message.encoding in COLOR_CHANNELS:
         return "color"
     known = ", ".join((*DEPTH_ENCODINGS, *COLOR_CHANNELS))
-    raise Fault("unknown encoding", f"{topic}: expected one of {known}, found {message.encoding!r}")
+    raise RecordingError(f"{topic}: expected one of {known}, found {message.encoding!r}", reason="unknown encoding")
 
 
 def _cut(message: Message) -> str:
