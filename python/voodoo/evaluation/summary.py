@@ -13,7 +13,7 @@ import numpy as np
 
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
-from voodoo.whole import write_whole
+from voodoo.whole import appearing_whole
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -98,7 +98,8 @@ def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
     """Write `table_text`, which appears when it is complete."""
-    write_whole(path, table_text(header, rows))
+    with appearing_whole(path) as part:
+        part.write_text(table_text(header, rows), encoding="utf-8")
 
 
 def cell(value: object) -> str:
