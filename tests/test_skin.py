@@ -206,10 +206,10 @@ def test_lost_tracking_teaches_nothing():
     skin = SkinTracker()
     pose = Pose((160, 60), (110, 120), (210, 120))
     pose.status = "lost"
-    before = skin.colors
+    before = skin._cue.colors
     skin.learn(picture((160, 60), (110, 120), (210, 120)), CAMERA, POSE, pose)
-    np.testing.assert_array_equal(before, skin.colors)
-    assert not skin.settled
+    np.testing.assert_array_equal(before, skin._cue.colors)
+    assert not skin._cue.learned
 
 
 def test_settings_and_images_are_checked():

@@ -51,10 +51,6 @@ class Row:
     left_out: int = 0
     source: str = ""
 
-    def cells(self) -> list[str]:
-        """The row as text; unknown values are empty."""
-        return [cell(getattr(self, field.name)) for field in fields(self)]
-
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Row:
         """A row from a mapping of fields to text or numbers.
@@ -98,8 +94,8 @@ def write_index(rows: Iterable[Row], pages: Container[str]) -> str:
     lines += ["<body style='font:15px sans-serif;margin:1.5em'><table cellpadding=4>"]
     lines.append(f"<tr>{''.join(f'<th align=left>{name}' for name in shown)}")
     for row in sorted(rows, key=lambda row: row.recording):
-        cells = [escape(words) for words in row.cells()[: len(shown)]]
+        cells = [escape(cell(getattr(row, name))) for name in shown]
         if f"{row.recording}.html" in pages:
             cells[0] = f"<a href='{REPORTS}/{quote(row.recording)}.html'>{cells[0]}</a>"
-        lines.append(f"<tr>{''.join(f'<td>{cell}' for cell in cells)}")
+        lines.append(f"<tr>{''.join(f'<td>{words}' for words in cells)}")
     return "\n".join([*lines, "</table></body></html>", ""])

@@ -108,18 +108,12 @@ class OnnxDetector:
     def _candidates(self, image: DetectorImage) -> list[PersonCandidate]:
         from voodoo._core import person_candidates
 
-        camera, sensor_from_world = image.camera, np.linalg.inv(image.world_from_sensor)
         floor = None
         if image.floor is not None:
             normal, offset = np.asarray(image.floor[0], dtype=np.float64), image.floor[1]
             height = offset - float(normal @ image.world_from_sensor[:3, 3])
-            floor = ((sensor_from_world[:3, :3] @ normal).tolist(), height)
-        return person_candidates(
-            image.depth,
-            camera=camera,
-            floor=floor,
-            most=self._most,
-        )
+            floor = ((np.linalg.inv(image.world_from_sensor)[:3, :3] @ normal).tolist(), height)
+        return person_candidates(image.depth, camera=image.camera, floor=floor, most=self._most)
 
     def _person(
         self,

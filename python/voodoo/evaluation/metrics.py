@@ -11,6 +11,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from voodoo.recordings.keypoint_layouts import LIMBS
+
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
@@ -30,11 +32,7 @@ STILL_M, STILL_S = 0.02, 0.2
 BONE_OFF = 0.25
 """Tolerated relative change of the length of a reference's bone: twice the variation of Kinect's skeleton."""
 
-_BONES = tuple(
-    (f"{side}_{parent}", f"{side}_{joint}")
-    for parent, joint in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
-    for side in ("l", "r")
-)
+_BONES = tuple(limb for limb in LIMBS if not limb[1].endswith("_hip"))
 _STAMP_TOLERANCE_S = 1e-6
 
 

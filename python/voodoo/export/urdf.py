@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from voodoo.export.human_frames import FRAMES, human_frames, turns_of
-from voodoo.export.skeleton import bones, skeleton
-from voodoo.export.track import Track
+from voodoo.export.skeleton import bones, skeleton_of
 from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
 from voodoo.tracker import Tracker
@@ -30,9 +29,9 @@ def urdf(body: Body, person: str) -> str:
         rest[bone.name][:3, :3], rest[bone.name][:3, 3] = bone.rest, bone.head - bone.rest @ bone.head_in_limb
     estimate = Tracker(body, detector=None).reset_pose(rest)
     names, limb_names = estimate.joint_names, estimate.limb_names
-    poses = np.array([estimate.limb_poses])
-    track = Track(np.zeros(1), ("tracking",), np.zeros(1), names, estimate.joint_positions[None], limb_names, poses)
-    frames = human_frames(names, track.joints, skeleton(track, body))
+    joints_at_rest = estimate.joint_positions[None]
+    posed = skeleton_of([body], np.zeros(1), estimate.limb_poses[None], names, joints_at_rest)
+    frames = human_frames(names, joints_at_rest, posed)
     ids, places = [f"{name}_{person}" for name in frames.names], frames.places[0]
     joints: dict[str, list[tuple[str, npt.NDArray[np.float64]]]] = {}
     for joint, _, limb, axes, which, sign in turns_of(limb_names):

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.errors import VoodooError
-from voodoo.live.source import Arrival, Fault, Faults
+from voodoo.errors import RecordingError, VoodooError
+from voodoo.live.source import Arrival, Faults
 from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.model.camera import Camera
 from voodoo.pipeline.frozen import unchanged
@@ -270,7 +270,8 @@ class Assembler:
             before_image = self._images.get(item.sensor)
             self._images[item.sensor] = item.image
             if before_image is not None and unchanged(before_image, item.image):
-                raise Fault("frozen picture", f"{item.sensor}, stamp {item.stamp:.6f}: the same as the image before")
+                where = f"{item.sensor}, stamp {item.stamp:.6f}"
+                raise RecordingError(f"{where}: the same as the image before", reason="frozen picture")
         return item
 
     def _refuse_far(self, item: DepthImage) -> None:
@@ -279,7 +280,5 @@ class Assembler:
         observed = item.image[::_STRIDE, ::_STRIDE]
         meters = observed[np.isfinite(observed) & (observed > 0.0)] * item.meters_per_unit
         if meters.size and float(np.median(meters)) > _FAR_M:
-            raise Fault(
-                "wrong unit",
-                f"{item.sensor}, stamp {item.stamp:.6f}: expected meters, found a median of {np.median(meters):.0f}",
-            )
+            where, found = f"{item.sensor}, stamp {item.stamp:.6f}", f"a median of {np.median(meters):.0f}"
+            raise RecordingError(f"{where}: expected meters, found {found}", reason="wrong unit")

@@ -19,9 +19,9 @@ from voodoo.live.stream import Live
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.model.standing import is_optical
-from voodoo.people import People, PeopleEstimate, Person
+from voodoo.people import People, PeopleEstimate, Person, everybody
 from voodoo.pipeline.floor import EVERY, FloorSight, detections
-from voodoo.pipeline.front_end import ONE, FrontEnd
+from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.starts import FoundStart, Starts
 from voodoo.sensors.settings import LEVEL_FRAMES, FrontEndSettings
 from voodoo.tracker import Tracker
@@ -104,15 +104,12 @@ class Follower:
         start = time.perf_counter()
         if frame.breaks and self._stamp is not None:
             self.restart(back=frame.stamp <= self._stamp, gone=frame.arrived - self._arrived > GONE_S)
-        estimate, tracker = self._front.step(frame), self._front.tracker
-        if isinstance(tracker, People):
-            estimates = {self._numbers + person.id: person.estimate for person in estimate}
-            bodies = {self._numbers + person.id: tracker.body(person.id) for person in estimate}
-            self._most = max(self._most, *estimates, 0)
-        else:
-            estimates, bodies = {ONE: estimate}, {ONE: tracker.body}
+        found = everybody(self._front.step(frame))
+        estimates = {self._numbers + person.id: person.estimate for person in found}
+        bodies = {self._numbers + number: body for number, body in self._front.bodies.items()}
+        self._most = max(self._most, *estimates, 0)
         self._stamp, self._arrived = frame.stamp, frame.arrived
-        front_end = None if isinstance(tracker, People) else self._front
+        front_end = None if isinstance(self._front.tracker, People) else self._front
         return Step(frame, estimates, bodies, time.perf_counter() - start, front_end)
 
     def choose(self, frame: LiveFrame, place: FloatArray) -> str:

@@ -53,19 +53,6 @@ _QUIET_S = 1.0
 """A persisting fault is reported once per second."""
 
 
-class Fault(RecordingError):
-    """A measurement that cannot be used.
-
-    Args:
-        kind: a name in FAULTS.
-        message: what was expected and found, and where.
-    """
-
-    def __init__(self, kind: str, message: str) -> None:
-        """Store kind and message."""
-        super().__init__(message, reason=kind)
-
-
 def kind_of(reason: str, otherwise: str) -> str:
     """The name in FAULTS for the `reason` of an error, or for what recordings leave out."""
     return _OF_REASONS.get(reason, reason if reason in FAULTS else otherwise)
@@ -73,11 +60,11 @@ def kind_of(reason: str, otherwise: str) -> str:
 
 @contextmanager
 def faulty(otherwise: str, where: str = "") -> Iterator[None]:
-    """Errors of recordings raised inside become faults, of the kind `otherwise` if their reason determines none."""
+    """Errors of recordings raised inside get a name in FAULTS as their reason: `otherwise` if it determines none."""
     try:
         yield
     except RecordingError as error:
-        raise Fault(kind_of(error.reason, otherwise), f"{where}{error}") from error
+        raise RecordingError(f"{where}{error}", reason=kind_of(error.reason, otherwise)) from error
 
 
 class Faults:

@@ -75,7 +75,19 @@ class Body:
         Raises:
             BodyError: names the key, what was expected and what was found.
         """
-        return cls(core_body(text, source=source))
+        values = parse_toml(text, source=source, error=BodyError)
+        with valid(source, BodyError, values):
+            spec = _BodySpec.model_validate(values)
+        limbs = []
+        for limb in spec.limbs:
+            shape = limb.shape
+            with naming(f"{source}: limbs.{limb.name}.shape", BodyError):
+                cylinder = TaperedEllipticCylinder(shape.length, shape.a0, shape.b0, shape.a1, shape.b1)
+            joint = None if limb.joint is None else limb.joint.parts()
+            limbs.append((limb.name, limb.parent, cylinder, joint, limb.match_caps))
+        sites = [(site.name, site.limb, site.position) for site in spec.sites]
+        with naming(source, BodyError):
+            return cls(_core.Body(spec.name, limbs, sites))
 
     @classmethod
     def load(cls, path: str | Path) -> Body:
@@ -96,7 +108,19 @@ class Body:
 
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""
-        return body_text(self.core)
+        name, limbs, sites = self.core.parts()
+        lines = [f"name = {_text(name)}"]
+        for limb, parent, shape, joint, match_caps in limbs:
+            sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
+            lines += _table("[limbs]", name=limb, parent=parent, shape=sizes, match_caps=match_caps)
+            if joint is not None:
+                own, *places, semi_axes, weight, limits, motion = joint
+                on_parent, on_limb = ({"position": position, "rotation": rotation} for position, rotation in places)
+                numbers = {"semi_axes": semi_axes, "weight": weight, "motion": motion, "limits": limits}
+                lines += _table("limbs.joint", name=own, on_parent=on_parent, on_limb=on_limb, **numbers)
+        for site, limb, position in sites:
+            lines += _table("[sites]", name=site, limb=limb, position=position)
+        return "\n".join(lines) + "\n"
 
     def __reduce__(self) -> tuple[type[Body], tuple[_core.Body]]:
         """Pickles and copies have the same bits."""
@@ -176,44 +200,6 @@ class _BodySpec(Strict):
     name: str
     limbs: list[_LimbSpec]
     sites: list[_SiteSpec] = Field(default_factory=list)
-
-
-def core_body(text: str, *, source: str) -> _core.Body:
-    """The body of a TOML text.
-
-    Raises:
-        BodyError: names the key, what was expected and what was found.
-    """
-    values = parse_toml(text, source=source, error=BodyError)
-    with valid(source, BodyError, values):
-        spec = _BodySpec.model_validate(values)
-    limbs = []
-    for limb in spec.limbs:
-        shape = limb.shape
-        with naming(f"{source}: limbs.{limb.name}.shape", BodyError):
-            cylinder = TaperedEllipticCylinder(shape.length, shape.a0, shape.b0, shape.a1, shape.b1)
-        joint = None if limb.joint is None else limb.joint.parts()
-        limbs.append((limb.name, limb.parent, cylinder, joint, limb.match_caps))
-    sites = [(site.name, site.limb, site.position) for site in spec.sites]
-    with naming(source, BodyError):
-        return _core.Body(spec.name, limbs, sites)
-
-
-def body_text(body: _core.Body) -> str:
-    """A body as TOML; `core_body` reads it back unchanged up to rounding at 1e-9 m."""
-    name, limbs, sites = body.parts()
-    lines = [f"name = {_text(name)}"]
-    for limb, parent, shape, joint, match_caps in limbs:
-        sizes = {key: getattr(shape, key) for key in ("length", "a0", "b0", "a1", "b1")}
-        lines += _table("[limbs]", name=limb, parent=parent, shape=sizes, match_caps=match_caps)
-        if joint is not None:
-            own, *places, semi_axes, weight, limits, motion = joint
-            on_parent, on_limb = ({"position": position, "rotation": rotation} for position, rotation in places)
-            numbers = {"semi_axes": semi_axes, "weight": weight, "motion": motion, "limits": limits}
-            lines += _table("limbs.joint", name=own, on_parent=on_parent, on_limb=on_limb, **numbers)
-    for site, limb, position in sites:
-        lines += _table("[sites]", name=site, limb=limb, position=position)
-    return "\n".join(lines) + "\n"
 
 
 def _table(heading: str, **entries: object) -> list[str]:

@@ -61,8 +61,7 @@ class EmptyScene:
         beside = place if place.is_dir() else place.parent
         folders = (beside / FOLDER, beside.parent / FOLDER)
         self._folder = next((one for one in folders if one.is_dir()), None) if given is None else Path(given)
-        self._cameras = {sensor: camera for sensor, (camera, _) in cameras.items()}
-        told = {sensor: own for sensor, (_, own) in cameras.items()}
+        self._cameras, told = cameras, {sensor: own for sensor, (_, own) in cameras.items()}
         self._files = {} if self._folder is None else pictures_of(self._folder, told)
         if given is not None and not self._files:
             names = [f"{sensor}: {', '.join(dict.fromkeys(own))}" for sensor, own in told.items()]
@@ -95,7 +94,7 @@ class EmptyScene:
         """
         read = {}
         for sensor, paths in self._files.items():
-            camera, pictures = self._cameras[sensor], []
+            (camera, _), pictures = self._cameras[sensor], []
             for path in paths[:: -(-len(paths) // MOST)]:
                 with leaving_out(left_out, "pictures of the empty scene"):
                     pictures.append(decode_color(read_stored(path, "a picture"), path, (camera.width, camera.height)))

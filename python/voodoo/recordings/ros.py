@@ -16,7 +16,7 @@ from voodoo.recordings.empty_scene import EmptyScene
 from voodoo.recordings.left_out import LeftOut, leaving_out
 from voodoo.recordings.recording import Recording, SensorInfo, mean_rate, number_option, usable
 from voodoo.recordings.ros_bag import Bag
-from voodoo.recordings.ros_messages import Message, Sensed, camera_of, stamp_of
+from voodoo.recordings.ros_messages import Message, camera_of, measured, stamp_of
 from voodoo.recordings.ros_topics import TopicChoice, TopicFinder, TopicSource
 from voodoo.recordings.set_back import SetBack
 from voodoo.recordings.together import in_turn, together
@@ -166,8 +166,8 @@ class RosRecording(Recording):
                 )
             source = self._sources[topic]
             pose = self._tree.lookup(self.root_frame, self._bag.frame_of(topic, message), stamp)
-            sensed = Sensed(topic, stamp, pose, source.camera, (self._units[topic], self._float_unit))
-            return sensed.of(source.kind, message, f"{where}, stamp {stamp:.6f}")
+            units, named = (self._units[topic], self._float_unit), f"{where}, stamp {stamp:.6f}"
+            return measured(source.kind, message, named, (topic, stamp), pose, source.camera, units)
 
     @cached_property
     def _ends(self) -> dict[str, tuple[float, float]]:

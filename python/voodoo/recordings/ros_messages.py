@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, TypeAlias, TypeVar
 
@@ -233,35 +232,39 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
     return {"ranges": message.ranges.astype(np.float32), **numbers}
 
 
-@dataclass(frozen=True, eq=False)
-class Sensed:
-    """What a measurement needs beside its message: topic, stamp [s], root_from_sensor (4, 4), camera of an image, and meters of
-    a unit of 16-bit depth and of float depth."""
+def measured(
+    kind: str,
+    message: Message,
+    source: str,
+    about: tuple[str, float],
+    pose: FloatArray,
+    camera: Camera | None,
+    units: tuple[float, float],
+) -> Measurement:
+    """The measurement in a message.
 
-    topic: str
-    stamp: float
-    pose: FloatArray
-    camera: Camera | None
-    units: tuple[float, float]
+    Args:
+        kind: "scan", "points", "depth" or "color".
+        message: of that kind.
+        source: named in errors.
+        about: its topic and stamp [s].
+        pose: root_from_sensor (4, 4).
+        camera: of an image.
+        units: meters of a unit of 16-bit depth, and of float depth.
 
-    def of(self, kind: str, message: Message, where: str) -> Measurement:
-        """The measurement in a message of the kind "scan", "points", "depth" or "color"; `where` is named in errors.
-
-        Raises:
-            RecordingError: the message cannot be used, or is an image without a camera.
-        """
-        if kind == "scan":
-            return LaserScan(self.topic, self.stamp, **scan_fields(message, where), root_from_sensor=self.pose)
-        if kind == "points":
-            return PointCloud(self.topic, self.stamp, cloud_points(message, where), self.pose)
-        if self.camera is None:
-            raise RecordingError(f"{where}: expected a calibrated camera, found none")
-        if kind == "color":
-            decode = partial(color_image, message, self.camera, where)
-            return ColorImage(self.topic, self.stamp, decode, self.camera, self.pose)
-        image = (compressed_depth_image if hasattr(message, "format") else depth_image)(message, self.camera, where)
-        unit = self.units[image.dtype.kind == "f"]
-        return DepthImage(self.topic, self.stamp, image, unit, self.camera, self.pose)
+    Raises:
+        RecordingError: the message cannot be used, or is an image without a camera.
+    """
+    if kind == "scan":
+        return LaserScan(*about, **scan_fields(message, source), root_from_sensor=pose)
+    if kind == "points":
+        return PointCloud(*about, cloud_points(message, source), pose)
+    if camera is None:
+        raise RecordingError(f"{source}: expected a calibrated camera, found none")
+    if kind == "color":
+        return ColorImage(*about, partial(color_image, message, camera, source), camera, pose)
+    image = (compressed_depth_image if hasattr(message, "format") else depth_image)(message, camera, source)
+    return DepthImage(*about, image, units[image.dtype.kind == "f"], camera, pose)
 
 
 def _rows(message: Message, pixel_bytes: int, source: str) -> ByteImage:

@@ -83,24 +83,15 @@ class StereoPair:
             raise MeasurementError(
                 f"stereo: expected 0 < nearest < farthest and an odd block, found {nearest!r}, {farthest!r}, {block!r}"
             )
-        size = (left.width, left.height)
-        right_from_left = np.linalg.inv(pose)
+        size, right_from_left = (left.width, left.height), np.linalg.inv(pose)
+        lenses = [(camera.matrix, np.array(camera.distortion or (0.0,) * 4)) for camera in (left, right)]
+        turn, shift = right_from_left[:3, :3], right_from_left[:3, 3:]
         turn_left, turn_right, project_left, project_right, _, _, _ = cv2.stereoRectify(
-            left.matrix,
-            np.array(left.distortion or (0.0,) * 4),
-            right.matrix,
-            np.array(right.distortion or (0.0,) * 4),
-            size,
-            right_from_left[:3, :3],
-            right_from_left[:3, 3:],
-            flags=cv2.CALIB_ZERO_DISPARITY,
-            alpha=0,
+            *lenses[0], *lenses[1], size, turn, shift, flags=cv2.CALIB_ZERO_DISPARITY, alpha=0
         )
         self._maps = [
-            cv2.initUndistortRectifyMap(
-                camera.matrix, np.array(camera.distortion or (0.0,) * 4), turn, project, size, cv2.CV_16SC2
-            )
-            for camera, turn, project in ((left, turn_left, project_left), (right, turn_right, project_right))
+            cv2.initUndistortRectifyMap(*lens, turn, project, size, cv2.CV_16SC2)
+            for lens, turn, project in zip(lenses, (turn_left, turn_right), (project_left, project_right), strict=True)
         ]
         p = np.asarray(project_left)
         self.camera = Camera(left.width, left.height, float(p[0, 0]), float(p[1, 1]), float(p[0, 2]), float(p[1, 2]))

@@ -9,7 +9,6 @@ from contextlib import ExitStack
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
 from typing import Any, TypeAlias
 
 import cv2
@@ -157,9 +156,7 @@ class PictureWriter:
         """Enter the context; files are opened with the first image."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Close the video and, without an error, check that it can be read."""
         if self._film is not None:
             try:

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -111,9 +110,7 @@ class Viewer:
         """Enter the context."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Finish the file; after an error or failure, remove it."""
         if error is None and self.failure is None:
             try:
@@ -124,7 +121,7 @@ class Viewer:
         self._stream.disconnect()
         with suppress(OSError, RuntimeError):
             raised = error or RuntimeError()
-            self._ends.__exit__(type(raised), raised, trace)
+            self._ends.__exit__(type(raised), raised, raised.__traceback__)
 
     def close(self) -> None:
         """Flush buffered data, and complete the file.

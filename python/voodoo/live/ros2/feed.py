@@ -10,17 +10,17 @@ from functools import partial
 from voodoo.errors import RecordingError, reading
 from voodoo.export.ros2 import STORE
 from voodoo.live.clock import Clock
-from voodoo.live.source import Arrival, Fault, Faults, faulty
+from voodoo.live.source import Arrival, Faults, faulty
 from voodoo.measurements import FloatArray, Measurement
 from voodoo.model.camera import Camera
 from voodoo.recordings.ros_messages import (
     COLOR_CHANNELS,
     DEPTH_ENCODINGS,
     Message,
-    Sensed,
     camera_of,
     frame_of,
     is_depth,
+    measured,
     stamp_of,
 )
 from voodoo.recordings.ros_topics import CAMERA_INFO, CLOUD, COMPRESSED, IMAGES, MEASURED, SCAN, info_topic
@@ -142,17 +142,17 @@ class RosFeed:
             try:
                 with faulty("calibration unusable"):
                     self._cameras[image] = camera_of(message, image, topic)
-            except Fault:
+            except RecordingError:
                 self._cameras.pop(image, None)
                 raise
 
     def _arrival(self, topic: str, kind: str, message: Message) -> Arrival:
         stamp = stamp_of(message, topic)
-        measured = _measured_as(topic, kind, message)
+        sensed = _measured_as(topic, kind, message)
         drives, frame = topic == self._topics[0], frame_of(message)
-        measure = partial(self._measure, topic, kind, measured, message, stamp, frame)
+        measure = partial(self._measure, topic, kind, sensed, message, stamp, frame)
         ready = partial(self._is_ready, frame, stamp)
-        return Arrival(topic, measured, stamp, measure, drives, ready=ready, patience=_TF_PATIENCE_S)
+        return Arrival(topic, sensed, stamp, measure, drives, ready=ready, patience=_TF_PATIENCE_S)
 
     def _is_ready(self, frame: str, stamp: float) -> bool:
         if self._pose is not None or self.root_frame == frame:
@@ -181,22 +181,22 @@ class RosFeed:
         with faulty("transform missing", f"{topic}, stamp {stamp:.6f}: "):
             return self.root_from(frame, stamp)
 
-    def _measure(self, topic: str, kind: str, measured: str, message: Message, stamp: float, frame: str) -> Measurement:
+    def _measure(self, topic: str, kind: str, sensed: str, message: Message, stamp: float, frame: str) -> Measurement:
         where = f"{topic}, stamp {stamp:.6f}"
         pose = self._root_from_sensor(topic, frame, stamp)
         camera = self._cameras.get(topic)
         if camera is None and kind in IMAGES:
             expected = f"a calibration on {info_topic(topic)}"
-            raise Fault("calibration missing", f"{where}: expected {expected}, found none")
+            raise RecordingError(f"{where}: expected {expected}, found none", reason="calibration missing")
         with faulty("damaged picture" if kind == COMPRESSED else _cut(message)):
-            return Sensed(topic, stamp, pose, camera, self._units).of(measured, message, where)
+            return measured(sensed, message, where, (topic, stamp), pose, camera, self._units)
 
 
 def _measured_as(topic: str, kind: str, message: Message) -> str:
     """Kind of measurement of a message: "depth", "color", "points" or "scan".
 
     Raises:
-        Fault: an image of neither depth nor color.
+        RecordingError: an image of neither depth nor color.
     """
     if kind in (CLOUD, SCAN):
         return "points" if kind == CLOUD else "scan"
@@ -207,7 +207,7 @@ def _measured_as(topic: str, kind: str, message: Message) -> str:
     if message.encoding in COLOR_CHANNELS:
         return "color"
     known = ", ".join((*DEPTH_ENCODINGS, *COLOR_CHANNELS))
-    raise Fault("unknown encoding", f"{topic}: expected one of {known}, found {message.encoding!r}")
+    raise RecordingError(f"{topic}: expected one of {known}, found {message.encoding!r}", reason="unknown encoding")
 
 
 def _cut(message: Message) -> str:

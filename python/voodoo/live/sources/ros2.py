@@ -13,7 +13,6 @@ from voodoo.live.clock import Clock, HostClock
 from voodoo.live.ros2.dds import Node, Offer, Subscription
 from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.live.source import Arrival, Faults, Source, SourceGone
-from voodoo.measurements import FloatArray
 from voodoo.recordings.camera_files import read_calibration
 from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGES, MEASURED, info_topic
 
@@ -22,44 +21,27 @@ _DEPTH, _TF_DEPTH = 30, 100
 """Queue length for a busy machine. Messages dropped from it are counted; those lost before it are not."""
 
 
-class Ros2Source(Source):
+class Ros2Source(RosFeed, Source):
     """Depth or color images (raw, compressed), clouds and scans of ROS 2 topics, with CameraInfo and transforms.
 
     Args:
         topics: topics of the measurements; the first one defines the frames.
-        root_frame: see RosFeed.
         calibration: a calibration.toml with the pose of the first topic's camera, instead of transforms.
-        meters_per_unit: see RosFeed.
-        tf_max_age: largest age of a changing transform [s].
+        **how: root_frame, meters_per_unit and tf_max_age, see RosFeed.
 
     Raises:
         VoodooError: no topics.
     """
 
-    def __init__(
-        self,
-        topics: Sequence[str],
-        *,
-        root_frame: str | None = None,
-        calibration: Path | None = None,
-        meters_per_unit: float | None = None,
-        tf_max_age: float = 0.5,
-    ) -> None:
+    def __init__(self, topics: Sequence[str], *, calibration: Path | None = None, **how: Any) -> None:  # noqa: ANN401
         """Nothing is subscribed yet."""
         if not topics:
             raise VoodooError("ros2: expected ros2:TOPIC[,TOPIC...], found no topic")
-        self._topics = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
-        self.name = f"ros2:{self._topics[0]}"
         place = None if calibration is None else read_calibration(calibration)
-        self._feed = RosFeed(
-            self._topics,
-            Faults(),
-            HostClock(),
-            root_frame=root_frame,
-            meters_per_unit=meters_per_unit,
-            tf_max_age=tf_max_age,
-            sensor_pose=None if place is None else (place.root_frame, place.depth.world_from_sensor),
-        )
+        pose = None if place is None else (place.root_frame, place.depth.world_from_sensor)
+        named = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
+        super().__init__(named, Faults(), HostClock(), sensor_pose=pose, **how)
+        self.name = f"ros2:{named[0]}"
         self._subscriptions: dict[str, Subscription] = {}
         self._gone = False
 
@@ -67,19 +49,9 @@ class Ros2Source(Source):
     def _node(self) -> Node:
         return Node()
 
-    @property
-    def root_frame(self) -> str:
-        """See Source."""
-        return self._feed.root_frame
-
-    @property
-    def unusable(self) -> int:  # type: ignore[override]
-        """See Source."""
-        return self._feed.unusable
-
     def open(self, clock: Clock, faults: Faults) -> None:
         """See Source."""
-        self._feed.faults, self._feed.clock = faults, clock
+        self.faults, self.clock = faults, clock
         self._subscribe("/tf", Offer(TF, reliable=True, latched=False), _TF_DEPTH)
         self._subscribe("/tf_static", Offer(TF, reliable=True, latched=True), _TF_DEPTH)
         until = time.monotonic() + _DISCOVERY_S
@@ -95,7 +67,7 @@ class Ros2Source(Source):
     def _discover(self) -> bool:
         """Subscribe to the topics offered so far; returns whether all are."""
         offers = self._node.offers()
-        self._feed.expects_transforms = bool({"/tf", "/tf_static"} & offers.keys())
+        self.expects_transforms = bool({"/tf", "/tf_static"} & offers.keys())
         for topic in self._topics:
             offer = offers.get(topic)
             if offer is None or topic in self._subscriptions:
@@ -122,11 +94,10 @@ class Ros2Source(Source):
         # Transforms and calibrations first, because images wait for them.
         for subscription in sorted(self._subscriptions.values(), key=lambda one: one.kind in MEASURED):
             for raw in subscription.take():
-                arrivals += self._feed.take(subscription.topic, subscription.kind, raw)
+                arrivals += self.take(subscription.topic, subscription.kind, raw)
         lost = self._subscriptions[self._topics[0]].lost()
         if lost:
-            now = self._feed.clock.now()
-            self._feed.faults.add("lost on the way", f"{self._topics[0]}: messages did not arrive", now, lost)
+            self.faults.add("lost on the way", f"{self._topics[0]}: messages did not arrive", self.clock.now(), lost)
         if not arrivals:
             self._check_states()
         return arrivals
@@ -136,18 +107,14 @@ class Ros2Source(Source):
         self._discover()
         gone = self._subscriptions[self._topics[0]].publishers == 0
         if gone and not self._gone:
-            self._feed.faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", self._feed.clock.now())
+            self.faults.add("gone", f"{self._topics[0]}: nobody publishes it any more", self.clock.now())
         elif self._gone and not gone:
-            self._feed.faults.log(f"{self.name}: it is there again")
+            self.faults.log(f"{self.name}: it is there again")
         self._gone = gone
-
-    def root_from(self, frame: str, stamp: float) -> FloatArray | None:
-        """See Source."""
-        return self._feed.root_from(frame, stamp)
 
     def about(self) -> dict[str, Any]:
         """See Source."""
-        return {"name": self.name, "kind": "ros2", "topics": self._topics, "root_frame": self.root_frame}
+        return {"name": self.name, "kind": "ros2", "topics": list(self._topics), "root_frame": self.root_frame}
 
 
 def listing(node: Node | None = None, *, seconds: float = _LISTEN_S) -> list[str]:

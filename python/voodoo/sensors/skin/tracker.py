@@ -50,16 +50,6 @@ class SkinTracker:
         return twin
 
     @property
-    def settled(self) -> bool:
-        """True if the colors were learned from this person."""
-        return self._cue.learned > 0
-
-    @property
-    def colors(self) -> npt.NDArray[np.float32]:
-        """Histogram of skin colors (64, 64), by Cr and Cb."""
-        return self._cue.colors
-
-    @property
     def mask(self) -> Mask:
         """(H, W): skin near the body in the last image; empty before the first image."""
         return self._cue.mask
@@ -160,7 +150,7 @@ class SkinTracker:
             return
         self._images += 1
         # The light changes slowly.
-        if self.settled and self._images % self.settings.learn_every:
+        if self._cue.learned and self._images % self.settings.learn_every:
             return
         names, positions = estimate.joint_names, np.ascontiguousarray(estimate.joint_positions)
         sites = np.array([positions[names.index(site)] if site in names else _NOWHERE for site in self._sites])
