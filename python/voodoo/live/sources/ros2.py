@@ -26,21 +26,28 @@ class Ros2Source(RosFeed, Source):
 
     Args:
         topics: topics of the measurements; the first one defines the frames.
+        root_frame, meters_per_unit: see RosFeed.
         calibration: a calibration.toml with the pose of the first topic's camera, instead of transforms.
-        **how: root_frame, meters_per_unit and tf_max_age, see RosFeed.
+        tf_max_age: largest age of a changing transform [s].
 
     Raises:
         VoodooError: no topics.
     """
 
-    def __init__(self, topics: Sequence[str], *, calibration: Path | None = None, **how: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self, topics: Sequence[str], *, root_frame: str | None = None, calibration: Path | None = None,
+        meters_per_unit: float | None = None, tf_max_age: float = 0.5,
+    ) -> None:  # fmt: skip
         """Nothing is subscribed yet."""
         if not topics:
             raise VoodooError("ros2: expected ros2:TOPIC[,TOPIC...], found no topic")
         place = None if calibration is None else read_calibration(calibration)
         pose = None if place is None else (place.root_frame, place.depth.world_from_sensor)
         named = [topic if topic.startswith("/") else f"/{topic}" for topic in topics]
-        super().__init__(named, Faults(), HostClock(), sensor_pose=pose, **how)
+        super().__init__(
+            named, Faults(), HostClock(), root_frame=root_frame, meters_per_unit=meters_per_unit, tf_max_age=tf_max_age,
+            sensor_pose=pose,
+        )  # fmt: skip
         self.name = f"ros2:{named[0]}"
         self._subscriptions: dict[str, Subscription] = {}
         self._gone = False
