@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3, smooth_step, widest};
+use crate::math::{Points, Pose, Vec3, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
@@ -65,10 +65,7 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
     let mut search = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64, sine: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let search = ContourSearch { start, along, rim, thickness, reach };
-        let edge = widest(
-            #[inline(always)]
-            || search.edge(view),
-        );
+        let edge = vectorized!(search.edge(view));
         if let Some(PixelEdge { at, place, weight }) = edge {
             let weight = weight * smooth_step((sine - ASLANT) / ASLANT_FADE);
             found(DepthEdge { side, rim, foot, reach: at, place: view.working_from_camera * place, weight });

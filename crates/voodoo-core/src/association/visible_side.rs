@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use crate::association::correspondence::LimbMatches;
-use crate::math::{Pose, Vec3, widest};
+use crate::math::{Pose, Vec3, vectorized};
 use crate::observation::candidates::Candidates;
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
 
@@ -26,10 +26,7 @@ pub(crate) fn match_visible_side(
         let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
         for first in (start..stop).step_by(MATCHES) {
             let last = stop.min(first + MATCHES);
-            let away = widest(
-                #[inline(always)]
-                || facing_away(matches, first..last, camera.as_vec3().to_array()),
-            );
+            let away = vectorized!(facing_away(matches, first..last, camera.as_vec3().to_array()));
             if away.iter().fold(0, |any, away| any | u8::from(*away)) == 0 {
                 continue;
             }

@@ -15,6 +15,7 @@ pub use geometry::*;
 pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
 pub use simd::{LANES, has_avx512, load, store, widest};
+pub(crate) use simd::{vectorized, widest_fused};
 pub(crate) use weighted_points::WeightedPoints;
 
 /// The cubic that rises smoothly from 0 at `at = 0` to 1 at `at = 1`, and is constant outside.

@@ -1,6 +1,6 @@
 //! Groups neighboring candidates into clusters, so that a test can be made once for a whole cluster.
 
-use crate::math::{LANES, Points, widest};
+use crate::math::{LANES, Points, vectorized};
 
 /// Points per cluster: a whole number of SIMD lanes.
 pub(crate) const CLUSTER: usize = 32;
@@ -59,10 +59,7 @@ impl Clusters {
         if points.is_empty() {
             return;
         }
-        widest(
-            #[inline(always)]
-            || self.find_cells(points),
-        );
+        vectorized!(self.find_cells(points));
         self.next.clear();
         self.next.resize(CELLS * CELLS * CELLS, 0);
         for cell in &self.cells {
@@ -85,10 +82,7 @@ impl Clusters {
             to.extend(self.order.iter().map(|index| from[*index as usize]));
             to.extend(std::iter::repeat_n(from[last as usize], padding));
         }
-        widest(
-            #[inline(always)]
-            || self.find_bounds(),
-        );
+        vectorized!(self.find_bounds());
     }
 
     /// The cell of every point. Cells are numbered layer by layer, and back and forth in each layer, so that consecutive cells

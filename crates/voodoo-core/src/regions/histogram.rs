@@ -1,6 +1,6 @@
 //! Smoothed color histograms: 16 x 16 x 16 bins for color images, 256 for grayscale.
 
-use crate::math::widest;
+use crate::math::vectorized;
 use crate::observation::picture::ColorPixels;
 
 /// Leading bits of each channel that select its bin.
@@ -105,15 +105,12 @@ impl ColorHistogram {
             let (keep, new) = (1.0 - rate, rate / self.counted);
             let uniform = UNIFORM / self.frequency.len() as f32;
             let Self { frequency, log, counts, .. } = self;
-            widest(
-                #[inline(always)]
-                || {
-                    for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
-                        *frequency = keep * *frequency + new * count;
-                        *log = ln((1.0 - UNIFORM) * *frequency + uniform);
-                    }
-                },
-            );
+            vectorized!({
+                for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
+                    *frequency = keep * *frequency + new * count;
+                    *log = ln((1.0 - UNIFORM) * *frequency + uniform);
+                }
+            });
             self.known = true;
         }
         if self.counted > 0.0 {
@@ -135,20 +132,17 @@ fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
     room.clear();
     room.extend_from_slice(values);
     let length = stride * row;
-    widest(
-        #[inline(always)]
-        || {
-            for (values, before) in values.chunks_exact_mut(length).zip(room.chunks_exact(length)) {
-                // Flow between each value and the next one at the stride.
-                for ((value, own), next) in values.iter_mut().zip(before).zip(&before[stride..]) {
-                    *value += SPREAD * (next - own);
-                }
-                for ((value, own), last) in values[stride..].iter_mut().zip(&before[stride..]).zip(before) {
-                    *value += SPREAD * (last - own);
-                }
+    vectorized!({
+        for (values, before) in values.chunks_exact_mut(length).zip(room.chunks_exact(length)) {
+            // Flow between each value and the next one at the stride.
+            for ((value, own), next) in values.iter_mut().zip(before).zip(&before[stride..]) {
+                *value += SPREAD * (next - own);
             }
-        },
-    );
+            for ((value, own), last) in values[stride..].iter_mut().zip(&before[stride..]).zip(before) {
+                *value += SPREAD * (last - own);
+            }
+        }
+    });
 }
 
 /// Natural logarithm of a positive normal number, to 2e-5; vectorizes.

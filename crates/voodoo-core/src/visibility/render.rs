@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{LANES, Pose, Vec3, is_rigid, widest};
+use crate::math::{LANES, Pose, Vec3, is_rigid, vectorized};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
@@ -136,14 +136,11 @@ impl Rendering {
         let raycasters = &*raycasters;
         let size = view.camera.width() * ROWS_TOGETHER;
         let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
-            widest(
-                #[inline(always)]
-                || {
-                    for (index, raycaster) in (0..).zip(raycasters) {
-                        raycaster.fill(view, band * ROWS_TOGETHER, index, depth, limb);
-                    }
-                },
-            );
+            vectorized!({
+                for (index, raycaster) in (0..).zip(raycasters) {
+                    raycaster.fill(view, band * ROWS_TOGETHER, index, depth, limb);
+                }
+            });
         };
         match pool {
             Some(pool) => pool.install(|| {
