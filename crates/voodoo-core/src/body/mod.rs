@@ -143,6 +143,12 @@ impl Body {
         first != second && !self.adjacent(first, second) && (own != other || own.is_none())
     }
 
+    /// Every joint with its limb and that limb's parent, parents first: limb, parent, joint.
+    pub(crate) fn joints(&self) -> impl DoubleEndedIterator<Item = (usize, usize, &Joint)> {
+        let limbs = self.limbs.iter().enumerate();
+        limbs.filter_map(|(limb, part)| part.parent.as_ref().map(|(parent, joint)| (limb, *parent, joint)))
+    }
+
     /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.limbs.len()).filter(move |other| self.parent(*other) == Some(limb))

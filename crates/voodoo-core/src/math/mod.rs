@@ -14,6 +14,8 @@ pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
 pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
+#[cfg(all(test, target_arch = "x86_64"))]
+pub(crate) use simd::compiled;
 pub use simd::{LANES, has_avx512, load, store, widest};
 pub(crate) use simd::{vectorized, widest_fused};
 pub(crate) use weighted_points::WeightedPoints;

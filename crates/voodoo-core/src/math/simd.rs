@@ -89,4 +89,6 @@ macro_rules! vectorized {
         )
     };
 }
+#[cfg(all(test, target_arch = "x86_64"))]
+pub(crate) use compiled;
 pub(crate) use vectorized;

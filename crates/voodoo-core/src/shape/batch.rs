@@ -190,9 +190,11 @@ impl Batch<'_> {
     }
 }
 
-/// [`closest`], compiled for the widest registers of this processor; every aarch64 processor has fused multiply-add.
+/// Whether the target that the crate is compiled for has fused multiply-add: every aarch64 processor does.
+const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
+
+/// [`closest`], compiled for the widest registers of this processor.
 fn run<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
-    const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
     widest_fused(
         out,
         #[inline(always)]
@@ -205,6 +207,8 @@ fn run<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Bloc
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(target_arch = "x86_64")]
+    use crate::math::{compiled, has_avx512};
 
     /// Points on a grid around the side, from 2 cm inside to 4 cm outside.
     fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block<BLOCK>> {
@@ -254,7 +258,7 @@ mod tests {
         let (mut fast, mut plain) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
             run::<BLOCK, FEW>(&constants, &queries, &mut fast);
-            closest_baseline::<BLOCK, FEW>(&constants, &queries, &mut plain);
+            closest::<FMA, BLOCK, FEW>(&constants, &queries, &mut plain);
             for i in (0..BLOCK).filter(|&i| fast.unsettled[i] | plain.unsettled[i] == 0) {
                 assert!((fast.points.x[i] - plain.points.x[i]).abs() < 1e-6);
                 assert!((fast.points.y[i] - plain.points.y[i]).abs() < 1e-6);
@@ -276,11 +280,12 @@ mod tests {
         let constants = Constants::new(&shape, &Pose::IDENTITY);
         let (mut wider, mut wide) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
-            // SAFETY: the processor was just found to have AVX-512 (hence AVX2) and FMA.
-            unsafe {
-                closest_avx512::<BLOCK, FEW>(&constants, &queries, &mut wider);
-                closest_avx2::<BLOCK, FEW>(&constants, &queries, &mut wide);
-            }
+            // The processor was just found to have AVX-512 (hence AVX2) and FMA.
+            compiled!(
+                "avx512f,avx512bw,avx512dq,avx512vl,fma",
+                closest::<true, BLOCK, FEW>(&constants, &queries, &mut wider)
+            );
+            compiled!("avx2,fma", closest::<true, BLOCK, FEW>(&constants, &queries, &mut wide));
             let bits = |found: &BlockResult<BLOCK>| {
                 [
                     &found.points.x,

@@ -61,14 +61,13 @@ impl TreeSolver {
         }
         self.mixed.clear();
         self.mixed.resize(poses.len(), Matrix6::zeros());
-        for (child, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &limb.parent else { continue };
+        for (child, parent, joint) in body.joints() {
             for end in bands(joint) {
                 let on_child = poses[child] * (joint.limb_from_joint * end);
-                let on_parent = poses[*parent] * (joint.parent_from_joint * end);
-                self.add_band([child, *parent], strength, on_child, on_parent);
+                let on_parent = poses[parent] * (joint.parent_from_joint * end);
+                self.add_band([child, parent], strength, on_child, on_parent);
             }
-            self.add_turn([child, *parent], normal);
+            self.add_turn([child, parent], normal);
         }
     }
 

@@ -73,8 +73,7 @@ impl WarmStart {
     pub(crate) fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, config, .. } = problem;
         if problem.step == 0 {
-            self.start.clear();
-            self.start.extend_from_slice(poses);
+            poses.clone_into(&mut self.start);
             close(body, &mut self.start);
             self.closed.clone_from(&self.start);
         }
@@ -140,11 +139,9 @@ impl WarmStart {
 
 /// Closes the joints from the root outwards, keeping orientations.
 fn close(body: &Body, poses: &mut [Pose]) {
-    for (index, limb) in body.limbs().iter().enumerate() {
-        if let Some((parent, joint)) = &limb.parent {
-            let turn = joint_turn(joint, &poses[*parent], &poses[index]);
-            poses[index] = place(joint, &poses[*parent], turn);
-        }
+    for (limb, parent, joint) in body.joints() {
+        let turn = joint_turn(joint, &poses[parent], &poses[limb]);
+        poses[limb] = place(joint, &poses[parent], turn);
     }
 }
 

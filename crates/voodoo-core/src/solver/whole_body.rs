@@ -157,10 +157,8 @@ impl WholeBody {
         for pair in problem.correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
             self.sites[pair.limb] += pair.weight;
         }
-        for (limb, part) in problem.body.limbs().iter().enumerate().rev() {
-            if let Some((parent, _)) = &part.parent {
-                self.sites[*parent] += self.sites[limb];
-            }
+        for (limb, parent, _) in problem.body.joints().rev() {
+            self.sites[parent] += self.sites[limb];
         }
     }
 

@@ -81,8 +81,7 @@ impl EdgeFilter {
         still.clear();
         for limb in body.limbs() {
             let sigma = limb.parent.as_ref().map_or(MAX_SIGMA, |(_, joint)| USUAL_MOTION * joint.motion * time_scale);
-            let count = limb.parent.as_ref().map_or(6, |(_, joint)| freedoms(joint));
-            still.extend((0..count).map(|_| 1.0 / (sigma * sigma)));
+            still.extend((0..freedoms(limb)).map(|_| 1.0 / (sigma * sigma)));
         }
         let n = still.len();
         if known.len() != n * n {
