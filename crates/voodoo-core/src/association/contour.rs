@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3, smooth_step, vectorized};
+use crate::math::{Points, Pose, Vec3, reset, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
@@ -230,8 +230,7 @@ impl Contours {
     fn find_distances(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
         for distances in [&mut self.own, &mut self.others] {
-            distances.clear();
-            distances.resize(count, f32::INFINITY);
+            reset(distances, count, f32::INFINITY);
         }
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             limb.shape.approximate_distances(pose, &self.places, &mut self.distance);

@@ -5,7 +5,7 @@
 //! nearest of some point are evaluated point by point.
 
 use crate::body::{Body, Limb};
-use crate::math::{LANES, Pose, Vec3, vectorized};
+use crate::math::{LANES, Pose, Vec3, refill, vectorized};
 use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
 
 /// The limb of a point that lies in no box.
@@ -46,8 +46,7 @@ impl NearestLimb {
                 open
             }
         }));
-        self.groups.clear();
-        self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
+        refill(&mut self.groups, self.limbs.chunks(LANES).map(Group::new));
     }
 
     /// Writes the nearest limb of every point, or [`NONE`], to `nearest`.

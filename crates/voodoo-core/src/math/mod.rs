@@ -27,6 +27,19 @@ pub(crate) fn smooth_step(at: f64) -> f64 {
     at * at * (3.0 - 2.0 * at)
 }
 
+/// Makes `values` a number of copies of a value. Their memory is kept.
+pub fn reset<T: Clone>(values: &mut Vec<T>, len: usize, value: T) {
+    values.clear();
+    values.resize(len, value);
+}
+
+/// Replaces `values` by others. Their memory is kept.
+#[inline(always)]
+pub fn refill<T>(values: &mut Vec<T>, others: impl IntoIterator<Item = T>) {
+    values.clear();
+    values.extend(others);
+}
+
 /// The dot product of two rows.
 pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()

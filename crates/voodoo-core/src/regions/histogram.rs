@@ -1,6 +1,6 @@
 //! Smoothed color histograms: 16 x 16 x 16 bins for color images, 256 for grayscale.
 
-use crate::math::vectorized;
+use crate::math::{reset, vectorized};
 use crate::observation::picture::ColorPixels;
 
 /// Leading bits of each channel that select its bin.
@@ -78,11 +78,9 @@ impl ColorHistogram {
     pub(super) fn clear(&mut self, kind: Kind) {
         let bins = kind.bins();
         for values in [&mut self.frequency, &mut self.counts] {
-            values.clear();
-            values.resize(bins, 0.0);
+            reset(values, bins, 0.0);
         }
-        self.log.clear();
-        self.log.resize(bins, (1.0 / bins as f32).ln());
+        reset(&mut self.log, bins, (1.0 / bins as f32).ln());
         (self.counted, self.known) = (0.0, false);
     }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::body::Body;
 use crate::camera::Camera;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, reset};
 
 /// Corners of an end's silhouette: cosines and sines.
 const CORNERS: [[f64; 2]; 8] = {
@@ -102,10 +102,8 @@ impl LimbLabels {
             }
         } else {
             (self.bits, self.columns, self.rows) = (bits, columns, rows);
-            self.limb.clear();
-            self.limb.resize(columns * rows, NOTHING);
-            self.depth.clear();
-            self.depth.resize(columns * rows, f32::INFINITY);
+            reset(&mut self.limb, columns * rows, NOTHING);
+            reset(&mut self.depth, columns * rows, f32::INFINITY);
         }
         self.drawn = [0..0, 0..0];
     }
@@ -157,8 +155,7 @@ impl LimbLabels {
         if first >= end {
             return;
         }
-        sides.clear();
-        sides.resize(end - first, [f32::INFINITY, f32::NEG_INFINITY]);
+        reset(sides, end - first, [f32::INFINITY, f32::NEG_INFINITY]);
         for (index, from) in hull.iter().enumerate() {
             let to = &hull[(index + 1) % hull.len()];
             let ([x0, y0], [x1, y1]) = if from[1] <= to[1] { (from, to) } else { (to, from) };

@@ -20,7 +20,7 @@ use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{Pose, Quat, Vec3, rotation_vector, shifted};
+use crate::math::{Pose, Quat, Vec3, refill, reset, rotation_vector, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
@@ -205,11 +205,9 @@ impl ColorRegions {
         found: &mut Correspondences,
     ) {
         let search = SEARCHES[step.min(STEPS - 1)];
-        self.evidence.clear();
-        self.evidence.resize(posed.poses.len(), Evidence::default());
+        reset(&mut self.evidence, posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, search, Some(&is_requested), &mut found.regions);
-        found.region_support.clear();
-        found.region_support.extend(self.evidence.iter().map(Evidence::support));
+        refill(&mut found.region_support, self.evidence.iter().map(Evidence::support));
     }
 
     /// Finds every edge on its own, for all limbs: where a limb is wider than modeled, the edges of both sides lie outward.
@@ -304,8 +302,7 @@ impl ColorRegions {
     fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
         let viewpoint = self.viewpoint(frame, picture, posed);
         let camera = self.camera(picture.number);
-        camera.camera_from_limb.clear();
-        camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.limb_pose(limb)));
+        refill(&mut camera.camera_from_limb, (0..posed.poses.len()).map(|limb| viewpoint.limb_pose(limb)));
         camera.unit = unit_of(picture.camera);
         let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);

@@ -10,7 +10,7 @@ use super::{ColorRegions, Posed, scan};
 use crate::association::correspondence::RegionSupport;
 use crate::body::two_bone::TwoBone;
 use crate::camera::Camera;
-use crate::math::{Pose, Vec3, shifted};
+use crate::math::{Pose, Vec3, refill, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
 use crate::shape::TaperedEllipticCylinder;
@@ -58,13 +58,11 @@ impl ColorRegions {
     /// Draws the `visible` limbs into the backdrop of each camera.
     pub(crate) fn draw(&self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
         let Backdrop { planes, camera_from_limb, drawn } = backdrop;
-        drawn.clear();
-        drawn.extend((0..posed.poses.len()).map(&visible));
+        refill(drawn, (0..posed.poses.len()).map(&visible));
         planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (picture, labels) in frame.colors.iter().zip(planes) {
             let view = self.viewpoint(frame, picture, posed);
-            camera_from_limb.clear();
-            camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.limb_pose(limb)));
+            refill(camera_from_limb, (0..posed.poses.len()).map(|limb| view.limb_pose(limb)));
             labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &visible);
         }
     }

@@ -6,7 +6,7 @@ use super::LARGEST_TURN;
 use crate::body::Body;
 use crate::body::kinematics::{Chain, exp, hinge_axis, joint_axes, joint_turn, place, screw};
 use crate::math::solve_in_place;
-use crate::math::{Pose, Quat, Vec3};
+use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory of the chain solver.
@@ -41,18 +41,15 @@ impl ChainSolver {
         let n = chain.freedoms;
         list_screws(body, poses, screws);
         // Blocks of a limb and all its descendants, leaf to root.
-        composite.clear();
-        composite.extend(normal.limbs.iter().map(|block| (block.h, block.g)));
+        refill(composite, normal.limbs.iter().map(|block| (block.h, block.g)));
         for limb in (1..composite.len()).rev() {
             let (h, g) = composite[limb];
             let parent = &mut composite[chain.parent[limb]];
             parent.0 += h;
             parent.1 += g;
         }
-        h.clear();
-        h.resize(n * n, 0.0);
-        step.clear();
-        step.resize(n, 0.0);
+        reset(h, n * n, 0.0);
+        reset(step, n, 0.0);
         for limb in 0..composite.len() {
             let (block, gradient) = &composite[limb];
             for row in chain.unknowns(limb) {
@@ -113,8 +110,7 @@ impl ChainSolver {
 
 /// The twist of every unknown: six of the root, then those of the joints.
 fn list_screws(body: &Body, poses: &[Pose], screws: &mut Vec<Vector6<f64>>) {
-    screws.clear();
-    screws.extend((0..6).map(|i| Vector6::ith(i, 1.0)));
+    refill(screws, (0..6).map(|i| Vector6::ith(i, 1.0)));
     for (_, parent, joint) in body.joints() {
         let center = poses[parent] * joint.parent_from_joint.translation;
         let (axes, count) = joint_axes(joint, &poses[parent]);

@@ -5,7 +5,7 @@ use nalgebra::Vector6;
 use super::ChainSolver;
 use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3, dot, factor, half_substitute, solve_in_place};
+use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory.
@@ -80,12 +80,9 @@ impl Lengths {
         let ChainSolver { chain, screws, composite, .. } = solver;
         let (n, count) = (chain.freedoms, pairs.len());
         let Self { mixed, reduced, gradient, .. } = self;
-        mixed.clear();
-        mixed.resize(count * n, 0.0);
-        reduced.clear();
-        reduced.resize(count * count, 0.0);
-        gradient.clear();
-        gradient.resize(count, 0.0);
+        reset(mixed, count * n, 0.0);
+        reset(reduced, count * count, 0.0);
+        reset(gradient, count, 0.0);
         let group = |limb: usize| pairs.iter().position(|pair| pair.contains(&limb));
         for limb in 1..composite.len() {
             let Some(row) = group(chain.parent[limb]) else { continue };

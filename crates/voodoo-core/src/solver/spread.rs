@@ -4,7 +4,7 @@ use nalgebra::Matrix6;
 
 use super::ChainSolver;
 use crate::body::Body;
-use crate::math::{Pose, Vec3, factor};
+use crate::math::{Pose, Vec3, factor, refill};
 use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Columns of the half-solved system, one row per unknown.
@@ -95,8 +95,7 @@ impl Spread {
     fn list(&mut self, solver: &ChainSolver, limb: usize) {
         let chain = &solver.chain;
         self.rows.resize(chain.freedoms, [0.0; 6]);
-        self.moving.clear();
-        self.moving.extend(chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
+        refill(&mut self.moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
     }
 
     /// Solves `L^T y = b` for six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`. Only unknowns that move the limb take part.

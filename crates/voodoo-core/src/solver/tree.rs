@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, Matrix6, Vector6};
 use super::LARGEST_TURN;
 use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
 
 /// Initial information of every unknown, so that nothing is singular.
@@ -51,16 +51,14 @@ impl TreeSolver {
     }
 
     fn assemble(&mut self, body: &Body, normal: &NormalEquations, damping: f64, strength: f64, poses: &[Pose]) {
-        self.parent.clear();
-        self.parent.extend((0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
+        refill(&mut self.parent, (0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
         self.own.clone_from(&normal.limbs);
         for block in &mut self.own {
             for i in 0..6 {
                 block.h[(i, i)] += damping * block.h[(i, i)] + FLOOR;
             }
         }
-        self.mixed.clear();
-        self.mixed.resize(poses.len(), Matrix6::zeros());
+        reset(&mut self.mixed, poses.len(), Matrix6::zeros());
         for (child, parent, joint) in body.joints() {
             for end in bands(joint) {
                 let on_child = poses[child] * (joint.limb_from_joint * end);
@@ -100,8 +98,7 @@ impl TreeSolver {
     /// unusable twists, when the matrix is not positive definite. Overwrites `own` and `mixed`.
     pub(crate) fn solve(&mut self) -> bool {
         let Self { parent, own, mixed, twist } = self;
-        twist.clear();
-        twist.resize(own.len(), Vector6::zeros());
+        reset(twist, own.len(), Vector6::zeros());
         for limb in (0..own.len()).rev() {
             let Some(factor) = Cholesky::new(own[limb].h) else { return false };
             twist[limb] = -factor.solve(&own[limb].g);

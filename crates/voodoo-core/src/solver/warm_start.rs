@@ -12,7 +12,7 @@ use super::{ChainSolver, DAMPING, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
-use crate::math::Pose;
+use crate::math::{Pose, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
 
@@ -44,10 +44,8 @@ impl WarmStart {
     /// Lets all limbs move, with points matched; returns false without sites.
     pub(crate) fn drives_all(&mut self, problem: &Problem) -> bool {
         let count = problem.body.limbs().len();
-        self.driven.clear();
-        self.driven.resize(count, true);
-        self.following.clear();
-        self.following.resize(count, false);
+        reset(&mut self.driven, count, true);
+        reset(&mut self.following, count, false);
         for pair in problem.correspondences.sites.iter().filter(|pair| pair.base_weight > 0.0) {
             self.following[pair.limb] = true;
             drive_from(problem.body, pair.limb, &mut self.following);
@@ -60,8 +58,7 @@ impl WarmStart {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
             self.following.clear();
-            self.driven.clear();
-            self.driven.resize(problem.body.limbs().len(), false);
+            reset(&mut self.driven, problem.body.limbs().len(), false);
             for pair in problem.correspondences.sites.iter().filter(far) {
                 drive_from(problem.body, pair.limb, &mut self.driven);
             }

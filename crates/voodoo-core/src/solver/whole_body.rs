@@ -5,7 +5,7 @@ use super::schedule::narrowed;
 use super::{ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
 
@@ -128,8 +128,7 @@ impl WholeBody {
         let holds = self.stillness.prior_gains(problem, &free, poses, gain);
         let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
-        self.spheres.clear();
-        self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
+        refill(&mut self.spheres, body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
         let posture = Posture { fraction: POSTURE * config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
@@ -152,8 +151,7 @@ impl WholeBody {
 
     /// A site gives information on every joint between it and the root: the position of a hand constrains the arm.
     fn weigh_sites(&mut self, problem: &Problem, limbs: usize, biased: bool) {
-        self.sites.clear();
-        self.sites.resize(limbs, 0.0);
+        reset(&mut self.sites, limbs, 0.0);
         for pair in problem.correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
             self.sites[pair.limb] += pair.weight;
         }
@@ -165,8 +163,7 @@ impl WholeBody {
     /// Computes the standard deviation of every joint's motion.
     fn expect_motion(&mut self, problem: &Problem) {
         let information = 1.0 / (problem.config.point_sigma * problem.config.point_sigma);
-        self.edges.clear();
-        self.edges.resize(problem.body.limbs().len(), 0.0);
+        reset(&mut self.edges, problem.body.limbs().len(), 0.0);
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
@@ -202,8 +199,7 @@ impl Stillness {
         if anew || problem.step == STILL_FROM {
             prior.stillness(problem.body, poses, joints);
         }
-        holds.clear();
-        holds.extend(joints.iter().map(|stillness| gain * stillness));
+        refill(holds, joints.iter().map(|stillness| gain * stillness));
         holds
     }
 }

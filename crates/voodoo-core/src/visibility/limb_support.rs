@@ -7,7 +7,7 @@
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::math::Pose;
+use crate::math::{Pose, reset};
 use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::EXPLAINED;
@@ -47,8 +47,7 @@ pub(crate) fn measure_support(
     raycasters: &mut Vec<LimbRaycaster>,
     supports: &mut Vec<LimbSupport>,
 ) {
-    supports.clear();
-    supports.resize(poses.len(), LimbSupport::default());
+    reset(supports, poses.len(), LimbSupport::default());
     for view in views.iter() {
         raycasters.clear();
         let limbs = body.limbs().iter().zip(poses);

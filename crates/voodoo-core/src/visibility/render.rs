@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{LANES, Pose, Vec3, is_rigid, vectorized};
+use crate::math::{LANES, Pose, Vec3, is_rigid, reset, vectorized};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
@@ -122,10 +122,8 @@ impl Rendering {
         }
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
-        depth.clear();
-        depth.resize(view.camera.pixels(), 0.0);
-        limb.clear();
-        limb.resize(view.camera.pixels(), NO_LIMB);
+        reset(depth, view.camera.pixels(), 0.0);
+        reset(limb, view.camera.pixels(), NO_LIMB);
         raycasters.clear();
         raycasters.extend(
             limbs

@@ -11,7 +11,7 @@ use super::goal::{Goal, level_cost, level_ranges};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
-use voodoo_core::math::Pose;
+use voodoo_core::math::{Pose, reset};
 
 pub use rest::Rest;
 
@@ -256,17 +256,13 @@ impl IkSolver {
         problem.model.normalize(angles);
         level_ranges(problem.goals, &mut self.levels.ranges);
         let count = self.levels.ranges.len();
-        self.levels.trust.clear();
-        self.levels.trust.resize(count, 0.1);
-        self.levels.before.clear();
-        self.levels.before.resize(count, 0.0);
+        reset(&mut self.levels.trust, count, 0.1);
+        reset(&mut self.levels.before, count, 0.0);
         for vector in [&mut self.linear.part, &mut self.here.gradient, &mut self.trial.gradient, &mut self.trial_angles]
         {
-            vector.clear();
-            vector.resize(n, 0.0);
+            reset(vector, n, 0.0);
         }
-        self.stages.clear();
-        self.stages.resize((count + 1) * n, 0.0);
+        reset(&mut self.stages, (count + 1) * n, 0.0);
         self.levels.best.clear();
         (self.report, self.comparing) = (Report { converged: true, ..Report::default() }, false);
         self.gain = problem.options.gain;
