@@ -5,7 +5,7 @@
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
-use super::{ColorRegions, Posed, scan};
+use super::{ColorRegions, Posed};
 use crate::association::correspondence::Correspondences;
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
@@ -45,11 +45,10 @@ impl ColorRegions {
         self.place_lines(frame, picture, posed);
         let mut likely = vec![0.0; picture.camera.width() * picture.camera.height()];
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
-        let (model, labels, scene) = (&camera.model, &camera.labels, camera.scene.as_ref());
-        let unit = camera.unit;
-        let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
+        let view = camera.view(picture, &camera.labels, &self.groups);
         let cell = 1_usize << super::CELL_BITS;
-        let near = distances(labels, [picture.camera.width(), picture.camera.height()], cell as f32 / unit);
+        let near =
+            distances(&camera.labels, [picture.camera.width(), picture.camera.height()], cell as f32 / camera.unit);
         // Log ratios, and then their means along rows and columns.
         let mut ratios = vec![0.0_f32; likely.len()];
         for (index, ratio) in ratios.iter_mut().enumerate() {
@@ -59,7 +58,7 @@ impl ColorRegions {
                 continue;
             }
             let group = usize::from(self.groups[usize::from(limb)]);
-            if model.knows(group) {
+            if camera.model.knows(group) {
                 *ratio = view.ratio(group, NOTHING, index, bin_of(&picture.pixels, index));
             }
         }
