@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::LARGEST_TURN;
+use super::{DAMPING, LARGEST_TURN};
 use crate::body::Body;
 use crate::body::kinematics::{Chain, exp, hinge_axis, joint_axes, joint_turn, place, screw};
 use crate::math::solve_in_place;
@@ -21,15 +21,8 @@ pub(crate) struct ChainSolver {
 
 impl ChainSolver {
     /// One damped step from the normal equations at `poses`, scaled by `stride`; afterwards the joints are exactly closed.
-    pub(crate) fn step(
-        &mut self,
-        body: &Body,
-        normal: &NormalEquations,
-        damping: f64,
-        stride: f64,
-        poses: &mut [Pose],
-    ) {
-        self.assemble(body, normal, poses, damping);
+    pub(crate) fn step(&mut self, body: &Body, normal: &NormalEquations, stride: f64, poses: &mut [Pose]) {
+        self.assemble(body, normal, poses, DAMPING);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
             self.apply(body, stride, poses);
         }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
-use super::LARGEST_TURN;
+use super::{DAMPING, LARGEST_TURN};
 use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
 use crate::math::{Pose, Vec3, refill, reset};
@@ -32,12 +32,11 @@ impl TreeSolver {
         &mut self,
         body: &Body,
         normal: &NormalEquations,
-        damping: f64,
         stride: f64,
         band_sigma: f64,
         poses: &mut [Pose],
     ) {
-        self.assemble(body, normal, damping, 1.0 / (band_sigma * band_sigma), poses);
+        self.assemble(body, normal, 1.0 / (band_sigma * band_sigma), poses);
         if !self.solve() {
             return;
         }
@@ -50,12 +49,12 @@ impl TreeSolver {
         }
     }
 
-    fn assemble(&mut self, body: &Body, normal: &NormalEquations, damping: f64, strength: f64, poses: &[Pose]) {
+    fn assemble(&mut self, body: &Body, normal: &NormalEquations, strength: f64, poses: &[Pose]) {
         refill(&mut self.parent, (0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
         self.own.clone_from(&normal.limbs);
         for block in &mut self.own {
             for i in 0..6 {
-                block.h[(i, i)] += damping * block.h[(i, i)] + FLOOR;
+                block.h[(i, i)] += DAMPING * block.h[(i, i)] + FLOOR;
             }
         }
         reset(&mut self.mixed, poses.len(), Matrix6::zeros());

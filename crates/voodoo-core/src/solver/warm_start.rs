@@ -8,7 +8,7 @@
 //! by the information of its points: an arm that can reach its hand position does not move the trunk, and a leg without
 //! measurements moves with its parent.
 
-use super::{ChainSolver, DAMPING, LIMIT_SIGMA, Problem};
+use super::{ChainSolver, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
@@ -99,7 +99,7 @@ impl WarmStart {
             term.add(body, &self.closed, &mut self.normal);
         }
         self.before.clone_from(&self.closed);
-        self.chain.step(body, &self.normal, DAMPING, 1.0, &mut self.closed);
+        self.chain.step(body, &self.normal, 1.0, &mut self.closed);
         // Limbs that are not driven keep their poses.
         self.moved.clone_from(&self.closed);
         for (limb, part) in body.limbs().iter().enumerate() {

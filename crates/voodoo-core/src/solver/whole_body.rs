@@ -2,7 +2,7 @@
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
-use super::{ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
+use super::{ChainSolver, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Vec3, refill, reset};
@@ -77,8 +77,8 @@ impl Solver for WholeBody {
         let follows = problem.step + 1 < problem.config.max_steps && !contours_alone(problem);
         let stride = if follows { OVER_RELAXATION } else { 1.0 };
         match &mut self.tree {
-            Some(tree) => tree.step(problem.body, &self.normal, DAMPING, stride, problem.config.band_sigma, poses),
-            None => self.chain.step(problem.body, &self.normal, DAMPING, stride, poses),
+            Some(tree) => tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
+            None => self.chain.step(problem.body, &self.normal, stride, poses),
         }
     }
 

@@ -7,7 +7,7 @@
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::math::{Pose, reset};
+use crate::math::{Pose, refill, reset};
 use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::EXPLAINED;
@@ -49,10 +49,7 @@ pub(crate) fn measure_support(
 ) {
     reset(supports, poses.len(), LimbSupport::default());
     for view in views.iter() {
-        raycasters.clear();
-        let limbs = body.limbs().iter().zip(poses);
-        raycasters
-            .extend(limbs.map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.working_from_camera))));
+        refill(raycasters, LimbRaycaster::of_body(body, poses, view.working_from_camera));
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
                 let in_view = support_in_view(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{LANES, Pose, Vec3, is_rigid, reset, vectorized};
+use crate::math::{LANES, Pose, Vec3, is_rigid, refill, reset, vectorized};
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
@@ -124,13 +124,7 @@ impl Rendering {
         *width = view.camera.width();
         reset(depth, view.camera.pixels(), 0.0);
         reset(limb, view.camera.pixels(), NO_LIMB);
-        raycasters.clear();
-        raycasters.extend(
-            limbs
-                .iter()
-                .zip(world_from_limb)
-                .map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.world_from_sensor))),
-        );
+        refill(raycasters, LimbRaycaster::of_body(body, world_from_limb, view.world_from_sensor));
         let raycasters = &*raycasters;
         let size = view.camera.width() * ROWS_TOGETHER;
         let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
@@ -167,6 +161,12 @@ pub(crate) struct LimbRaycaster {
 }
 
 impl LimbRaycaster {
+    /// Those of all limbs of a body, for a sensor in the frame of the poses.
+    pub(crate) fn of_body(body: &Body, poses: &[Pose], sensor: Pose) -> impl Iterator<Item = Self> {
+        let limbs = body.limbs().iter().zip(poses);
+        limbs.map(move |(limb, pose)| Self::new(limb.shape, pose.inv_mul(&sensor)))
+    }
+
     /// Prepares the intersection of a camera's rays with a limb of this shape.
     pub(crate) fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();

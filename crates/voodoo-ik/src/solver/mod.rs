@@ -127,6 +127,17 @@ struct LinearSystem {
     part: Vec<f64>,
 }
 
+/// What a step may move for.
+#[derive(Clone, Copy, Debug)]
+struct Active {
+    /// Number of levels; without the image there is at least one.
+    levels: usize,
+    /// Whether the image follows them.
+    image: bool,
+    /// Whether levels above may rise by the second-order effect of a step, which the next step corrects.
+    slack: bool,
+}
+
 struct IkProblem<'a> {
     model: &'a ChainModel,
     base: &'a Pose,
@@ -179,8 +190,7 @@ impl IkSolver {
         self.report
     }
 
-    /// Steps with the first `phase + 1` levels, or with all levels and the image. With `slack`, levels above may rise by the
-    /// second-order effect of a step, which the next step corrects.
+    /// Steps with the first `phase + 1` levels, or with all levels and the image.
     fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64]) {
         let (count, options) = (self.levels.ranges.len(), problem.options);
         let image = phase == count;
@@ -196,7 +206,7 @@ impl IkSolver {
             }
             self.report.steps += 1;
             let before = self.here.h;
-            let moved = self.step(problem, active, image, slack, angles);
+            let moved = self.step(problem, Active { levels: active, image, slack }, angles);
             idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
             if moved >= options.still && idle < STALLED_STEPS {
                 continue;
@@ -231,7 +241,7 @@ impl IkSolver {
                     break;
                 }
                 moved = true;
-                if self.step(problem, active, false, true, angles) < 1e-12 {
+                if self.step(problem, Active { levels: active, image: false, slack: true }, angles) < 1e-12 {
                     break;
                 }
             }
