@@ -47,14 +47,8 @@ impl Body {
     /// positions. Positions that require a scale above ten or below a tenth are rejected.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         for (site, position) in positions {
-            if !is_place(*position) {
-                let name = &self.sites()[*site].name;
-                return Err(TrackError::measurement(
-                    format!("joints[{name}]"),
-                    "finite meters, 1e9 at most",
-                    format!("{position:?}"),
-                ));
-            }
+            let what = || format!("joints[{}]", self.sites()[*site].name);
+            TrackError::unless(is_place(*position), what, "finite meters, 1e9 at most", || format!("{position:?}"))?;
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
         if farthest <= NEAR_ORIGIN {
@@ -74,13 +68,9 @@ impl Body {
         let scale = if fit_sizes { self.scale_to(positions) } else { 1.0 };
         let mut body = self.scaled(scale)?;
         let world_from_rest = body.overall_orientation(positions)?;
-        if !(1.0 / LARGEST..=LARGEST).contains(&scale) {
-            return Err(TrackError::measurement(
-                "joints",
-                "meters, between a tenth and ten times the body's own distances",
-                format!("{scale:.4} times"),
-            ));
-        }
+        let expected = "meters, between a tenth and ten times the body's own distances";
+        let plausible = (1.0 / LARGEST..=LARGEST).contains(&scale);
+        TrackError::unless(plausible, || "joints".into(), expected, || format!("{scale:.4} times"))?;
         let rest = body.rest_pose(Pose::IDENTITY);
         let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
         for limb in 0..rest.len() {

@@ -66,13 +66,12 @@ impl EmptyScene {
 
     /// Returns an error for an image that cannot be compared with the empty scene.
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
-        if self.size == [picture.camera.height(), picture.camera.width()] && self.kind == Kind::new(&picture.pixels) {
-            return Ok(());
-        }
-        let what = format!("color[{index}].image");
-        let found =
-            format!("{}x{} beside {}x{}", picture.camera.width(), picture.camera.height(), self.size[1], self.size[0]);
-        Err(TrackError::measurement(what, "a picture like those of the empty scene", found))
+        let [height, width] = [picture.camera.height(), picture.camera.width()];
+        let valid = self.size == [height, width] && self.kind == Kind::new(&picture.pixels);
+        let (what, expected) = (|| format!("color[{index}].image"), "a picture like those of the empty scene");
+        TrackError::unless(valid, what, expected, || {
+            format!("{width}x{height} beside {}x{}", self.size[1], self.size[0])
+        })
     }
 
     /// Log-likelihood of this color at a pixel that does not show the body; `around` is the log-likelihood under the colors of

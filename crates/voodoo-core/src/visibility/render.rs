@@ -12,6 +12,7 @@ use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
 use crate::math::{LANES, Pose, Vec3, is_rigid, refill, reset, vectorized};
+use crate::observation::frame::check_pose;
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
@@ -111,15 +112,11 @@ impl Rendering {
         view: &Viewpoint,
         pool: Option<&rayon::ThreadPool>,
     ) -> Result<(), TrackError> {
-        if !is_rigid(&view.world_from_sensor) {
-            let found = format!("{:?}", view.world_from_sensor);
-            return Err(TrackError::measurement("world_from_sensor", "a rigid transform", found));
-        }
-        let limbs = body.limbs();
-        if world_from_limb.len() != limbs.len() || !world_from_limb.iter().all(is_rigid) {
-            let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
-            return Err(TrackError::measurement("world_from_limb", "one rigid pose a limb", found));
-        }
+        check_pose(|| "world_from_sensor".into(), &view.world_from_sensor)?;
+        let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
+        let found = || format!("{poses} poses for {limbs} limbs, or one not finite");
+        let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
+        TrackError::unless(valid, || "world_from_limb".into(), "one rigid pose a limb", found)?;
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
         reset(depth, view.camera.pixels(), 0.0);
