@@ -322,6 +322,17 @@ pub struct Frame<'a> {
     pub excluded: &'a [Aabb],
 }
 
+/// Functions that return a frame with another part.
+macro_rules! with_parts {
+    ($($(#[$doc:meta])* $with:ident($part:ident: $type:ty);)*) => {$(
+        $(#[$doc])*
+        #[must_use]
+        pub fn $with(self, $part: $type) -> Self {
+            Self { $part, ..self }
+        }
+    )*};
+}
+
 impl<'a> Frame<'a> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
@@ -329,52 +340,27 @@ impl<'a> Frame<'a> {
         Self { stamp, clouds: &[], images: &[], colors: &[], positions, rays, detections, ground: None, excluded: &[] }
     }
 
-    /// The frame with these 3-D points.
-    #[must_use]
-    pub fn with_clouds(self, clouds: &'a [Cloud<'a>]) -> Self {
-        Self { clouds, ..self }
-    }
-
-    /// The frame with these depth images.
-    #[must_use]
-    pub fn with_images(self, images: &'a [DepthImage<'a>]) -> Self {
-        Self { images, ..self }
-    }
-
-    /// The frame with these color images.
-    #[must_use]
-    pub fn with_colors(self, colors: &'a [ColorImage<'a>]) -> Self {
-        Self { colors, ..self }
-    }
-
-    /// The frame with these site positions.
-    #[must_use]
-    pub fn with_positions(self, positions: &'a [PositionRelation]) -> Self {
-        Self { positions, ..self }
-    }
-
-    /// The frame with these site rays.
-    #[must_use]
-    pub fn with_rays(self, rays: &'a [RayRelation]) -> Self {
-        Self { rays, ..self }
-    }
-
-    /// The frame with these detected persons.
-    #[must_use]
-    pub fn with_detections(self, detections: &'a [DetectedPerson<'a>]) -> Self {
-        Self { detections, ..self }
+    with_parts! {
+        /// The frame with these 3-D points.
+        with_clouds(clouds: &'a [Cloud<'a>]);
+        /// The frame with these depth images.
+        with_images(images: &'a [DepthImage<'a>]);
+        /// The frame with these color images.
+        with_colors(colors: &'a [ColorImage<'a>]);
+        /// The frame with these site positions.
+        with_positions(positions: &'a [PositionRelation]);
+        /// The frame with these site rays.
+        with_rays(rays: &'a [RayRelation]);
+        /// The frame with these detected persons.
+        with_detections(detections: &'a [DetectedPerson<'a>]);
+        /// The frame with these boxes of the world whose points belong to no person.
+        with_excluded(excluded: &'a [Aabb]);
     }
 
     /// The frame with this ground plane, or without one.
     #[must_use]
     pub fn with_ground(self, ground: impl Into<Option<Ground>>) -> Self {
         Self { ground: ground.into(), ..self }
-    }
-
-    /// The frame with these boxes of the world whose points belong to no person.
-    #[must_use]
-    pub fn with_excluded(self, excluded: &'a [Aabb]) -> Self {
-        Self { excluded, ..self }
     }
 
     /// Returns an error for unusable input, before any of it reaches the tracker's state.
