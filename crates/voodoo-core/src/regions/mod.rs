@@ -325,7 +325,8 @@ impl ColorRegions {
         for line in &camera.lines {
             let weak = evidence.get(usize::from(line.limb)).is_some_and(Evidence::is_weak);
             if !line.hidden && (light || !weak) {
-                scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+                let group = usize::from(groups[usize::from(line.limb)]);
+                camera.model.count(picture, &camera.labels, group, unit, line);
             }
         }
         camera.model.learn();

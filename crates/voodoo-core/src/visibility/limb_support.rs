@@ -9,7 +9,6 @@ use crate::body::Body;
 use crate::body::two_bone::TwoBone;
 use crate::math::{Pose, refill, reset};
 use crate::observation::depth_view::{DepthView, DepthViews};
-use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
@@ -52,7 +51,7 @@ pub(crate) fn measure_support(
         refill(raycasters, LimbRaycaster::of_body(body, poses, view.working_from_camera));
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
-                let in_view = support_in_view(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
+                let in_view = support_in_view(&view, &poses[limb], limb, chain, raycasters);
                 let support = &mut supports[limb];
                 for part in 0..2 {
                     support.own[part] = support.own[part].max(in_view.own[part]);
@@ -67,7 +66,6 @@ pub(crate) fn measure_support(
 /// Returns the evidence of one camera on a limb of a chain.
 fn support_in_view(
     view: &DepthView,
-    shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     limb: usize,
     chain: &TwoBone,
@@ -76,7 +74,7 @@ fn support_in_view(
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
     let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
-    for row in surface_rows(shape, &camera_from_limb) {
+    for row in surface_rows(&raycasters[limb].shape, &camera_from_limb) {
         let t = row.t;
         // The weights of all points sum to one, in the whole limb and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);

@@ -144,7 +144,7 @@ impl Rendering {
 /// A limb as observed by one camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimbRaycaster {
-    shape: TaperedEllipticCylinder,
+    pub(super) shape: TaperedEllipticCylinder,
     /// The camera's center and axes in the limb frame.
     origin: Vec3,
     axes: [Vec3; 3],
