@@ -1,6 +1,6 @@
 //! The empty scene of a camera: a background color per pixel, and the likelihood of another color there.
 
-use super::histogram::Kind;
+use super::histogram::{Kind, SIDE};
 use crate::error::TrackError;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
@@ -58,7 +58,7 @@ impl EmptyScene {
         let sigma = variance.sqrt().max(LEAST_SIGMA);
         let width = (std::f32::consts::TAU.sqrt() * sigma).ln();
         let most = match kind {
-            Kind::Color => (16.0_f32).ln() * 3.0 - 3.0 * width,
+            Kind::Color => (SIDE as f32).ln() * 3.0 - 3.0 * width,
             Kind::Gray => -width,
         };
         Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })

@@ -6,7 +6,7 @@ use crate::observation::picture::ColorPixels;
 /// Leading bits of each channel that select its bin.
 const BITS: u32 = 4;
 /// Bins per channel.
-const SIDE: usize = 1 << BITS;
+pub(super) const SIDE: usize = 1 << BITS;
 /// Fraction of a count that spreads to the neighbor on either side: a Gaussian of 0.7 bins.
 const SPREAD: f32 = 0.21;
 /// Number of smoothing passes for grayscale, which has finer bins.
@@ -97,7 +97,7 @@ impl ColorHistogram {
         if self.counted >= least {
             match kind {
                 Kind::Color => smooth_color(&mut self.counts, room),
-                Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, 256)),
+                Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, kind.bins())),
             }
             let rate = if self.known { rate } else { 1.0 };
             let (keep, new) = (1.0 - rate, rate / self.counted);

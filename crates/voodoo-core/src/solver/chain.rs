@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::{DAMPING, LARGEST_TURN};
+use super::{DAMPING, FLOOR, LARGEST_TURN};
 use crate::body::Body;
 use crate::body::kinematics::{Chain, exp, hinge_axis, joint_axes, joint_turn, place, screw};
 use crate::math::solve_in_place;
@@ -68,7 +68,7 @@ impl ChainSolver {
             }
         }
         for row in 0..n {
-            h[row * n + row] += damping * h[row * n + row] + 1e-6;
+            h[row * n + row] += damping * h[row * n + row] + FLOOR;
         }
     }
 

@@ -3,14 +3,11 @@
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
-use super::{DAMPING, LARGEST_TURN};
+use super::{DAMPING, FLOOR, LARGEST_TURN};
 use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
 use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
-
-/// Initial information of every unknown, so that nothing is singular.
-const FLOOR: f64 = 1e-6;
 
 /// The system of one step, and its solution.
 #[derive(Debug, Default)]

@@ -29,9 +29,6 @@ const HIDDEN_MOTION: f64 = 0.1;
 const TO_REST: f64 = 0.1;
 /// Minimum expected motion of a joint when only contours are measured, radians: no points hold a wrong shoulder there.
 const LEAST_MOTION: f64 = 0.1;
-/// When only contours are measured, joints with a small range are pulled to their rest position, with a standard deviation of
-/// this fraction of half of the range, times `motion_scale`.
-const POSTURE: f64 = 1.0;
 /// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
 /// length.
 pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
@@ -130,7 +127,7 @@ impl WholeBody {
         let limits = Limits { sigma: LIMIT_SIGMA };
         refill(&mut self.spheres, body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
-        let posture = Posture { fraction: POSTURE * config.motion_scale };
+        let posture = Posture { fraction: config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The cost function: a new term is a new file and a line here.
         let detected = DetectedJoints { pairs: &correspondences.detected };
