@@ -66,6 +66,8 @@ pub(crate) fn widest_fused<A>(argument: A, plain: impl FnOnce(A), fused: impl Fn
             return compiled!("avx2,fma", fused(argument));
         }
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    drop(fused);
     plain(argument);
 }
 
