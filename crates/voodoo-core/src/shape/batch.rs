@@ -139,6 +139,17 @@ impl Batch<'_> {
     /// Closest points of the queries in `range`, block by block. Unsettled queries are processed whenever there are enough of
     /// them; the last ones wait.
     fn closest_blocks<const N: usize>(&mut self, queries: &Points, range: Range<usize>) {
+        widest_fused(
+            self,
+            #[inline(always)]
+            |batch| batch.run_blocks::<FMA, N>(queries, range.clone()),
+            #[inline(always)]
+            |batch| batch.run_blocks::<true, N>(queries, range.clone()),
+        );
+    }
+
+    #[inline(always)]
+    fn run_blocks<const FMA: bool, const N: usize>(&mut self, queries: &Points, range: Range<usize>) {
         let mut block = Block::ZERO;
         let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
@@ -148,7 +159,7 @@ impl Batch<'_> {
             load(&mut block.x, &queries.x[span.clone()]);
             load(&mut block.y, &queries.y[span.clone()]);
             load(&mut block.z, &queries.z[span.clone()]);
-            run::<N, FEW>(&self.constants, &block, &mut found);
+            closest::<FMA, N, FEW>(&self.constants, &block, &mut found);
             let out = &mut *self.out;
             store(&mut out.points.x[span.clone()], &found.points.x);
             store(&mut out.points.y[span.clone()], &found.points.y);

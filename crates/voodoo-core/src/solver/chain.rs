@@ -49,9 +49,10 @@ impl ChainSolver {
                 let force = block * screws[row];
                 step[row] = -screws[row].dot(gradient);
                 // The degrees of freedom of every ancestor move this limb too.
-                for column in chain.up_from(limb).flat_map(|limb| chain.unknowns(limb)).filter(|column| *column <= row)
-                {
-                    h[row * n + column] = force.dot(&screws[column]);
+                for ancestor in chain.up_from(limb) {
+                    for column in chain.unknowns(ancestor).take_while(|column| *column <= row) {
+                        h[row * n + column] = force.dot(&screws[column]);
+                    }
                 }
             }
         }
