@@ -148,4 +148,14 @@ impl TrackError {
     pub fn measurement(what: impl Into<String>, expected: &'static str, found: impl Into<String>) -> Self {
         Self::Measurement { what: what.into(), expected, found: found.into() }
     }
+
+    /// Rejects a measurement that is not valid; the texts are made only then.
+    pub(crate) fn unless(
+        valid: bool,
+        what: impl FnOnce() -> String,
+        expected: &'static str,
+        found: impl FnOnce() -> String,
+    ) -> Result<(), Self> {
+        if valid { Ok(()) } else { Err(Self::measurement(what(), expected, found())) }
+    }
 }

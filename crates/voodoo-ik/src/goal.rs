@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::model::{ChainModel, Kinematics};
-use voodoo_core::math::Vec3;
+use voodoo_core::math::{Vec3, reset};
 
 /// The target of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,8 +80,7 @@ pub fn level_rows(
     residual: &mut Vec<f64>,
 ) {
     let n = model.freedoms();
-    jacobian.clear();
-    jacobian.resize(3 * goals.len() * n, 0.0);
+    reset(jacobian, 3 * goals.len() * n, 0.0);
     residual.clear();
     for (index, goal) in goals.iter().enumerate() {
         let x = at.poses[goal.link].transform_point(goal.point);

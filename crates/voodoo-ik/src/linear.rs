@@ -1,6 +1,6 @@
 //! Row-vector linear algebra: damped pseudo-inverse and null spaces, without heap allocation after the first use.
 
-use voodoo_core::math::{dot, solve_in_place};
+use voodoo_core::math::{dot, reset, solve_in_place};
 
 /// A row whose remainder is below this fraction of the longest row depends linearly on the rows before it.
 const RANK: f64 = 1e-9;
@@ -90,8 +90,7 @@ impl Damped {
         x.fill(0.0);
         // Rounding can make a nearly singular matrix indefinite; more damping resolves that.
         for _ in 0..6 {
-            self.h.clear();
-            self.h.resize(size * size, 0.0);
+            reset(&mut self.h, size * size, 0.0);
             self.z.clear();
             if rows <= n {
                 for i in 0..rows {

@@ -4,7 +4,7 @@ use super::goal::{Aim, Goal};
 use super::model::{ChainModel, Turn};
 use super::solver::{IkSolver, SolverOptions};
 use voodoo_core::kinematics::joint_turn;
-use voodoo_core::math::{Pose, Vec3, rotation_vector};
+use voodoo_core::math::{Pose, Vec3, reset, rotation_vector};
 use voodoo_core::{Body, Joint};
 
 /// Lever that weights a limb's rotation about its axis against its position, meters: approximately the radius of an arm.
@@ -13,8 +13,7 @@ const GIRTH: f64 = 0.05;
 /// Reads the joint angles from `poses` (one per limb of the body, world frame); gaps at the joints are ignored. The result is
 /// within the limits.
 pub fn read(body: &Body, model: &ChainModel, world_from_base: &Pose, poses: &[Pose], angles: &mut Vec<f64>) {
-    angles.clear();
-    angles.resize(model.freedoms(), 0.0);
+    reset(angles, model.freedoms(), 0.0);
     for link in model.links() {
         let joint: Option<&(usize, Joint)> = body.limbs()[link.limb].parent.as_ref();
         let world_from_limb = &poses[link.limb];

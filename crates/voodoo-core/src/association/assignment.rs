@@ -4,7 +4,7 @@ use crate::association::correspondence::LimbMatches;
 use crate::association::nearest_limb::{NONE, NearestLimb};
 use crate::body::{Body, Limb};
 use crate::config::{Config, Overlap};
-use crate::math::{Points, Pose, widest};
+use crate::math::{Points, Pose, vectorized};
 use crate::observation::candidates::{ANY_LIMB, Candidates};
 use crate::shape::Region;
 
@@ -126,17 +126,14 @@ pub(crate) fn match_limb(limb: &Limb, pose: &Pose, max_distance: f64, fades: boo
     let LimbMatches { weight, base_weight, surface, .. } = matches;
     weight.resize(base_weight.len(), 0.0);
     let per_meter = if fades { 1.0 / (GATE_FADE * limit) } else { f32::INFINITY };
-    widest(
-        #[inline(always)]
-        || {
-            let found = base_weight.iter().zip(&surface.signed_distance).zip(&surface.region);
-            for (weight, ((base_weight, distance), region)) in weight.iter_mut().zip(found) {
-                let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
-                let fade = ((limit - distance.abs()) * per_meter).min(1.0);
-                *weight = if kept { *base_weight * fade * fade * (3.0 - 2.0 * fade) } else { 0.0 };
-            }
-        },
-    );
+    vectorized!({
+        let found = base_weight.iter().zip(&surface.signed_distance).zip(&surface.region);
+        for (weight, ((base_weight, distance), region)) in weight.iter_mut().zip(found) {
+            let kept = (distance.abs() <= limit) & (refused >> region & 1 == 0);
+            let fade = ((limit - distance.abs()) * per_meter).min(1.0);
+            *weight = if kept { *base_weight * fade * fade * (3.0 - 2.0 * fade) } else { 0.0 };
+        }
+    });
 }
 
 /// How many of a limb's candidates are used (K06 IV-B.3).

@@ -4,7 +4,7 @@
 //! would hold it there.
 
 use crate::body::Body;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill};
 use crate::visibility::ALONG_LIMB;
 
 /// A position this deep in another limb counts as inside it, meters: limbs are soft, and thinner or thicker than their models.
@@ -24,8 +24,7 @@ impl Buried {
     pub(crate) fn find(&mut self, body: &Body, poses: &[Pose]) -> &[bool] {
         let Self { limbs, spheres } = self;
         let parts = body.limbs();
-        spheres.clear();
-        spheres.extend(parts.iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
+        refill(spheres, parts.iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         limbs.clear();
         limbs.extend((0..poses.len()).map(|limb| {
             let inside = |fraction: &&f64| {

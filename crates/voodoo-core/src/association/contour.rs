@@ -2,7 +2,7 @@
 
 use crate::association::correspondence::ContourPair;
 use crate::body::{Body, Limb};
-use crate::math::{Points, Pose, Vec3, smooth_step, widest};
+use crate::math::{Points, Pose, Vec3, reset, smooth_step, vectorized};
 use crate::observation::depth_view::{DepthView, Pixel};
 
 /// Where along a limb its contour is searched for, as fractions of its length; the ends also belong to the neighbors.
@@ -65,11 +65,8 @@ pub(crate) fn edges(view: &DepthView, limb: &Limb, working_from_limb: &Pose, mut
     let mut search = |start: Vec3, side: Vec3, rim: f64, thickness: f64, foot: Vec3, reach: f64, sine: f64| {
         let (start, along) = (camera_from_limb * start, camera_from_limb.rotation * side);
         let search = ContourSearch { start, along, rim, thickness, reach };
-        let edge = widest(
-            #[inline(always)]
-            || search.edge(view),
-        );
-        if let Some(PixelEdge { at, place, weight }) = edge {
+        let edge = vectorized!(search.edge(view));
+        if let Some((at, place, weight)) = edge {
             let weight = weight * smooth_step((sine - ASLANT) / ASLANT_FADE);
             found(DepthEdge { side, rim, foot, reach: at, place: view.working_from_camera * place, weight });
         }
@@ -118,18 +115,12 @@ struct ContourSearch {
     reach: f64,
 }
 
-/// Where the body ends on a search path, a point that was observed a pixel before that, and the weight of the edge.
-struct PixelEdge {
-    at: f64,
-    place: Vec3,
-    weight: f64,
-}
-
 impl ContourSearch {
-    /// Finds where the body ends. Returns `None` when another object occludes it, when the pixels past it are unknown, or when
+    /// Finds where the body ends on the path: returns the distance from its start, a point that was observed a pixel before that,
+    /// and the weight of the edge. Returns `None` when another object occludes it, when the pixels past it are unknown, or when
     /// there is no edge within reach.
     #[inline(always)]
-    fn edge(&self, view: &DepthView) -> Option<PixelEdge> {
+    fn edge(&self, view: &DepthView) -> Option<(f64, Vec3, f64)> {
         let [fx, fy] = view.image.camera.focal();
         let focal = fx.max(fy);
         let step = 0.5 * self.start.z.max(NEAREST_STEP) / focal;
@@ -152,7 +143,7 @@ impl ContourSearch {
     /// Locates the edge between a sample on the body and one past it, from interpolated pixels, so that it moves continuously
     /// with the path. `step` is half a pixel.
     #[inline(always)]
-    fn between(&self, view: &DepthView, on: f64, past: f64, step: f64) -> Option<PixelEdge> {
+    fn between(&self, view: &DepthView, on: f64, past: f64, step: f64) -> Option<(f64, Vec3, f64)> {
         let deep = self.thickness + DEPTH_REACH;
         let shares = |r: f64| view.shares(self.start + self.along * r, deep);
         let (mut on, mut past) = ((on - step, 1.0), (past + step, 0.0));
@@ -173,7 +164,7 @@ impl ContourSearch {
         }
         let inside = self.start + self.along * (at - 2.0 * step);
         let depth = view.shares(inside, deep).depth.unwrap_or(inside.z);
-        Some(PixelEdge { at, place: inside * (depth / inside.z), weight })
+        Some((at, inside * (depth / inside.z), weight))
     }
 }
 
@@ -233,8 +224,7 @@ impl Contours {
     fn find_distances(&mut self, body: &Body, poses: &[Pose]) {
         let count = self.places.len();
         for distances in [&mut self.own, &mut self.others] {
-            distances.clear();
-            distances.resize(count, f32::INFINITY);
+            reset(distances, count, f32::INFINITY);
         }
         for (index, (limb, pose)) in body.limbs().iter().zip(poses).enumerate() {
             limb.shape.approximate_distances(pose, &self.places, &mut self.distance);

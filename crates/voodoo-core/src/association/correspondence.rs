@@ -3,7 +3,7 @@
 //!
 //! Everything is in the working frame: world axes, origin near the body.
 
-use crate::math::{LANES, Mat3, Points, Vec3, widest};
+use crate::math::{LANES, Mat3, Points, Vec3, vectorized};
 use crate::shape::SurfaceBatch;
 
 /// Surface matches of one limb: measured points and their closest points. Rejected pairs are kept with weight zero.
@@ -165,19 +165,12 @@ impl LimbMatches {
         let square = |weight, distance| f64::from(weight) * f64::from(distance) * f64::from(distance);
         let (weight, distance) = (&self.weight, &self.surface.signed_distance);
         let both = |weight, distance| [f64::from(weight), square(weight, distance)];
-        widest(
-            #[inline(always)]
-            || in_lanes(weight, distance, both),
-        )
-        .into()
+        vectorized!(in_lanes(weight, distance, both)).into()
     }
 
     /// Sum of the weights.
     pub(crate) fn total_weight(&self) -> f64 {
-        let [total] = widest(
-            #[inline(always)]
-            || in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]),
-        );
+        let [total] = vectorized!(in_lanes(&self.weight, &self.weight, |weight, _| [f64::from(weight)]));
         total
     }
 
@@ -237,10 +230,7 @@ impl Correspondences {
                 let fits = f64::from(fraction) * (falloff * falloff);
                 [fits, fits * square]
             };
-            let [fits, squares] = widest(
-                #[inline(always)]
-                || in_lanes(&limb.weight, &limb.surface.signed_distance, fitting),
-            );
+            let [fits, squares] = vectorized!(in_lanes(&limb.weight, &limb.surface.signed_distance, fitting));
             weight += fits;
             sum += squares;
         }

@@ -50,16 +50,15 @@ impl Correspondences {
             let count = body.children(limb).count() + usize::from(body.parent(limb).is_some());
             measured.push(if weight > 0.0 { weight } else { UNMEASURED } / count.max(1) as f64);
         }
-        for (child, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &limb.parent else { continue };
+        for (child, parent, joint) in body.joints() {
             let fraction = joint.weight / joint.band_points().count() as f64;
             for point in joint.band_points() {
                 self.bands.push(Band {
-                    parent: *parent,
+                    parent,
                     child,
-                    on_parent: poses[*parent] * (joint.parent_from_joint * point),
+                    on_parent: poses[parent] * (joint.parent_from_joint * point),
                     on_child: poses[child] * (joint.limb_from_joint * point),
-                    parent_weight: fraction * measured[*parent],
+                    parent_weight: fraction * measured[parent],
                     child_weight: fraction * measured[child],
                 });
             }

@@ -5,7 +5,7 @@
 //! nearest of some point are evaluated point by point.
 
 use crate::body::{Body, Limb};
-use crate::math::{LANES, Pose, Vec3, widest};
+use crate::math::{LANES, Pose, Vec3, refill, vectorized};
 use crate::observation::clusters::{Bounds, CLUSTER, Cluster, Clusters};
 
 /// The limb of a point that lies in no box.
@@ -46,8 +46,7 @@ impl NearestLimb {
                 open
             }
         }));
-        self.groups.clear();
-        self.groups.extend(self.limbs.chunks(LANES).map(Group::new));
+        refill(&mut self.groups, self.limbs.chunks(LANES).map(Group::new));
     }
 
     /// Writes the nearest limb of every point, or [`NONE`], to `nearest`.
@@ -57,17 +56,14 @@ impl NearestLimb {
     pub(crate) fn find(&mut self, clusters: &Clusters, nearest: &mut [u32], inside: &mut [bool]) {
         self.least.resize(self.groups.len(), [OUTSIDE; LANES]);
         self.expected.resize(clusters.iter().len(), [0; 2]);
-        widest(
-            #[inline(always)]
-            || {
-                for (index, cluster) in clusters.iter().enumerate() {
-                    let found = self.find_cluster(index, &cluster, inside);
-                    for (which, limb) in cluster.which.iter().zip(found) {
-                        nearest[*which as usize] = limb;
-                    }
+        vectorized!({
+            for (index, cluster) in clusters.iter().enumerate() {
+                let found = self.find_cluster(index, &cluster, inside);
+                for (which, limb) in cluster.which.iter().zip(found) {
+                    nearest[*which as usize] = limb;
                 }
-            },
-        );
+            }
+        });
     }
 
     #[inline(always)]

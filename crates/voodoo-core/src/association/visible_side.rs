@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use crate::association::correspondence::LimbMatches;
-use crate::math::{Pose, Vec3, widest};
+use crate::math::{Pose, Vec3, vectorized};
 use crate::observation::candidates::Candidates;
 use crate::shape::{MIN_SIZE, Region, TaperedEllipticCylinder};
 
@@ -26,15 +26,22 @@ pub(crate) fn match_visible_side(
         let stop = start + matches.candidate[start..].partition_point(|candidate| candidate < end);
         for first in (start..stop).step_by(MATCHES) {
             let last = stop.min(first + MATCHES);
-            let away = widest(
-                #[inline(always)]
-                || facing_away(matches, first..last, camera.as_vec3().to_array()),
-            );
+            let away = vectorized!(facing_away(matches, first..last, camera.as_vec3().to_array()));
             if away.iter().fold(0, |any, away| any | u8::from(*away)) == 0 {
                 continue;
             }
+            let LimbMatches { measured, weight, surface, .. } = &mut *matches;
             for index in (first..last).filter(|index| away[index - first]) {
-                turn_match(shape, pose, *camera, max_distance, matches, index);
+                let (measured, far) = (measured.get(index), pose.inverse_transform_point(surface.points.get(index)));
+                let (place, normal) = near_side(shape, far, pose.rotation.inverse() * (measured - *camera));
+                let (place, normal) = (*pose * place, pose.rotation * normal);
+                let distance = normal.dot(measured - place);
+                surface.points.set(index, place.as_vec3().to_array());
+                surface.normals.set(index, normal.as_vec3().to_array());
+                surface.signed_distance[index] = distance as f32;
+                if distance.abs() > max_distance {
+                    weight[index] = 0.0;
+                }
             }
         }
         start = stop;
@@ -59,29 +66,6 @@ fn facing_away(matches: &LimbMatches, range: Range<usize>, [x, y, z]: [f32; 3]) 
         away[i] = (along > 0.0) & (distance[i] < 0.0) & (region[i] == Region::Side as u8) & (weight[i] > 0.0);
     }
     away
-}
-
-/// Moves one match to the near side.
-fn turn_match(
-    shape: &TaperedEllipticCylinder,
-    pose: &Pose,
-    camera: Vec3,
-    max_distance: f64,
-    matches: &mut LimbMatches,
-    index: usize,
-) {
-    let LimbMatches { measured, weight, surface, .. } = matches;
-    let to_f32 = |v: Vec3| v.to_array().map(|value| value as f32);
-    let view = pose.rotation.inverse() * (measured.get(index) - camera);
-    let (place, normal) = near_side(shape, pose.inverse_transform_point(surface.points.get(index)), view);
-    let (place, normal) = (*pose * place, pose.rotation * normal);
-    let distance = normal.dot(measured.get(index) - place);
-    surface.points.set(index, to_f32(place));
-    surface.normals.set(index, to_f32(normal));
-    surface.signed_distance[index] = distance as f32;
-    if distance.abs() > max_distance {
-        weight[index] = 0.0;
-    }
 }
 
 /// The other end of the chord through a slice, from a surface point along the line of sight (limb frame), and the normal there.

@@ -47,14 +47,8 @@ impl Body {
     /// positions. Positions that require a scale above ten or below a tenth are rejected.
     pub fn fit(&self, positions: &[(usize, Vec3)], fit_sizes: bool) -> Result<(Self, Vec<Pose>), TrackError> {
         for (site, position) in positions {
-            if !is_place(*position) {
-                let name = &self.sites()[*site].name;
-                return Err(TrackError::measurement(
-                    format!("joints[{name}]"),
-                    "finite meters, 1e9 at most",
-                    format!("{position:?}"),
-                ));
-            }
+            let what = || format!("joints[{}]", self.sites()[*site].name);
+            TrackError::unless(is_place(*position), what, "finite meters, 1e9 at most", || format!("{position:?}"))?;
         }
         let farthest = positions.iter().map(|(_, position)| position.abs().max_element()).fold(0.0, f64::max);
         if farthest <= NEAR_ORIGIN {
@@ -74,13 +68,9 @@ impl Body {
         let scale = if fit_sizes { self.scale_to(positions) } else { 1.0 };
         let mut body = self.scaled(scale)?;
         let world_from_rest = body.overall_orientation(positions)?;
-        if !(1.0 / LARGEST..=LARGEST).contains(&scale) {
-            return Err(TrackError::measurement(
-                "joints",
-                "meters, between a tenth and ten times the body's own distances",
-                format!("{scale:.4} times"),
-            ));
-        }
+        let expected = "meters, between a tenth and ten times the body's own distances";
+        let plausible = (1.0 / LARGEST..=LARGEST).contains(&scale);
+        TrackError::unless(plausible, || "joints".into(), expected, || format!("{scale:.4} times"))?;
         let rest = body.rest_pose(Pose::IDENTITY);
         let mut poses: Vec<Pose> = Vec::with_capacity(rest.len());
         for limb in 0..rest.len() {
@@ -126,20 +116,18 @@ impl Body {
         for (index, site) in self.sites().iter().enumerate().filter(|(_, site)| site.limb == limb) {
             add(Some(index), site.position);
         }
-        for (index, other) in self.limbs().iter().enumerate() {
-            if let Some((parent, joint)) = &other.parent {
-                let center = self.roles.joint_site(index);
-                if *parent == limb {
-                    add(center, joint.parent_from_joint.translation);
-                } else if index == limb {
-                    add(center, joint.limb_from_joint.translation);
-                } else if let Some((grandparent, carrier)) = &self.limbs()[*parent].parent
-                    && *grandparent == limb
-                    && self.carried(*parent)
-                {
-                    let limb_from_parent = carrier.parent_from_limb_at_rest();
-                    add(center, limb_from_parent * joint.parent_from_joint.translation);
-                }
+        for (index, parent, joint) in self.joints() {
+            let center = self.roles.joint_site(index);
+            if parent == limb {
+                add(center, joint.parent_from_joint.translation);
+            } else if index == limb {
+                add(center, joint.limb_from_joint.translation);
+            } else if let Some((grandparent, carrier)) = &self.limbs()[parent].parent
+                && *grandparent == limb
+                && self.carried(parent)
+            {
+                let limb_from_parent = carrier.parent_from_limb_at_rest();
+                add(center, limb_from_parent * joint.parent_from_joint.translation);
             }
         }
         pairs
@@ -171,10 +159,8 @@ impl Body {
     fn overall_orientation(&self, positions: &[(usize, Vec3)]) -> Result<Pose, TrackError> {
         let rest = self.rest_pose(Pose::IDENTITY);
         let mut trunk = vec![true];
-        for limb in &self.limbs()[1..] {
-            let steady =
-                limb.parent.as_ref().is_some_and(|(parent, joint)| trunk[*parent] && turns_less(joint, STEADY));
-            trunk.push(steady);
+        for (_, parent, joint) in self.joints() {
+            trunk.push(trunk[parent] && turns_less(joint, STEADY));
         }
         let mut central: Vec<(Vec3, Vec3)> = Vec::new();
         for limb in (0..trunk.len()).filter(|limb| trunk[*limb]) {
@@ -232,9 +218,8 @@ impl Body {
 
     /// The axis of a hinge at the distal end of a limb: in the limb frame, and in the world as the bent child determines it.
     fn hinge_axis(&self, limb: usize, positions: &[(usize, Vec3)]) -> Option<(Vec3, Vec3)> {
-        for (index, child) in self.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &child.parent else { continue };
-            if *parent != limb || joint.kind() != JointKind::Hinge {
+        for (index, parent, joint) in self.joints() {
+            if parent != limb || joint.kind() != JointKind::Hinge {
                 continue;
             }
             let center = self.roles.joint_site(index);
@@ -245,7 +230,7 @@ impl Body {
             let end = end.or_else(|| {
                 let away = |local: Vec3| (local - joint.limb_from_joint.translation).length();
                 let landmarks = self.known_landmarks(index, positions).into_iter();
-                let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * child.shape.length());
+                let far = landmarks.filter(|(local, _)| away(*local) > FAR_END * self.limbs[index].shape.length());
                 far.max_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, position)| position)
             })?;
             let normal = (bend - start).normalize_or_zero().cross((end - bend).normalize_or_zero());
@@ -341,11 +326,9 @@ impl Body {
 
     /// Moves every limb so that the two centers of its joint coincide.
     pub(crate) fn close_joints(&self, poses: &mut [Pose]) {
-        for (index, limb) in self.limbs().iter().enumerate() {
-            if let Some((parent, joint)) = &limb.parent {
-                let center = poses[*parent] * joint.parent_from_joint.translation;
-                poses[index].translation = center - poses[index].rotation * joint.limb_from_joint.translation;
-            }
+        for (limb, parent, joint) in self.joints() {
+            let center = poses[parent] * joint.parent_from_joint.translation;
+            poses[limb].translation = center - poses[limb].rotation * joint.limb_from_joint.translation;
         }
     }
 }

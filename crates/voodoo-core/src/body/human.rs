@@ -116,20 +116,11 @@ const MEASURED: Build = Build {
 /// Trunk and head of `Papers`; its other surfaces are those of `ANSUR`.
 const TORSO: Surface = centered([0.068, 0.098, 0.064, 0.096]);
 const PAPERS_HEAD: Surface = centered([0.046, 0.040, 0.050, 0.042]);
-const HAND_AXES: [f64; 4] = [0.022, 0.012, 0.019, 0.010];
-const FOOT_AXES: [f64; 4] = [0.020, 0.022, 0.014, 0.017];
+const HAND_SURFACE: Surface = centered([0.022, 0.012, 0.019, 0.010]);
+const FOOT_SURFACE: Surface = centered([0.020, 0.022, 0.014, 0.017]);
 
 const fn centered(axes: [f64; 4]) -> Surface {
     Surface { offsets: [[0.0; 2]; 2], axes }
-}
-
-impl HumanModel {
-    fn build(self) -> &'static Build {
-        match self {
-            Self::Papers | Self::Full => &ANSUR,
-            Self::Measured => &MEASURED,
-        }
-    }
 }
 
 impl Surface {
@@ -143,8 +134,13 @@ impl Surface {
 }
 
 /// The parts of a human in the standing frame: x forward, y left, z up, origin on the floor between the feet; stature 1.
-#[derive(Default)]
 struct Builder {
+    /// The ten limbs of the papers, which have no hands and feet.
+    papers: bool,
+    build: &'static Build,
+    /// Side of what is added, and how its names begin: left 1, right -1, center 0.
+    side: f64,
+    prefix: &'static str,
     limbs: Vec<Limb>,
     /// Pose of each limb in the standing frame.
     poses: Vec<Pose>,
@@ -152,18 +148,27 @@ struct Builder {
 }
 
 impl Builder {
-    /// Adds a limb between two places. The x axis of its frame points to the `front` as far as possible. The ellipses of its joint
-    /// are given in the standing frame.
+    fn named(&self, name: &str) -> String {
+        format!("{}{name}", self.prefix)
+    }
+
+    /// A place on the side of what is added.
+    fn aside(&self, [x, y, z]: [f64; 3]) -> Vec3 {
+        Vec3::new(x, self.side * y, z)
+    }
+
+    /// Adds a limb whose joints' line is between two places. The x axis of its frame points to the `front` as far as possible. The
+    /// ellipses of its joint are given in the standing frame.
     fn limb(
         &mut self,
-        name: impl Into<String>,
-        [start, end]: [Vec3; 2],
+        name: &str,
+        surface: Surface,
+        line: [Vec3; 2],
         front: Vec3,
-        [a0, b0, a1, b1]: [f64; 4],
         parent: Option<(usize, Joint)>,
         match_caps: [bool; 2],
     ) -> Result<usize, BodyError> {
-        let name = name.into();
+        let (name, [start, end], [a0, b0, a1, b1]) = (self.named(name), surface.ends(line, self.side), surface.axes);
         let length = (end - start).length();
         let along = (end - start) / length;
         let x = (front - along * front.dot(along)).normalize();
@@ -180,38 +185,34 @@ impl Builder {
         Ok(self.limbs.len() - 1)
     }
 
-    fn site(&mut self, name: impl Into<String>, limb: usize, position: Vec3) {
+    fn site(&mut self, name: &str, limb: usize, position: Vec3) {
         let position = self.poses[limb].inverse_transform_point(position);
-        self.sites.push(Site { name: name.into(), limb, position });
+        self.sites.push(Site { name: self.named(name), limb, position });
     }
 
     /// Adds the pelvis or torso, and the parts of the trunk above it. Returns the limbs that carry the legs and the arms.
-    fn trunk(&mut self, model: HumanModel) -> Result<(usize, usize), BodyError> {
+    fn trunk(&mut self) -> Result<[usize; 2], BodyError> {
         let link = |name: &str, center: Vec3, semi_axis: f64, limits, motion| {
             joint(name, center, [Vec3::Y, Vec3::Z], [semi_axis; 2], limits, motion)
         };
         let vc7 = link("vc7", Vec3::Z * VC7, 0.02, [[-0.9, 1.0], [-0.7, 0.7], [-1.2, 1.2]], 0.15);
-        let upright = |surface: Surface, from: f64, to: f64| surface.ends([Vec3::Z * from, Vec3::Z * to], 0.0);
-        let build = model.build();
+        let upright = |from: f64, to: f64| [Vec3::Z * from, Vec3::Z * to];
+        let build = self.build;
         let [base, center, tip] = build.skull;
-        let (front, none) = (Vec3::X, [false; 2]);
-        let [legs, arms, neck, skull] = if model == HumanModel::Papers {
-            let torso = self.limb("torso", upright(TORSO, 0.490, 0.835), front, TORSO.axes, None, none)?;
-            let line = upright(PAPERS_HEAD, VC7, VC7 + 0.135);
-            let head = self.limb("head", line, front, PAPERS_HEAD.axes, Some((torso, vc7)), [false, true])?;
+        let (front, none, top) = (Vec3::X, [false; 2], [false, true]);
+        let [legs, arms, neck, skull] = if self.papers {
+            let torso = self.limb("torso", TORSO, upright(0.490, 0.835), front, None, none)?;
+            let head = self.limb("head", PAPERS_HEAD, upright(VC7, VC7 + 0.135), front, Some((torso, vc7)), top)?;
             [torso, torso, head, head]
         } else {
-            let hips = upright(build.pelvis, 0.485, WAIST);
-            let pelvis = self.limb("pelvis", hips, front, build.pelvis.axes, None, none)?;
+            let pelvis = self.limb("pelvis", build.pelvis, upright(0.485, WAIST), front, None, none)?;
             let spine = link("vl3", Vec3::Z * WAIST, 0.04, [[-0.5, 1.3], [-0.6, 0.6], [-0.8, 0.8]], 0.12);
-            let chest = upright(build.thorax, WAIST, 0.830);
-            let thorax = self.limb("thorax", chest, front, build.thorax.axes, Some((pelvis, spine)), none)?;
-            let line = upright(build.neck, 0.830, 0.910);
-            let neck = self.limb("neck", line, front, build.neck.axes, Some((thorax, vc7)), none)?;
+            let chest = upright(WAIST, 0.830);
+            let thorax = self.limb("thorax", build.thorax, chest, front, Some((pelvis, spine)), none)?;
+            let neck = self.limb("neck", build.neck, upright(0.830, 0.910), front, Some((thorax, vc7)), none)?;
             let limits = [[-0.6, 0.6], [-0.4, 0.4], [-0.8, 0.8]];
             let skullbase = link("skullbase", Vec3::new(base, 0.0, SKULLBASE), 0.015, limits, 0.10);
-            let line = upright(build.head, 0.880, 0.995);
-            let head = self.limb("head", line, front, build.head.axes, Some((neck, skullbase)), [false, true])?;
+            let head = self.limb("head", build.head, upright(0.880, 0.995), front, Some((neck, skullbase)), top)?;
             [pelvis, thorax, neck, head]
         };
         self.site("humanoid_root", legs, Vec3::new(build.root, 0.0, 0.535));
@@ -219,95 +220,72 @@ impl Builder {
         self.site("skullbase", skull, Vec3::new(base, 0.0, SKULLBASE));
         self.site("head_center", skull, Vec3::new(center, 0.0, 0.937));
         self.site("skull_tip", skull, Vec3::new(tip, 0.0, 0.997));
-        Ok((legs, arms))
+        Ok([legs, arms])
     }
 
-    fn arm(&mut self, model: HumanModel, prefix: &str, side: f64, thorax: usize) -> Result<(), BodyError> {
-        let named = |name: &str| format!("{prefix}_{name}");
-        let shoulder = Vec3::new(model.build().arm, side * SHOULDER[0], SHOULDER[1]);
+    fn arm(&mut self, thorax: usize) -> Result<(), BodyError> {
+        let (build, side) = (self.build, self.side);
+        let shoulder = self.aside([build.arm, SHOULDER[0], SHOULDER[1]]);
         let elbow = shoulder - Vec3::Z * UPPER_ARM;
         let wrist = elbow - Vec3::Z * FOREARM;
+        let carrier = if self.papers { thorax } else { self.clavicle(thorax)? };
         // The joint's y axis points backward: negative rotations about it raise the left arm sideways.
-        let shoulder_limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
-        let carrier = match model {
-            HumanModel::Papers => thorax,
-            HumanModel::Full | HumanModel::Measured => self.clavicle(model.build(), prefix, side, thorax)?,
-        };
-        let surface = model.build().upper_arm;
-        let upper = self.limb(
-            named("upperarm"),
-            surface.ends([shoulder + Vec3::Z * DELTOID, elbow], side),
-            Vec3::X,
-            surface.axes,
-            Some((carrier, joint(named("shoulder"), shoulder, hanging(), [0.0; 2], shoulder_limits, 0.35))),
-            [false; 2],
-        )?;
-        self.site(named("shoulder"), upper, shoulder);
-        let (end, caps) = match model {
-            // The ten-limb model has no hand: its forearm ends at the knuckles.
-            HumanModel::Papers => (wrist - Vec3::Z * KNUCKLES, [false, true]),
-            HumanModel::Full | HumanModel::Measured => (wrist, [false; 2]),
-        };
-        let link = joint(named("elbow"), elbow, hanging(), [0.02, 0.0], [[-0.1, 2.7], [0.0; 2], [0.0; 2]], 0.45);
-        let surface = model.build().forearm;
-        let line = surface.ends([elbow, end], side);
-        let forearm = self.limb(named("forearm"), line, Vec3::X, surface.axes, Some((upper, link)), caps)?;
-        let last = match model {
-            HumanModel::Papers => forearm,
-            HumanModel::Full | HumanModel::Measured => {
-                let limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
-                let link = joint(named("wrist"), wrist, hanging(), [0.012; 2], limits, 0.3);
-                let line = [wrist, wrist - Vec3::Z * HAND];
-                self.limb(named("hand"), line, Vec3::X, HAND_AXES, Some((forearm, link)), [false, true])?
-            }
-        };
-        self.site(named("elbow"), forearm, elbow);
-        self.site(named("wrist"), last, wrist);
-        self.site(named("hand"), last, wrist - Vec3::Z * HAND_CENTER);
+        let limits = [[-1.2, 3.2], mirrored([-3.2, 0.8], side), mirrored([-1.6, 1.6], side)];
+        let link = joint(self.named("shoulder"), shoulder, hanging(), [0.0; 2], limits, 0.35);
+        let line = [shoulder + Vec3::Z * DELTOID, elbow];
+        let upper = self.limb("upperarm", build.upper_arm, line, Vec3::X, Some((carrier, link)), [false; 2])?;
+        self.site("shoulder", upper, shoulder);
+        // Without a hand, the forearm ends at the knuckles.
+        let end = if self.papers { wrist - Vec3::Z * KNUCKLES } else { wrist };
+        let (line, caps) = ([elbow, end], [false, self.papers]);
+        let link = joint(self.named("elbow"), elbow, hanging(), [0.02, 0.0], [[-0.1, 2.7], [0.0; 2], [0.0; 2]], 0.45);
+        let forearm = self.limb("forearm", build.forearm, line, Vec3::X, Some((upper, link)), caps)?;
+        let mut last = forearm;
+        if !self.papers {
+            let limits = [[-1.2, 1.2], [-0.5, 0.5], [-1.5, 1.5]];
+            let link = joint(self.named("wrist"), wrist, hanging(), [0.012; 2], limits, 0.3);
+            let line = [wrist, wrist - Vec3::Z * HAND];
+            last = self.limb("hand", HAND_SURFACE, line, Vec3::X, Some((forearm, link)), [false, true])?;
+        }
+        self.site("elbow", forearm, elbow);
+        self.site("wrist", last, wrist);
+        self.site("hand", last, wrist - Vec3::Z * HAND_CENTER);
         Ok(())
     }
 
     /// Adds a clavicle. It carries the arm and moves slightly on the chest: a raised arm raises its shoulder.
-    fn clavicle(&mut self, build: &Build, prefix: &str, side: f64, thorax: usize) -> Result<usize, BodyError> {
-        let [x, y, z] = STERNOCLAVICULAR;
+    fn clavicle(&mut self, thorax: usize) -> Result<usize, BodyError> {
         // The joint's x axis points forward: positive rotations about it raise the left shoulder.
-        let limits = [mirrored([-0.15, 0.70], side), [-0.1, 0.1], [-0.4, 0.4]];
-        let (name, center) = (format!("{prefix}_sternoclavicular"), Vec3::new(x, side * y, z));
+        let limits = [mirrored([-0.15, 0.70], self.side), [-0.1, 0.1], [-0.4, 0.4]];
+        let (name, center) = (self.named("sternoclavicular"), self.aside(STERNOCLAVICULAR));
         let link = joint(name, center, [Vec3::X, Vec3::Z], [0.0; 2], limits, 0.015);
-        let line = build.slope.map(|[x, y, z]| Vec3::new(x, side * y, z));
-        self.limb(format!("{prefix}_clavicle"), line, Vec3::Z, build.clavicle.axes, Some((thorax, link)), [false; 2])
+        let line = self.build.slope.map(|place| self.aside(place));
+        self.limb("clavicle", self.build.clavicle, line, Vec3::Z, Some((thorax, link)), [false; 2])
     }
 
-    fn leg(&mut self, model: HumanModel, prefix: &str, side: f64, pelvis: usize) -> Result<(), BodyError> {
-        let named = |name: &str| format!("{prefix}_{name}");
-        let hip = Vec3::new(0.0, side * HIP[0], HIP[1]);
+    fn leg(&mut self, pelvis: usize) -> Result<(), BodyError> {
+        let (build, side) = (self.build, self.side);
+        let hip = self.aside([0.0, HIP[0], HIP[1]]);
         let knee = Vec3::new(0.0, hip.y, KNEE);
         let ankle = Vec3::new(0.0, hip.y, ANKLE);
-        let hip_limits = [[-0.6, 2.3], mirrored([-1.0, 0.5], side), mirrored([-0.8, 0.8], side)];
-        let link = joint(named("hip"), hip, hanging(), [0.02, 0.005], hip_limits, 0.25);
-        let surface = model.build().thigh;
-        let line = surface.ends([hip, knee], side);
-        let thigh = self.limb(named("thigh"), line, Vec3::X, surface.axes, Some((pelvis, link)), [false; 2])?;
+        let limits = [[-0.6, 2.3], mirrored([-1.0, 0.5], side), mirrored([-0.8, 0.8], side)];
+        let link = joint(self.named("hip"), hip, hanging(), [0.02, 0.005], limits, 0.25);
+        let thigh = self.limb("thigh", build.thigh, [hip, knee], Vec3::X, Some((pelvis, link)), [false; 2])?;
+        self.site("hip", thigh, hip);
         // A hanging calf bends backward, which is a rotation about the axis to the left.
-        let knee_limits = [[-0.1, 2.6], [0.0; 2], [0.0; 2]];
-        let link = joint(named("knee"), knee, [Vec3::Y, -Vec3::Z], [0.028, 0.0], knee_limits, 0.30);
-        self.site(named("hip"), thigh, hip);
-        let (end, caps) = match model {
-            HumanModel::Papers => (knee - Vec3::Z * KNEE, [false, true]),
-            HumanModel::Full | HumanModel::Measured => (ankle, [false; 2]),
-        };
-        let surface = model.build().calf;
-        let line = surface.ends([knee, end], side);
-        let calf = self.limb(named("calf"), line, Vec3::X, surface.axes, Some((thigh, link)), caps)?;
-        self.site(named("knee"), calf, knee);
-        self.site(named("ankle"), calf, ankle);
-        if model != HumanModel::Papers {
-            let [heel, toe] = model.build().foot;
+        let limits = [[-0.1, 2.6], [0.0; 2], [0.0; 2]];
+        let link = joint(self.named("knee"), knee, [Vec3::Y, -Vec3::Z], [0.028, 0.0], limits, 0.30);
+        let end = if self.papers { knee - Vec3::Z * KNEE } else { ankle };
+        let calf = self.limb("calf", build.calf, [knee, end], Vec3::X, Some((thigh, link)), [false, self.papers])?;
+        self.site("knee", calf, knee);
+        self.site("ankle", calf, ankle);
+        if !self.papers {
+            let [heel, toe] = build.foot;
             let line = [Vec3::new(-HEEL, hip.y, heel), Vec3::new(TOE, hip.y, toe)];
             let limits = [[-0.8, 0.6], [-0.4, 0.4], [-0.4, 0.4]];
-            let link = joint(named("ankle"), ankle, hanging(), [0.012; 2], limits, 0.20);
-            let foot = self.limb(named("foot"), line, Vec3::Z, FOOT_AXES, Some((calf, link)), [true, true])?;
-            self.site(named("toe"), foot, Vec3::new(TOE, hip.y, 0.012));
+            let link = joint(self.named("ankle"), ankle, hanging(), [0.012; 2], limits, 0.20);
+            let foot = self.limb("foot", FOOT_SURFACE, line, Vec3::Z, Some((calf, link)), [true, true])?;
+            self.site("toe", foot, Vec3::new(TOE, hip.y, 0.012));
         }
         Ok(())
     }
@@ -349,11 +327,15 @@ impl Body {
         if !(0.3..=3.0).contains(&stature) {
             return Err(BodyError::value("stature", "meters from 0.3 to 3.0", stature.to_string()));
         }
-        let mut builder = Builder::default();
-        let (legs, arms) = builder.trunk(model)?;
-        for (prefix, side) in [("l", 1.0), ("r", -1.0)] {
-            builder.arm(model, prefix, side, arms)?;
-            builder.leg(model, prefix, side, legs)?;
+        let papers = model == HumanModel::Papers;
+        let build = if model == HumanModel::Measured { &MEASURED } else { &ANSUR };
+        let (limbs, poses, sites) = Default::default();
+        let mut builder = Builder { papers, build, side: 0.0, prefix: "", limbs, poses, sites };
+        let [legs, arms] = builder.trunk()?;
+        for (prefix, side) in [("l_", 1.0), ("r_", -1.0)] {
+            (builder.prefix, builder.side) = (prefix, side);
+            builder.arm(arms)?;
+            builder.leg(legs)?;
         }
         Body::new("human", builder.limbs, builder.sites)?.scaled(stature)
     }

@@ -1,8 +1,10 @@
 //! The kinematic chain of a body: exact joints. The unknowns are the root's twist and the joint angles (R07 section 2.2).
 
+use std::ops::Range;
+
 use nalgebra::Vector6;
 
-use crate::body::{Body, Joint, JointKind};
+use crate::body::{Body, Joint, JointKind, Limb};
 use crate::math::{Pose, Quat, Vec3};
 
 /// Layout of the unknowns of all limbs' joints in the vector of unknowns; the root has six.
@@ -10,7 +12,7 @@ use crate::math::{Pose, Quat, Vec3};
 pub(crate) struct Chain {
     /// First unknown of each limb.
     pub start: Vec<usize>,
-    /// Number of unknowns of each limb: 6 for the root, 1 for a hinge, else 3.
+    /// Number of unknowns of each limb.
     pub count: Vec<usize>,
     /// Parent of each limb; the root is its own.
     pub parent: Vec<usize>,
@@ -25,22 +27,33 @@ impl Chain {
         self.count.clear();
         self.parent.clear();
         self.freedoms = 0;
-        for limb in body.limbs() {
-            let (parent, count) = match &limb.parent {
-                None => (0, 6),
-                Some((parent, joint)) => (*parent, freedoms(joint)),
-            };
+        for (index, limb) in body.limbs().iter().enumerate() {
+            let count = freedoms(limb);
             self.start.push(self.freedoms);
             self.count.push(count);
-            self.parent.push(parent);
+            self.parent.push(body.parent(index).unwrap_or(0));
             self.freedoms += count;
         }
     }
+
+    /// The unknowns of a limb.
+    pub(crate) fn unknowns(&self, limb: usize) -> Range<usize> {
+        self.start[limb]..self.start[limb] + self.count[limb]
+    }
+
+    /// The limb, its parent, and so on up to the root: the limbs whose unknowns move it.
+    pub(crate) fn up_from(&self, limb: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(limb), |limb| (*limb > 0).then(|| self.parent[*limb]))
+    }
 }
 
-/// Number of a joint's degrees of freedom: 1 for a hinge, else 3.
-pub(crate) fn freedoms(joint: &Joint) -> usize {
-    if joint.kind() == JointKind::Hinge { 1 } else { 3 }
+/// Number of a limb's degrees of freedom: 6 for the root, 1 for a limb at a hinge, else 3.
+pub(crate) fn freedoms(limb: &Limb) -> usize {
+    match limb.parent.as_ref().map(|(_, joint)| joint.kind()) {
+        None => 6,
+        Some(JointKind::Hinge) => 1,
+        Some(_) => 3,
+    }
 }
 
 /// Below this angle, radians, series replace quotients whose numerators lose all digits.

@@ -143,6 +143,12 @@ impl Body {
         first != second && !self.adjacent(first, second) && (own != other || own.is_none())
     }
 
+    /// Every joint with its limb and that limb's parent, parents first: limb, parent, joint.
+    pub(crate) fn joints(&self) -> impl DoubleEndedIterator<Item = (usize, usize, &Joint)> {
+        let limbs = self.limbs.iter().enumerate();
+        limbs.filter_map(|(limb, part)| part.parent.as_ref().map(|(parent, joint)| (limb, *parent, joint)))
+    }
+
     /// The children of a limb.
     pub fn children(&self, limb: usize) -> impl Iterator<Item = usize> + '_ {
         (0..self.limbs.len()).filter(move |other| self.parent(*other) == Some(limb))
@@ -198,10 +204,7 @@ impl Body {
         check_letters("name", &self.name)?;
         for (index, limb) in self.limbs.iter().enumerate() {
             let key = format!("limbs.{}", limb.name);
-            check_name(&key, &limb.name)?;
-            if self.limbs[..index].iter().any(|other| other.name == limb.name) {
-                return Err(BodyError::Duplicate { key, name: limb.name.clone() });
-            }
+            check_name(&key, &limb.name, self.limbs[..index].iter().map(|other| &other.name))?;
             match (&limb.parent, index) {
                 (None, 0) => {}
                 (Some((parent, joint)), 1..) if *parent < index => {
@@ -219,10 +222,7 @@ impl Body {
         }
         for (index, site) in self.sites.iter().enumerate() {
             let key = format!("sites.{}", site.name);
-            check_name(&key, &site.name)?;
-            if self.sites[..index].iter().any(|other| other.name == site.name) {
-                return Err(BodyError::Duplicate { key, name: site.name.clone() });
-            }
+            check_name(&key, &site.name, self.sites[..index].iter().map(|other| &other.name))?;
             if site.limb >= self.limbs.len() {
                 return wrong(&format!("{key}.limb"), "the index of a limb", &site.limb.to_string());
             }
@@ -235,11 +235,15 @@ impl Body {
     }
 }
 
-fn check_name(key: &str, name: &str) -> Result<(), BodyError> {
+fn check_name<'a>(key: &str, name: &str, mut before: impl Iterator<Item = &'a String>) -> Result<(), BodyError> {
     if name.is_empty() {
         return Err(BodyError::value(key, "a name", "an empty one"));
     }
-    check_letters(key, name)
+    check_letters(key, name)?;
+    if before.any(|known| known == name) {
+        return Err(BodyError::Duplicate { key: key.into(), name: name.into() });
+    }
+    Ok(())
 }
 
 /// Rejects characters that break file formats: tabs and line breaks separate table cells, braces delimit trees of bones.

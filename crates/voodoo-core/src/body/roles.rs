@@ -25,105 +25,93 @@ impl Side {
     }
 }
 
-/// A limb of the human; see [`Roles`] for an example.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LimbRole {
-    /// `pelvis`
-    Pelvis,
-    /// `thorax`; or `torso`, the whole trunk.
-    Thorax,
-    /// `neck`
-    Neck,
-    /// `head`
-    Head,
-    /// `l_clavicle`
-    Clavicle(Side),
-    /// `l_upperarm`
-    UpperArm(Side),
-    /// `l_forearm`
-    Forearm(Side),
-    /// `l_hand`
-    Hand(Side),
-    /// `l_thigh`
-    Thigh(Side),
-    /// `l_calf`
-    Calf(Side),
-    /// `l_foot`
-    Foot(Side),
+/// An enumeration of roles on the human, some of them once for each side, and its function `from_name`.
+macro_rules! roles {
+    ($(#[$doc:meta])* $visibility:vis enum $roles:ident {
+        $($(#[$note:meta])* $role:ident = $($name:literal)|+),+;
+        $($(#[$side_note:meta])* $side_role:ident(side) = $stem:literal),+;
+    }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        $visibility enum $roles {
+            $($(#[$note])* $role,)*
+            $($(#[$side_note])* $side_role(Side),)*
+        }
+
+        impl $roles {
+            pub(crate) fn from_name(name: &str) -> Option<Self> {
+                Some(match split(name) {
+                    $((None, $($name)|+) => Self::$role,)*
+                    $((Some(side), $stem) => Self::$side_role(side),)*
+                    _ => return None,
+                })
+            }
+        }
+    };
 }
 
-/// A joint of the human, or a site: that at a joint's center, or one of those that detectors report beside them (H-Anim names).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum JointRole {
-    /// `humanoid_root`
-    Root,
-    /// `vl3`
-    Waist,
-    /// `vc7`
-    NeckBase,
-    /// `skullbase`
-    SkullBase,
-    /// `head_center`
-    HeadCenter,
-    /// `l_sternoclavicular`
-    Sternoclavicular(Side),
-    /// `l_shoulder`
-    Shoulder(Side),
-    /// `l_elbow`
-    Elbow(Side),
-    /// `l_wrist`
-    Wrist(Side),
-    /// `l_hand`
-    Hand(Side),
-    /// `l_hip`
-    Hip(Side),
-    /// `l_knee`
-    Knee(Side),
-    /// `l_ankle`
-    Ankle(Side),
+roles! {
+    /// A limb of the human; see [`Roles`] for an example.
+    pub enum LimbRole {
+        /// `pelvis`
+        Pelvis = "pelvis",
+        /// `thorax`; or `torso`, the whole trunk.
+        Thorax = "thorax" | "torso",
+        /// `neck`
+        Neck = "neck",
+        /// `head`
+        Head = "head";
+        /// `l_clavicle`
+        Clavicle(side) = "clavicle",
+        /// `l_upperarm`
+        UpperArm(side) = "upperarm",
+        /// `l_forearm`
+        Forearm(side) = "forearm",
+        /// `l_hand`
+        Hand(side) = "hand",
+        /// `l_thigh`
+        Thigh(side) = "thigh",
+        /// `l_calf`
+        Calf(side) = "calf",
+        /// `l_foot`
+        Foot(side) = "foot";
+    }
 }
 
-impl LimbRole {
-    fn from_name(name: &str) -> Option<Self> {
-        let (side, stem) = split(name);
-        Some(match (stem, side) {
-            ("pelvis", None) => Self::Pelvis,
-            ("thorax" | "torso", None) => Self::Thorax,
-            ("neck", None) => Self::Neck,
-            ("head", None) => Self::Head,
-            ("clavicle", Some(side)) => Self::Clavicle(side),
-            ("upperarm", Some(side)) => Self::UpperArm(side),
-            ("forearm", Some(side)) => Self::Forearm(side),
-            ("hand", Some(side)) => Self::Hand(side),
-            ("thigh", Some(side)) => Self::Thigh(side),
-            ("calf", Some(side)) => Self::Calf(side),
-            ("foot", Some(side)) => Self::Foot(side),
-            _ => return None,
-        })
+roles! {
+    /// A joint of the human, or a site: that at a joint's center, or one of those that detectors report beside them (H-Anim
+    /// names).
+    pub(crate) enum JointRole {
+        /// The center of the hips.
+        Root = "humanoid_root",
+        /// Between pelvis and thorax.
+        Waist = "vl3",
+        /// Between thorax and neck.
+        NeckBase = "vc7",
+        /// Between neck and head.
+        SkullBase = "skullbase",
+        /// The center of the head.
+        HeadCenter = "head_center";
+        /// Between thorax and clavicle.
+        Sternoclavicular(side) = "sternoclavicular",
+        /// Between clavicle, or thorax, and upper arm.
+        Shoulder(side) = "shoulder",
+        /// Between upper arm and forearm.
+        Elbow(side) = "elbow",
+        /// Between forearm and hand.
+        Wrist(side) = "wrist",
+        /// The center of the hand.
+        Hand(side) = "hand",
+        /// Between pelvis and thigh.
+        Hip(side) = "hip",
+        /// Between thigh and calf.
+        Knee(side) = "knee",
+        /// Between calf and foot.
+        Ankle(side) = "ankle";
     }
 }
 
 impl JointRole {
-    pub(crate) fn from_name(name: &str) -> Option<Self> {
-        let (side, stem) = split(name);
-        Some(match (stem, side) {
-            ("humanoid_root", None) => Self::Root,
-            ("vl3", None) => Self::Waist,
-            ("vc7", None) => Self::NeckBase,
-            ("skullbase", None) => Self::SkullBase,
-            ("head_center", None) => Self::HeadCenter,
-            ("sternoclavicular", Some(side)) => Self::Sternoclavicular(side),
-            ("shoulder", Some(side)) => Self::Shoulder(side),
-            ("elbow", Some(side)) => Self::Elbow(side),
-            ("wrist", Some(side)) => Self::Wrist(side),
-            ("hand", Some(side)) => Self::Hand(side),
-            ("hip", Some(side)) => Self::Hip(side),
-            ("knee", Some(side)) => Self::Knee(side),
-            ("ankle", Some(side)) => Self::Ankle(side),
-            _ => return None,
-        })
-    }
-
     /// The preceding joint of the same arm or leg, and the resulting requirement for the body as a message.
     fn after(self) -> Option<(Self, &'static str)> {
         match self {

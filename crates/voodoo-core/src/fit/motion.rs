@@ -4,7 +4,7 @@
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
 use crate::body::shoulders::raise_shoulders;
-use crate::math::{Pose, Quat, Vec3, rotation_vector, shifted};
+use crate::math::{Pose, Vec3, extrapolated, extrapolated_rotation, shifted};
 
 /// Longest extrapolation of a motion, in multiples of the interval over which it was measured.
 const LONGEST_PREDICTION: f64 = 2.0;
@@ -126,17 +126,13 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
     predicted.clear();
     for (index, limb) in body.limbs().iter().enumerate() {
         let pose = match &limb.parent {
-            None => {
-                let (before, now) = (&previous[0], &current[0]);
-                let rotation = extrapolate(before.rotation, now.rotation, factor);
-                Pose::from_parts(now.translation + factor * (now.translation - before.translation), rotation)
-            }
+            None => extrapolated(&previous[0], &current[0], factor),
             Some((parent, joint)) => {
                 let before = joint_turn(joint, &previous[*parent], &previous[index]);
                 let now = joint_turn(joint, &current[*parent], &current[index]);
                 // A clavicle moves with its arm.
                 let factor = if body.roles().is_clavicle(index) { 0.0 } else { factor };
-                place(joint, &predicted[*parent], extrapolate(before, now, factor))
+                place(joint, &predicted[*parent], extrapolated_rotation(before, now, factor))
             }
         };
         predicted.push(Pose::from_parts(pose.translation, pose.rotation.normalize()));
@@ -144,15 +140,11 @@ fn predict(body: &Body, previous: &[Pose], current: &[Pose], factor: f64, predic
     raise_shoulders(body, previous, current, predicted);
 }
 
-fn extrapolate(before: Quat, now: Quat, factor: f64) -> Quat {
-    let motion = rotation_vector(now * before.inverse());
-    Quat::from_scaled_axis(factor * motion) * now
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::body::HumanModel;
+    use crate::math::Quat;
 
     const STEP: Vec3 = Vec3::new(0.03, -0.01, 0.02);
 

@@ -49,24 +49,15 @@ impl Moments {
         let stay = 1e-6 * self.weight * stay * stay;
         let s = |x: usize, p: usize| centerd.col(x)[p] + if x == p { stay } else { 0.0 };
         // Horn's symmetric matrix N; the eigenvector of its largest eigenvalue is the quaternion (w, x, y, z).
-        let n = Matrix4::new(
-            s(0, 0) + s(1, 1) + s(2, 2),
-            s(1, 2) - s(2, 1),
-            s(2, 0) - s(0, 2),
-            s(0, 1) - s(1, 0),
-            s(1, 2) - s(2, 1),
-            s(0, 0) - s(1, 1) - s(2, 2),
-            s(0, 1) + s(1, 0),
-            s(2, 0) + s(0, 2),
-            s(2, 0) - s(0, 2),
-            s(0, 1) + s(1, 0),
-            s(1, 1) - s(0, 0) - s(2, 2),
-            s(1, 2) + s(2, 1),
-            s(0, 1) - s(1, 0),
-            s(2, 0) + s(0, 2),
-            s(1, 2) + s(2, 1),
-            s(2, 2) - s(0, 0) - s(1, 1),
-        );
+        let [x, y, z] = [0, 1, 2].map(|axis| s(axis, axis));
+        let [yz, zx, xy] = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| s(a, b) + s(b, a));
+        let [rx, ry, rz] = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| s(a, b) - s(b, a));
+        let n = Matrix4::from([
+            [x + y + z, rx, ry, rz],
+            [rx, x - y - z, xy, zx],
+            [ry, xy, y - x - z, yz],
+            [rz, zx, yz, z - x - y],
+        ]);
         let eigen = SymmetricEigen::new(n);
         let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
         let rotation = Quat::from_xyzw(q[1], q[2], q[3], q[0]).normalize();

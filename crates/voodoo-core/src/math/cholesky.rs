@@ -1,6 +1,6 @@
 //! Dense Cholesky of a small symmetric system, in place and without heap allocation.
 
-use super::simd::widest;
+use super::simd::vectorized;
 
 /// Solves `h x = b` for the symmetric `h` (row-major, lower triangle given); `b` becomes `x`. Returns false, with `b` undefined,
 /// when `h` is not positive definite.
@@ -9,32 +9,18 @@ use super::simd::widest;
 /// (Featherstone, "Rigid Body Dynamics Algorithms", 2008, section 6.5), so entries between unknowns on different branches stay
 /// zero and are skipped.
 pub fn solve_in_place(h: &mut [f64], b: &mut [f64], n: usize) -> bool {
-    factor(h, n) && substitute(h, b, n)
+    factor(h, n) && vectorized!(substitute_lanes(h, b, n))
 }
 
 /// The first half of [`solve_in_place`], to be used with several right-hand sides: `h` becomes `L`.
 pub(crate) fn factor(h: &mut [f64], n: usize) -> bool {
-    widest(
-        #[inline(always)]
-        || factor_lanes(h, n),
-    )
+    vectorized!(factor_lanes(h, n))
 }
 
 /// The first of the two substitutions, for every right-hand side: `b` becomes `y` with `L^T y = b`, where `l` is the result of
 /// [`factor`]. For two right-hand sides, `y_1^T y_2 = b_1^T h^-1 b_2`.
 pub(crate) fn half_substitute(l: &[f64], b: &mut [f64], n: usize) {
-    widest(
-        #[inline(always)]
-        || half_substitute_lanes(l, b, n),
-    );
-}
-
-/// The second half of [`solve_in_place`]: `l` is the result of [`factor`].
-fn substitute(l: &[f64], b: &mut [f64], n: usize) -> bool {
-    widest(
-        #[inline(always)]
-        || substitute_lanes(l, b, n),
-    )
+    vectorized!(half_substitute_lanes(l, b, n));
 }
 
 #[inline(always)]
@@ -73,6 +59,7 @@ fn half_substitute_lanes(l: &[f64], b: &mut [f64], n: usize) {
     }
 }
 
+/// The second half of [`solve_in_place`]: `h` is the result of [`factor`].
 #[inline(always)]
 fn substitute_lanes(h: &[f64], b: &mut [f64], n: usize) -> bool {
     half_substitute_lanes(h, b, n);

@@ -259,6 +259,18 @@ pub fn rotation_vector(rotation: Quat) -> Vec3 {
     if sine < 1e-9 { 2.0 * v } else { v * (2.0 * sine.atan2(q.w) / sine) }
 }
 
+/// The rotation after `now`, by a multiple of the rotation from `before` to `now`.
+pub(crate) fn extrapolated_rotation(before: Quat, now: Quat, factor: f64) -> Quat {
+    let motion = rotation_vector(now * before.inverse());
+    Quat::from_scaled_axis(factor * motion) * now
+}
+
+/// The pose after `now`, by a multiple of the motion from `before` to `now`.
+pub(crate) fn extrapolated(before: &Pose, now: &Pose, factor: f64) -> Pose {
+    let translation = now.translation + factor * (now.translation - before.translation);
+    Pose::from_parts(translation, extrapolated_rotation(before.rotation, now.rotation, factor))
+}
+
 /// The transform into the working frame, whose origin is `origin` in the world.
 pub(crate) fn shifted(world_from_sensor: &Pose, origin: Vec3) -> Pose {
     Pose::from_parts(world_from_sensor.translation - origin, world_from_sensor.rotation)

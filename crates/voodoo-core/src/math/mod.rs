@@ -14,7 +14,10 @@ pub(crate) use cholesky::{factor, half_substitute};
 pub use geometry::*;
 pub use linear_sum_assignment::linear_sum_assignment;
 pub use rotations::{euler_angles, is_skewed, quaternion};
+#[cfg(all(test, target_arch = "x86_64"))]
+pub(crate) use simd::compiled;
 pub use simd::{LANES, has_avx512, load, store, widest};
+pub(crate) use simd::{vectorized, widest_fused};
 pub(crate) use weighted_points::WeightedPoints;
 
 /// The cubic that rises smoothly from 0 at `at = 0` to 1 at `at = 1`, and is constant outside.
@@ -22,6 +25,19 @@ pub(crate) use weighted_points::WeightedPoints;
 pub(crate) fn smooth_step(at: f64) -> f64 {
     let at = at.clamp(0.0, 1.0);
     at * at * (3.0 - 2.0 * at)
+}
+
+/// Makes `values` a number of copies of a value. Their memory is kept.
+pub fn reset<T: Clone>(values: &mut Vec<T>, len: usize, value: T) {
+    values.clear();
+    values.resize(len, value);
+}
+
+/// Replaces `values` by others. Their memory is kept.
+#[inline(always)]
+pub fn refill<T>(values: &mut Vec<T>, others: impl IntoIterator<Item = T>) {
+    values.clear();
+    values.extend(others);
 }
 
 /// The dot product of two rows.

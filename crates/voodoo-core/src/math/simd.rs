@@ -1,4 +1,5 @@
 //! Run-time choice of instruction set for loops that the compiler vectorizes.
+#![allow(unsafe_code, reason = "a function compiled for an instruction set is called where the processor has it")]
 
 /// Number of single-precision values in one AVX2 register.
 pub const LANES: usize = 8;
@@ -21,39 +22,53 @@ pub fn store<T: Copy, const N: usize>(to: &mut [T], from: &[T; N]) {
     }
 }
 
-/// Runs `work`, compiled for AVX-512 or AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`.
+/// The value of an expression that is compiled for an instruction set, which the processor must have.
+#[cfg(target_arch = "x86_64")]
+macro_rules! compiled {
+    ($features:tt, $work:expr) => {{
+        #[target_feature(enable = $features)]
+        fn compiled<R>(work: impl FnOnce() -> R) -> R {
+            work()
+        }
+        // SAFETY: `compiled` is safe code that only needs these features, and this processor was found to have them.
+        unsafe {
+            compiled(
+                #[inline(always)]
+                || $work,
+            )
+        }
+    }};
+}
+
+/// Runs `work`, compiled for AVX-512 or AVX2 where this processor has it; write `widest(#[inline(always)] || ...)`, which is
+/// `vectorized!(...)` in this crate.
 ///
 /// Fused multiply-add is disabled on purpose: without it the result is bit-identical on every processor.
 #[inline(always)]
 pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-        fn wider<R>(work: impl FnOnce() -> R) -> R {
-            work()
-        }
-        #[target_feature(enable = "avx2")]
-        fn wide<R>(work: impl FnOnce() -> R) -> R {
-            work()
-        }
-        if has_avx512() {
-            // SAFETY: `wider` is safe code that only needs these parts of AVX-512, and this processor was found to have them.
-            #[allow(
-                unsafe_code,
-                reason = "a function compiled for an instruction set is called where the processor has it"
-            )]
-            return unsafe { wider(work) };
-        }
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: `wide` is safe code that only needs AVX2, and this processor was found to have it.
-            #[allow(
-                unsafe_code,
-                reason = "a function compiled for an instruction set is called where the processor has it"
-            )]
-            return unsafe { wide(work) };
-        }
+    if has_avx512() {
+        return compiled!("avx512f,avx512bw,avx512dq,avx512vl", work());
+    } else if std::arch::is_x86_feature_detected!("avx2") {
+        return compiled!("avx2", work());
     }
     work()
+}
+
+/// Runs `fused` as [`widest`] does, with fused multiply-add; `plain` where this processor has no such registers.
+#[inline(always)]
+pub(crate) fn widest_fused<A>(argument: A, plain: impl FnOnce(A), fused: impl FnOnce(A)) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("fma") {
+        if has_avx512() {
+            return compiled!("avx512f,avx512bw,avx512dq,avx512vl,fma", fused(argument));
+        } else if std::arch::is_x86_feature_detected!("avx2") {
+            return compiled!("avx2,fma", fused(argument));
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    drop(fused);
+    plain(argument);
 }
 
 /// Whether this processor has the parts of AVX-512 that are used (all processors with AVX-512 do, except Xeon Phi). The detection
@@ -66,3 +81,16 @@ pub fn has_avx512() -> bool {
         && std::arch::is_x86_feature_detected!("avx512dq")
         && std::arch::is_x86_feature_detected!("avx512vl")
 }
+
+/// The value of an expression, computed by [`widest`].
+macro_rules! vectorized {
+    ($work:expr) => {
+        $crate::math::widest(
+            #[inline(always)]
+            || $work,
+        )
+    };
+}
+#[cfg(all(test, target_arch = "x86_64"))]
+pub(crate) use compiled;
+pub(crate) use vectorized;

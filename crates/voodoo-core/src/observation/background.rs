@@ -1,6 +1,6 @@
 //! The static scene behind the body, learned from the depth images of each camera.
 
-use crate::math::Pose;
+use crate::math::{Pose, refill};
 use crate::observation::frame::{DepthImage, Frame};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
@@ -90,8 +90,7 @@ impl Backgrounds {
         let is_others = |owner: &u16| ownership.is_others(*owner);
         self.others.resize_with(ownership.cloud_owners.len(), Vec::new);
         for (others, owners) in self.others.iter_mut().zip(ownership.cloud_owners) {
-            others.clear();
-            others.extend(owners.iter().map(is_others));
+            refill(others, owners.iter().map(is_others));
         }
         if frame.images.is_empty() {
             return;

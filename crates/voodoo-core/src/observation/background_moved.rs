@@ -3,7 +3,7 @@
 use super::background::{Background, Backgrounds, pose_difference};
 use super::candidates::columns_f32;
 use super::frame::{DepthImage, Frame};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, reset};
 
 /// A camera that moved by more than this between two images counts as a different camera: meters, and radians.
 const LEAPS: (f64, f64) = (0.5, 0.5);
@@ -48,8 +48,7 @@ impl Backgrounds {
 impl Background {
     /// Resets all depths of this image to unknown.
     fn forget(&mut self, image: &DepthImage) {
-        self.depth.clear();
-        self.depth.resize(image.pixels.len(), 0.0);
+        reset(&mut self.depth, image.pixels.len(), 0.0);
         self.rays.clear();
     }
 

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::config::Config;
-use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, widest};
+use crate::math::{Aabb, Mat3, Points, Pose, Vec3, shifted, vectorized};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::clusters::Clusters;
 use crate::observation::frame::{Cloud, DepthImage, Frame, Scope};
@@ -200,22 +200,19 @@ impl Candidates {
         let grid = Grid::new(VISIBLE_AREA / patch / max_points as f64);
         let weight = image.weight * patch * (grid.rows * grid.columns) as f64 / REFERENCE_PATCH;
         let stride = grid.columns;
-        widest(
-            #[inline(always)]
-            || {
-                // The grid is fixed to the image: a box that moves takes the same pixels.
-                for row in (rows.start.next_multiple_of(grid.rows)..rows.end).step_by(grid.rows) {
-                    let offset = grid.offset(row);
-                    let first = (columns.start + stride - offset).next_multiple_of(stride) - stride + offset;
-                    for start in (first..columns.end).step_by(STRETCH * stride) {
-                        let stretch = Stretch::load(image, background, row, start, columns.end, stride);
-                        if stretch.returned() {
-                            stretch.gather(&m, gate, points);
-                        }
+        vectorized!({
+            // The grid is fixed to the image: a box that moves takes the same pixels.
+            for row in (rows.start.next_multiple_of(grid.rows)..rows.end).step_by(grid.rows) {
+                let offset = grid.offset(row);
+                let first = (columns.start + stride - offset).next_multiple_of(stride) - stride + offset;
+                for start in (first..columns.end).step_by(STRETCH * stride) {
+                    let stretch = Stretch::load(image, background, row, start, columns.end, stride);
+                    if stretch.returned() {
+                        stretch.gather(&m, gate, points);
                     }
                 }
-            },
-        );
+            }
+        });
         let count = self.points.len();
         self.weight.resize(count, weight as f32);
         self.limb.resize(count, ANY_LIMB);

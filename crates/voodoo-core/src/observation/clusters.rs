@@ -1,6 +1,6 @@
 //! Groups neighboring candidates into clusters, so that a test can be made once for a whole cluster.
 
-use crate::math::{LANES, Points, widest};
+use crate::math::{LANES, Points, reset, vectorized};
 
 /// Points per cluster: a whole number of SIMD lanes.
 pub(crate) const CLUSTER: usize = 32;
@@ -52,19 +52,14 @@ pub(crate) struct Cluster<'a> {
 impl Clusters {
     /// Sorts points into clusters.
     pub(crate) fn arrange(&mut self, points: &Points) {
-        self.order.clear();
-        self.order.resize(points.len(), 0);
+        reset(&mut self.order, points.len(), 0);
         self.bounds.clear();
         self.points.clear();
         if points.is_empty() {
             return;
         }
-        widest(
-            #[inline(always)]
-            || self.find_cells(points),
-        );
-        self.next.clear();
-        self.next.resize(CELLS * CELLS * CELLS, 0);
+        vectorized!(self.find_cells(points));
+        reset(&mut self.next, CELLS * CELLS * CELLS, 0);
         for cell in &self.cells {
             self.next[*cell as usize] += 1;
         }
@@ -85,10 +80,7 @@ impl Clusters {
             to.extend(self.order.iter().map(|index| from[*index as usize]));
             to.extend(std::iter::repeat_n(from[last as usize], padding));
         }
-        widest(
-            #[inline(always)]
-            || self.find_bounds(),
-        );
+        vectorized!(self.find_bounds());
     }
 
     /// The cell of every point. Cells are numbered layer by layer, and back and forth in each layer, so that consecutive cells
@@ -96,8 +88,7 @@ impl Clusters {
     #[inline(always)]
     fn find_cells(&mut self, points: &Points) {
         let (x, y, z) = (CellAxis::new(&points.x), CellAxis::new(&points.y), CellAxis::new(&points.z));
-        self.cells.clear();
-        self.cells.resize(points.len(), 0);
+        reset(&mut self.cells, points.len(), 0);
         let back = |turn: u32| (turn & 1) * LAST;
         let (xs, ys, zs) =
             (&points.x[..self.cells.len()], &points.y[..self.cells.len()], &points.z[..self.cells.len()]);

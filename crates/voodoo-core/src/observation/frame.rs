@@ -3,7 +3,7 @@
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{Aabb, FARTHEST, Pose, Vec3, is_place, is_rigid};
+use crate::math::{Aabb, Pose, Vec3, is_place, is_rigid};
 use crate::observation::picture::ColorImage;
 
 /// Three-dimensional points in the caller's memory layout, in meters.
@@ -322,6 +322,17 @@ pub struct Frame<'a> {
     pub excluded: &'a [Aabb],
 }
 
+/// Functions that return a frame with another part.
+macro_rules! with_parts {
+    ($($(#[$doc:meta])* $with:ident($part:ident: $type:ty);)*) => {$(
+        $(#[$doc])*
+        #[must_use]
+        pub fn $with(self, $part: $type) -> Self {
+            Self { $part, ..self }
+        }
+    )*};
+}
+
 impl<'a> Frame<'a> {
     /// A frame without measurements.
     pub fn empty(stamp: f64) -> Self {
@@ -329,40 +340,21 @@ impl<'a> Frame<'a> {
         Self { stamp, clouds: &[], images: &[], colors: &[], positions, rays, detections, ground: None, excluded: &[] }
     }
 
-    /// The frame with these 3-D points.
-    #[must_use]
-    pub fn with_clouds(self, clouds: &'a [Cloud<'a>]) -> Self {
-        Self { clouds, ..self }
-    }
-
-    /// The frame with these depth images.
-    #[must_use]
-    pub fn with_images(self, images: &'a [DepthImage<'a>]) -> Self {
-        Self { images, ..self }
-    }
-
-    /// The frame with these color images.
-    #[must_use]
-    pub fn with_colors(self, colors: &'a [ColorImage<'a>]) -> Self {
-        Self { colors, ..self }
-    }
-
-    /// The frame with these site positions.
-    #[must_use]
-    pub fn with_positions(self, positions: &'a [PositionRelation]) -> Self {
-        Self { positions, ..self }
-    }
-
-    /// The frame with these site rays.
-    #[must_use]
-    pub fn with_rays(self, rays: &'a [RayRelation]) -> Self {
-        Self { rays, ..self }
-    }
-
-    /// The frame with these detected persons.
-    #[must_use]
-    pub fn with_detections(self, detections: &'a [DetectedPerson<'a>]) -> Self {
-        Self { detections, ..self }
+    with_parts! {
+        /// The frame with these 3-D points.
+        with_clouds(clouds: &'a [Cloud<'a>]);
+        /// The frame with these depth images.
+        with_images(images: &'a [DepthImage<'a>]);
+        /// The frame with these color images.
+        with_colors(colors: &'a [ColorImage<'a>]);
+        /// The frame with these site positions.
+        with_positions(positions: &'a [PositionRelation]);
+        /// The frame with these site rays.
+        with_rays(rays: &'a [RayRelation]);
+        /// The frame with these detected persons.
+        with_detections(detections: &'a [DetectedPerson<'a>]);
+        /// The frame with these boxes of the world whose points belong to no person.
+        with_excluded(excluded: &'a [Aabb]);
     }
 
     /// The frame with this ground plane, or without one.
@@ -371,20 +363,13 @@ impl<'a> Frame<'a> {
         Self { ground: ground.into(), ..self }
     }
 
-    /// The frame with these boxes of the world whose points belong to no person.
-    #[must_use]
-    pub fn with_excluded(self, excluded: &'a [Aabb]) -> Self {
-        Self { excluded, ..self }
-    }
-
     /// Returns an error for unusable input, before any of it reaches the tracker's state.
     ///
     /// Depth images and point clouds may hold NaN only where the sensor had no return. In a depth image it counts as "no
     /// return"; in a cloud it is an error (drop such rows before).
     pub fn check(&self, body: &Body, previous_stamp: Option<f64>) -> Result<(), TrackError> {
-        if !self.stamp.is_finite() {
-            return Err(TrackError::measurement("stamp", "a finite time in seconds", self.stamp.to_string()));
-        }
+        let stamp = || self.stamp.to_string();
+        TrackError::unless(self.stamp.is_finite(), || "stamp".into(), "a finite time in seconds", stamp)?;
         if let Some(previous) = previous_stamp.filter(|previous| *previous >= self.stamp) {
             return Err(TrackError::TimeBackwards { previous, found: self.stamp });
         }
@@ -392,18 +377,10 @@ impl<'a> Frame<'a> {
             let what = |part: &str| format!("points[{index}].{part}");
             check_weight(|| what("weight"), cloud.weight)?;
             check_pose(|| what("world_from_sensor"), &cloud.world_from_sensor)?;
-            if let Scope::Limb(limb) = cloud.scope
-                && limb >= body.limbs().len()
-            {
-                return Err(TrackError::measurement(what("limb"), "the index of a limb", limb.to_string()));
+            if let Scope::Limb(limb) = cloud.scope {
+                check_index(|| what("limb"), "the index of a limb", limb, body.limbs().len())?;
             }
-            let bad = match cloud.points {
-                PointSlice::F32(points) => {
-                    points.iter().position(|p| !p.iter().all(|value| f64::from(*value).abs() <= FARTHEST))
-                }
-                PointSlice::F64(points) => points.iter().position(|p| !p.iter().all(|value| value.abs() <= FARTHEST)),
-            };
-            if let Some(row) = bad {
+            if let Some(row) = (0..cloud.points.len()).find(|row| !is_place(cloud.points.get(*row))) {
                 let found = format!("{:?} in row {row}", cloud.points.get(row).to_array());
                 return Err(TrackError::measurement(what("points"), "finite meters, 1e9 at most", found));
             }
@@ -421,90 +398,82 @@ impl<'a> Frame<'a> {
             for (number, relation) in detection.positions.iter().enumerate() {
                 check_position(|| format!("detections[{index}].positions[{number}]"), relation, body)?;
             }
-            if detection.person.is_nan() {
-                return Err(TrackError::measurement(format!("detections[{index}].person"), "log odds", "NaN"));
-            }
+            let what = || format!("detections[{index}].person");
+            TrackError::unless(!detection.person.is_nan(), what, "log odds", || "NaN".into())?;
         }
         for (index, relation) in self.rays.iter().enumerate() {
             let what = |part: &str| format!("rays[{index}].{part}");
-            check_site(|| what("site"), relation.site, body)?;
+            check_index(|| what("site"), "the index of a site", relation.site, body.sites().len())?;
             check_weight(|| what("weight"), relation.weight)?;
             check_bias(|| what("bias"), relation.bias)?;
             check_vector(|| what("origin"), relation.origin)?;
             check_vector(|| what("direction"), relation.direction)?;
-            let (known, found) =
-                (relation.direction.length() >= 1e-9, || format!("{:?}", relation.direction.to_array()));
-            require(known, || what("direction"), "a vector that is not zero", found)?;
+            let found = || format!("{:?}", relation.direction.to_array());
+            let known = relation.direction.length() >= 1e-9;
+            TrackError::unless(known, || what("direction"), "a vector that is not zero", found)?;
         }
         self.check_scene()
     }
 
     /// Rejects invalid ground planes and boxes.
     fn check_scene(&self) -> Result<(), TrackError> {
-        if let Some(ground) = self.ground
-            && (!ground.offset.is_finite() || !ground.normal.is_normalized())
-        {
-            let found = format!("normal {:?} and offset {}", ground.normal.to_array(), ground.offset);
-            return Err(TrackError::measurement("ground", "a unit normal and a finite offset", found));
+        if let Some(Ground { normal, offset }) = self.ground {
+            let valid = offset.is_finite() && normal.is_normalized();
+            let found = || format!("normal {:?} and offset {offset}", normal.to_array());
+            TrackError::unless(valid, || "ground".into(), "a unit normal and a finite offset", found)?;
         }
-        for (index, bounds) in self.excluded.iter().enumerate() {
-            let (low, high) = (bounds.mins, bounds.maxs);
-            if !(low.is_finite() && high.is_finite() && low.cmple(high).all()) {
-                let found = format!("{:?} to {:?}", low.to_array(), high.to_array());
-                return Err(TrackError::measurement(format!("excluded[{index}]"), "a low and a high corner", found));
-            }
+        for (index, Aabb { mins, maxs }) in self.excluded.iter().enumerate() {
+            let valid = mins.is_finite() && maxs.is_finite() && mins.cmple(*maxs).all();
+            let found = || format!("{:?} to {:?}", mins.to_array(), maxs.to_array());
+            TrackError::unless(valid, || format!("excluded[{index}]"), "a low and a high corner", found)?;
         }
         Ok(())
     }
 }
 
 fn check_image(index: usize, image: &DepthImage) -> Result<(), TrackError> {
-    let wrong = |part: &str, expected, found: String| {
-        Err(TrackError::measurement(format!("depth[{index}].{part}"), expected, found))
-    };
-    if image.pixels.len() != image.camera.pixels() {
-        let found = format!("{} for {}x{}", image.pixels.len(), image.camera.width(), image.camera.height());
-        return wrong("image", "all pixels of the camera", found);
-    }
-    if !(image.meters_per_unit > 0.0 && image.meters_per_unit.is_finite()) {
-        return wrong("meters_per_unit", "a finite length above zero", image.meters_per_unit.to_string());
-    }
-    check_weight(|| format!("depth[{index}].weight"), image.weight)?;
-    check_pose(|| format!("depth[{index}].world_from_sensor"), &image.world_from_sensor)
+    let (what, unit) = (|part: &str| format!("depth[{index}].{part}"), image.meters_per_unit);
+    check_size(|| what("image"), image.pixels.len(), image.camera)?;
+    let expected = "a finite length above zero";
+    TrackError::unless(unit > 0.0 && unit.is_finite(), || what("meters_per_unit"), expected, || unit.to_string())?;
+    check_weight(|| what("weight"), image.weight)?;
+    check_pose(|| what("world_from_sensor"), &image.world_from_sensor)
+}
+
+/// Rejects an image that has not a value for every pixel of its camera.
+pub(super) fn check_size(what: impl FnOnce() -> String, pixels: usize, camera: &Camera) -> Result<(), TrackError> {
+    let found = || format!("{pixels} for {}x{}", camera.width(), camera.height());
+    TrackError::unless(pixels == camera.pixels(), what, "all pixels of the camera", found)
 }
 
 fn check_position(what: impl Fn() -> String, relation: &PositionRelation, body: &Body) -> Result<(), TrackError> {
-    check_site(|| what() + ".site", relation.site, body)?;
+    check_index(|| what() + ".site", "the index of a site", relation.site, body.sites().len())?;
     check_weight(|| what() + ".weight", relation.weight)?;
     check_bias(|| what() + ".bias", relation.bias)?;
     check_vector(|| what() + ".position", relation.position)
 }
 
-fn check_site(what: impl FnOnce() -> String, site: usize, body: &Body) -> Result<(), TrackError> {
-    require(site < body.sites().len(), what, "the index of a site", || site.to_string())
+fn check_index(
+    what: impl FnOnce() -> String,
+    expected: &'static str,
+    index: usize,
+    count: usize,
+) -> Result<(), TrackError> {
+    TrackError::unless(index < count, what, expected, || index.to_string())
 }
 
 fn check_weight(what: impl FnOnce() -> String, weight: f64) -> Result<(), TrackError> {
-    require(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", || weight.to_string())
+    TrackError::unless(weight.is_finite() && weight > 0.0, what, "a finite weight above zero", || weight.to_string())
 }
 
 fn check_bias(what: impl FnOnce() -> String, bias: f64) -> Result<(), TrackError> {
-    require(bias.is_finite() && bias >= 0.0, what, "a finite length, zero or above", || bias.to_string())
+    TrackError::unless(bias.is_finite() && bias >= 0.0, what, "a finite length, zero or above", || bias.to_string())
 }
 
 fn check_vector(what: impl FnOnce() -> String, vector: Vec3) -> Result<(), TrackError> {
-    require(is_place(vector), what, "finite meters, 1e9 at most", || format!("{:?}", vector.to_array()))
+    TrackError::unless(is_place(vector), what, "finite meters, 1e9 at most", || format!("{:?}", vector.to_array()))
 }
 
-fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
-    require(is_rigid(pose), what, "a rigid transform", || format!("{pose:?}"))
-}
-
-fn require(
-    valid: bool,
-    what: impl FnOnce() -> String,
-    expected: &'static str,
-    found: impl FnOnce() -> String,
-) -> Result<(), TrackError> {
-    if valid { Ok(()) } else { Err(TrackError::measurement(what(), expected, found())) }
+pub(crate) fn check_pose(what: impl FnOnce() -> String, pose: &Pose) -> Result<(), TrackError> {
+    TrackError::unless(is_rigid(pose), what, "a rigid transform", || format!("{pose:?}"))
 }

@@ -2,7 +2,8 @@
 
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{Pose, is_rigid};
+use crate::math::Pose;
+use crate::observation::frame::{check_pose, check_size};
 
 /// Maximum time between an image and its frame, seconds: beyond it, the pose at the image's time is unknown.
 const LONGEST_ASIDE: f64 = 0.25;
@@ -84,23 +85,12 @@ pub struct ColorImage<'a> {
 impl ColorImage<'_> {
     /// Returns an error for an unusable image; `index` is its index in a frame with this `stamp`, after `others`.
     pub(super) fn check(&self, index: usize, stamp: f64, others: &[Self]) -> Result<(), TrackError> {
-        let wrong = |part: &str, expected, found: String| {
-            Err(TrackError::measurement(format!("color[{index}].{part}"), expected, found))
-        };
-        let aside = (self.stamp - stamp).abs();
-        if !(aside <= LONGEST_ASIDE) {
-            return wrong("stamp", "a time within 0.25 s of the frame's", self.stamp.to_string());
-        }
-        if self.pixels.len() != self.camera.pixels() {
-            let found = format!("{} for {}x{}", self.pixels.len(), self.camera.width(), self.camera.height());
-            return wrong("image", "all pixels of the camera", found);
-        }
-        if !is_rigid(&self.world_from_sensor) {
-            return wrong("world_from_sensor", "a rigid transform", format!("{:?}", self.world_from_sensor));
-        }
-        if others.iter().any(|other| other.number == self.number) {
-            return wrong("source", "one picture of each camera", "a second one of this".into());
-        }
-        Ok(())
+        let what = |part: &str| format!("color[{index}].{part}");
+        let (near, found) = ((self.stamp - stamp).abs() <= LONGEST_ASIDE, || self.stamp.to_string());
+        TrackError::unless(near, || what("stamp"), "a time within 0.25 s of the frame's", found)?;
+        check_size(|| what("image"), self.pixels.len(), self.camera)?;
+        check_pose(|| what("world_from_sensor"), &self.world_from_sensor)?;
+        let (first, found) = (others.iter().all(|other| other.number != self.number), || "a second one of this".into());
+        TrackError::unless(first, || what("source"), "one picture of each camera", found)
     }
 }

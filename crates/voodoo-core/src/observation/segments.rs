@@ -1,7 +1,7 @@
 //! Cuts the foreground of a frame into connected segments: each may be a lost body.
 
 use crate::config::Config;
-use crate::math::Vec3;
+use crate::math::{Vec3, reset};
 use crate::observation::background::{Background, Backgrounds};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
@@ -169,8 +169,7 @@ impl Segments {
 
     fn sum_up(&mut self) {
         self.found.clear();
-        self.of_cell.clear();
-        self.of_cell.resize(self.cells.len(), 0);
+        reset(&mut self.of_cell, self.cells.len(), 0);
         for index in 0..self.cells.len() {
             let first = self.first(index as u32) as usize;
             if first == index {

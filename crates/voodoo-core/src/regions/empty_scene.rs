@@ -1,6 +1,6 @@
 //! The empty scene of a camera: a background color per pixel, and the likelihood of another color there.
 
-use super::histogram::Kind;
+use super::histogram::{Kind, SIDE};
 use crate::error::TrackError;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
@@ -58,7 +58,7 @@ impl EmptyScene {
         let sigma = variance.sqrt().max(LEAST_SIGMA);
         let width = (std::f32::consts::TAU.sqrt() * sigma).ln();
         let most = match kind {
-            Kind::Color => (16.0_f32).ln() * 3.0 - 3.0 * width,
+            Kind::Color => (SIDE as f32).ln() * 3.0 - 3.0 * width,
             Kind::Gray => -width,
         };
         Ok(Self { size: *size, kind, mean, most: most.min(0.0), narrow: 0.5 / (sigma * sigma) })
@@ -66,13 +66,12 @@ impl EmptyScene {
 
     /// Returns an error for an image that cannot be compared with the empty scene.
     pub(super) fn check(&self, picture: &ColorImage, index: usize) -> Result<(), TrackError> {
-        if self.size == [picture.camera.height(), picture.camera.width()] && self.kind == Kind::new(&picture.pixels) {
-            return Ok(());
-        }
-        let what = format!("color[{index}].image");
-        let found =
-            format!("{}x{} beside {}x{}", picture.camera.width(), picture.camera.height(), self.size[1], self.size[0]);
-        Err(TrackError::measurement(what, "a picture like those of the empty scene", found))
+        let [height, width] = [picture.camera.height(), picture.camera.width()];
+        let valid = self.size == [height, width] && self.kind == Kind::new(&picture.pixels);
+        let (what, expected) = (|| format!("color[{index}].image"), "a picture like those of the empty scene");
+        TrackError::unless(valid, what, expected, || {
+            format!("{width}x{height} beside {}x{}", self.size[1], self.size[0])
+        })
     }
 
     /// Log-likelihood of this color at a pixel that does not show the body; `around` is the log-likelihood under the colors of

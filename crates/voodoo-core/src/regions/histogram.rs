@@ -1,12 +1,12 @@
 //! Smoothed color histograms: 16 x 16 x 16 bins for color images, 256 for grayscale.
 
-use crate::math::widest;
+use crate::math::{reset, vectorized};
 use crate::observation::picture::ColorPixels;
 
 /// Leading bits of each channel that select its bin.
 const BITS: u32 = 4;
 /// Bins per channel.
-const SIDE: usize = 1 << BITS;
+pub(super) const SIDE: usize = 1 << BITS;
 /// Fraction of a count that spreads to the neighbor on either side: a Gaussian of 0.7 bins.
 const SPREAD: f32 = 0.21;
 /// Number of smoothing passes for grayscale, which has finer bins.
@@ -78,11 +78,9 @@ impl ColorHistogram {
     pub(super) fn clear(&mut self, kind: Kind) {
         let bins = kind.bins();
         for values in [&mut self.frequency, &mut self.counts] {
-            values.clear();
-            values.resize(bins, 0.0);
+            reset(values, bins, 0.0);
         }
-        self.log.clear();
-        self.log.resize(bins, (1.0 / bins as f32).ln());
+        reset(&mut self.log, bins, (1.0 / bins as f32).ln());
         (self.counted, self.known) = (0.0, false);
     }
 
@@ -99,21 +97,18 @@ impl ColorHistogram {
         if self.counted >= least {
             match kind {
                 Kind::Color => smooth_color(&mut self.counts, room),
-                Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, 256)),
+                Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, kind.bins())),
             }
             let rate = if self.known { rate } else { 1.0 };
             let (keep, new) = (1.0 - rate, rate / self.counted);
             let uniform = UNIFORM / self.frequency.len() as f32;
             let Self { frequency, log, counts, .. } = self;
-            widest(
-                #[inline(always)]
-                || {
-                    for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
-                        *frequency = keep * *frequency + new * count;
-                        *log = ln((1.0 - UNIFORM) * *frequency + uniform);
-                    }
-                },
-            );
+            vectorized!({
+                for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
+                    *frequency = keep * *frequency + new * count;
+                    *log = ln((1.0 - UNIFORM) * *frequency + uniform);
+                }
+            });
             self.known = true;
         }
         if self.counted > 0.0 {
@@ -135,20 +130,17 @@ fn smooth(values: &mut [f32], room: &mut Vec<f32>, stride: usize, row: usize) {
     room.clear();
     room.extend_from_slice(values);
     let length = stride * row;
-    widest(
-        #[inline(always)]
-        || {
-            for (values, before) in values.chunks_exact_mut(length).zip(room.chunks_exact(length)) {
-                // Flow between each value and the next one at the stride.
-                for ((value, own), next) in values.iter_mut().zip(before).zip(&before[stride..]) {
-                    *value += SPREAD * (next - own);
-                }
-                for ((value, own), last) in values[stride..].iter_mut().zip(&before[stride..]).zip(before) {
-                    *value += SPREAD * (last - own);
-                }
+    vectorized!({
+        for (values, before) in values.chunks_exact_mut(length).zip(room.chunks_exact(length)) {
+            // Flow between each value and the next one at the stride.
+            for ((value, own), next) in values.iter_mut().zip(before).zip(&before[stride..]) {
+                *value += SPREAD * (next - own);
             }
-        },
-    );
+            for ((value, own), last) in values[stride..].iter_mut().zip(&before[stride..]).zip(before) {
+                *value += SPREAD * (last - own);
+            }
+        }
+    });
 }
 
 /// Natural logarithm of a positive normal number, to 2e-5; vectorizes.

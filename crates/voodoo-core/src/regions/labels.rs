@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use crate::body::Body;
 use crate::camera::Camera;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, reset};
 
 /// Corners of an end's silhouette: cosines and sines.
 const CORNERS: [[f64; 2]; 8] = {
@@ -36,13 +36,6 @@ pub(super) struct LimbLabels {
     corners: Vec<[f32; 2]>,
     /// Left and right end of the hull in every row that it spans.
     sides: Vec<[f32; 2]>,
-}
-
-/// Depth along the projection of an axis.
-struct DepthAxis {
-    start: [f32; 2],
-    along: [f32; 2],
-    depth: [f32; 2],
 }
 
 impl LimbLabels {
@@ -76,9 +69,8 @@ impl LimbLabels {
             let front = |end: usize| (centers[end].z - 0.5 * (ends[end].a + ends[end].b)) as f32;
             let along = [end[0] - start[0], end[1] - start[1]];
             let square = (along[0] * along[0] + along[1] * along[1]).max(1.0);
-            let axis = DepthAxis { start, along: along.map(|value| value / square), depth: [front(0), front(1)] };
             self.find_hull();
-            self.fill(index as u16, &axis);
+            self.fill(index as u16, start, along.map(|value| value / square), [front(0), front(1)]);
         }
     }
 
@@ -102,10 +94,8 @@ impl LimbLabels {
             }
         } else {
             (self.bits, self.columns, self.rows) = (bits, columns, rows);
-            self.limb.clear();
-            self.limb.resize(columns * rows, NOTHING);
-            self.depth.clear();
-            self.depth.resize(columns * rows, f32::INFINITY);
+            reset(&mut self.limb, columns * rows, NOTHING);
+            reset(&mut self.depth, columns * rows, f32::INFINITY);
         }
         self.drawn = [0..0, 0..0];
     }
@@ -147,8 +137,9 @@ impl LimbLabels {
         hull.pop();
     }
 
-    /// Fills the hull where nothing nearer was drawn.
-    fn fill(&mut self, limb: u16, axis: &DepthAxis) {
+    /// Fills the hull where nothing nearer was drawn. The depth changes along the projection of the axis, from `start`, between
+    /// those of both `fronts`.
+    fn fill(&mut self, limb: u16, start: [f32; 2], along: [f32; 2], fronts: [f32; 2]) {
         let Self { columns, rows, hull, depth, limb: limbs, sides, drawn, .. } = self;
         let (low, high) =
             hull.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), [_, y]| (low.min(*y), high.max(*y)));
@@ -157,8 +148,7 @@ impl LimbLabels {
         if first >= end {
             return;
         }
-        sides.clear();
-        sides.resize(end - first, [f32::INFINITY, f32::NEG_INFINITY]);
+        reset(sides, end - first, [f32::INFINITY, f32::NEG_INFINITY]);
         for (index, from) in hull.iter().enumerate() {
             let to = &hull[(index + 1) % hull.len()];
             let ([x0, y0], [x1, y1]) = if from[1] <= to[1] { (from, to) } else { (to, from) };
@@ -186,12 +176,12 @@ impl LimbLabels {
                 };
             }
             let (y, x) = (row as f32, range.start as f32);
-            let start = (x - axis.start[0]) * axis.along[0] + (y - axis.start[1]) * axis.along[1];
+            let start = (x - start[0]) * along[0] + (y - start[1]) * along[1];
             let cells = row * *columns + range.start..row * *columns + range.end;
             let cells = limbs[cells.clone()].iter_mut().zip(&mut depth[cells]);
             for (column, (visible, depth)) in cells.enumerate() {
-                let at = (start + column as f32 * axis.along[0]).clamp(0.0, 1.0);
-                let z = axis.depth[0] + (axis.depth[1] - axis.depth[0]) * at;
+                let at = (start + column as f32 * along[0]).clamp(0.0, 1.0);
+                let z = fronts[0] + (fronts[1] - fronts[0]) * at;
                 if z < *depth {
                     (*visible, *depth) = (limb, z);
                 }

@@ -1,8 +1,8 @@
 //! Lines across the contour of limbs: their positions in an image, and what borders the limb there.
 
 use super::labels::{LimbLabels, NOTHING};
-use crate::body::{Body, Limb};
-use crate::camera::Camera;
+use crate::body::Body;
+use crate::camera::{Camera, NEAREST_RETURN};
 use crate::math::{Pose, Vec3};
 use crate::observation::depth_view::{DepthView, Pixel};
 use crate::observation::frame::Frame;
@@ -82,13 +82,6 @@ pub(super) struct Viewer<'a> {
     pub beside: Option<OcclusionDepth<'a>>,
 }
 
-/// What borders a limb at a point of its contour.
-struct Border {
-    outside: u16,
-    depth: f32,
-    clear: bool,
-}
-
 impl Viewer<'_> {
     /// Adds the given number of lines on each side of a limb, and the lines at its free ends.
     pub(super) fn add(&self, index: usize, camera_from_limb: &Pose, a_side: usize, lines: &mut Vec<Line>) {
@@ -113,24 +106,18 @@ impl Viewer<'_> {
             lines.extend([first, second]);
         }
         for (distal, _) in [false, true].into_iter().zip(limb.match_caps).filter(|(_, free)| *free) {
-            self.add_rim(index, limb, camera_from_limb, camera, distal, lines);
+            self.add_rim(index, camera_from_limb, distal, lines);
         }
     }
 
-    fn add_rim(
-        &self,
-        index: usize,
-        limb: &Limb,
-        camera_from_limb: &Pose,
-        camera: Vec3,
-        distal: bool,
-        lines: &mut Vec<Line>,
-    ) {
-        let middle = *camera_from_limb * (0.5 * limb.shape.length() * Vec3::Z);
+    fn add_rim(&self, index: usize, camera_from_limb: &Pose, distal: bool, lines: &mut Vec<Line>) {
+        let shape = &self.body.limbs()[index].shape;
+        let camera = camera_from_limb.inverse_transform_point(Vec3::ZERO);
+        let middle = *camera_from_limb * (0.5 * shape.length() * Vec3::Z);
         let Some(middle) = self.camera.project(middle) else { return };
         for corner in 0..RIM {
             let (s, c) = f64::sin_cos(std::f64::consts::TAU * corner as f64 / RIM as f64);
-            let Some([point, along]) = limb.shape.rim_contour(distal, [c, s], camera) else { continue };
+            let Some([point, along]) = shape.rim_contour(distal, [c, s], camera) else { continue };
             let place = *camera_from_limb * point;
             let along = camera_from_limb.rotation * along;
             // The projection of the rim's direction; the normal is perpendicular to it, away from the limb.
@@ -146,14 +133,13 @@ impl Viewer<'_> {
     fn line(&self, limb: usize, camera_from_limb: &Pose, foot: Vec3, normal: [f64; 2]) -> Option<Line> {
         let point = *camera_from_limb * foot;
         let norm = (normal[0] * normal[0] + normal[1] * normal[1]).sqrt();
-        if !(point.z > 0.05 && norm > 0.0) {
+        if !(point.z > NEAREST_RETURN && norm > 0.0) {
             return None;
         }
         let n = normal.map(|value| value / norm);
         let place = self.camera.project(point)?.map(|value| value as f32);
         let (normal, motion) = (n.map(|value| value as f32), self.camera.gradient(point, n)?);
-        let border = self.border(limb, place, normal)?;
-        let Border { outside, depth, clear } = border;
+        let (outside, depth, clear) = self.border(limb, place, normal)?;
         let hidden = self.beside.is_some_and(|beside| beside.is_occluded(point));
         Some(Line {
             limb: limb as u16,
@@ -171,8 +157,9 @@ impl Viewer<'_> {
         })
     }
 
-    /// What borders a limb at a pixel; `None` outside of the image.
-    fn border(&self, limb: usize, place: [f32; 2], normal: [f32; 2]) -> Option<Border> {
+    /// What borders a limb at a pixel of its contour: the limb outside, the depth inside, and whether the contour is clear.
+    /// `None` outside of the image.
+    fn border(&self, limb: usize, place: [f32; 2], normal: [f32; 2]) -> Option<(u16, f32, bool)> {
         let inside = |u: f32, v: f32| {
             (u >= 0.0 && v >= 0.0 && u < self.camera.width() as f32 && v < self.camera.height() as f32)
                 .then_some((u, v))
@@ -188,6 +175,6 @@ impl Viewer<'_> {
                 let far = if self.body.adjacent(limb, usize::from(outside)) { FAR_BEHIND } else { -NEARER_BY };
                 behind > depth + far
             });
-        Some(Border { outside, depth, clear })
+        Some((outside, depth, clear))
     }
 }

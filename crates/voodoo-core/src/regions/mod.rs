@@ -20,7 +20,7 @@ use crate::association::correspondence::{Correspondences, RegionPair};
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{Pose, Quat, Vec3, rotation_vector, shifted};
+use crate::math::{Pose, Vec3, refill, reset, shifted};
 use crate::observation::frame::Frame;
 use crate::observation::picture::{ColorImage, ColorPixels};
 use empty_scene::EmptyScene;
@@ -30,7 +30,7 @@ use labels::LimbLabels;
 use lines::{Line, OcclusionDepth, Viewer};
 use models::ColorModel;
 pub(crate) use pixel_gain::{Backdrop, PixelGain};
-use scan::EdgeSearch;
+use scan::{EdgeSearch, ScanView};
 
 /// The edge search of each step of a frame: wide and coarse at first, then narrower and finer.
 const SEARCHES: [EdgeSearch; STEPS] = [
@@ -163,11 +163,9 @@ impl ColorRegions {
     /// Returns an error for images with distortion, and for those that cannot be compared with the empty scene.
     pub(crate) fn check(&self, frame: &Frame) -> Result<(), TrackError> {
         for (index, picture) in frame.colors.iter().enumerate() {
-            if picture.camera.distorts() {
-                let found = format!("{:?}", picture.camera.lens());
-                let expected = "a pinhole camera: take the distortion out of the picture";
-                return Err(TrackError::measurement(format!("color[{index}].camera"), expected, found));
-            }
+            let (what, found) = (|| format!("color[{index}].camera"), || format!("{:?}", picture.camera.lens()));
+            let expected = "a pinhole camera: take the distortion out of the picture";
+            TrackError::unless(!picture.camera.distorts(), what, expected, found)?;
             let known = self.cameras.iter().find(|camera| camera.number == picture.number);
             known.and_then(|camera| camera.scene.as_ref()).map_or(Ok(()), |scene| scene.check(picture, index))?;
         }
@@ -205,11 +203,9 @@ impl ColorRegions {
         found: &mut Correspondences,
     ) {
         let search = SEARCHES[step.min(STEPS - 1)];
-        self.evidence.clear();
-        self.evidence.resize(posed.poses.len(), Evidence::default());
+        reset(&mut self.evidence, posed.poses.len(), Evidence::default());
         self.find_within(frame, posed, search, Some(&is_requested), &mut found.regions);
-        found.region_support.clear();
-        found.region_support.extend(self.evidence.iter().map(Evidence::support));
+        refill(&mut found.region_support, self.evidence.iter().map(Evidence::support));
     }
 
     /// Finds every edge on its own, for all limbs: where a limb is wider than modeled, the edges of both sides lie outward.
@@ -234,14 +230,13 @@ impl ColorRegions {
             let Some(camera) = cameras.iter_mut().find(|camera| camera.number == picture.number && camera.known) else {
                 continue;
             };
-            let Learned { unit, model, labels, scene, lines, edges, .. } = camera;
-            let unit = *unit;
-            let view = scan::ScanView { picture, model, labels, scene: scene.as_ref(), groups, unit };
+            let mut edges = std::mem::take(&mut camera.edges);
+            let (unit, lines, view) = (camera.unit, &camera.lines, camera.view(picture, &camera.labels, groups));
             let working_from_camera = shifted(&picture.world_from_sensor, posed.origin);
             edges.clear();
             edges.reserve(lines.capacity());
             pairs.reserve(lines.capacity());
-            for line in &*lines {
+            for line in lines {
                 let searched = is_requested.is_none_or(|is_requested| is_requested(usize::from(line.limb)));
                 let found = if searched { scan::edge_on(&view, line, search, together) } else { None };
                 edges.push(found);
@@ -263,6 +258,7 @@ impl ColorRegions {
                     source: picture.source,
                 });
             }
+            camera.edges = edges;
         }
     }
 
@@ -302,10 +298,9 @@ impl ColorRegions {
 
     /// Places the lines of one image.
     fn place_lines(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) {
-        let viewpoint = self.viewpoint(frame, picture, posed);
+        let camera_from_limb = self.camera_from_limb(frame, picture, posed);
         let camera = self.camera(picture.number);
-        camera.camera_from_limb.clear();
-        camera.camera_from_limb.extend((0..posed.poses.len()).map(|limb| viewpoint.limb_pose(limb)));
+        refill(&mut camera.camera_from_limb, (0..posed.poses.len()).map(camera_from_limb));
         camera.unit = unit_of(picture.camera);
         let (body, Learned { unit, labels, lines, camera_from_limb, .. }) = (posed.body, camera);
         labels.draw(body, camera_from_limb, picture.camera, CELL_BITS, |_| true);
@@ -330,10 +325,18 @@ impl ColorRegions {
         for line in &camera.lines {
             let weak = evidence.get(usize::from(line.limb)).is_some_and(Evidence::is_weak);
             if !line.hidden && (light || !weak) {
-                scan::count(picture, &camera.labels, groups, unit, line, &mut camera.model);
+                let group = usize::from(groups[usize::from(line.limb)]);
+                camera.model.count(picture, &camera.labels, group, unit, line);
             }
         }
         camera.model.learn();
+    }
+}
+
+impl Learned {
+    /// What is known of this camera's image, behind and beside the limbs that are drawn in `labels`.
+    fn view<'a>(&'a self, picture: &'a ColorImage, labels: &'a LimbLabels, groups: &'a [u16]) -> ScanView<'a> {
+        ScanView { picture, model: &self.model, labels, scene: self.scene.as_ref(), groups, unit: self.unit }
     }
 }
 
@@ -341,11 +344,4 @@ impl ColorRegions {
 fn unit_of(camera: &Camera) -> f32 {
     let [fx, fy] = camera.focal();
     (0.5 * (fx + fy) / FOCAL) as f32
-}
-
-/// Extrapolates a limb's pose by a fraction of the last motion.
-fn moved_on(before: &Pose, now: &Pose, fraction: f64) -> Pose {
-    let turn = rotation_vector(now.rotation * before.rotation.inverse());
-    let shift = now.translation - before.translation;
-    Pose::from_parts(now.translation + fraction * shift, Quat::from_scaled_axis(fraction * turn) * now.rotation)
 }

@@ -1,6 +1,7 @@
 //! Color models of limbs and their surroundings in the images of one camera.
 
 use super::histogram::{ColorHistogram, Kind, clamped};
+use crate::math::reset;
 
 /// Weight of the new colors of two frames in the model of a limb, and in that of its surroundings: clothes stay the same.
 const RATES: [f32; 2] = [0.19, 0.36];
@@ -26,8 +27,7 @@ impl ColorModel {
             histograms.resize_with(groups, ColorHistogram::default);
             histograms.iter_mut().for_each(|histogram| histogram.clear(kind));
         }
-        self.ratios.clear();
-        self.ratios.resize(groups * kind.bins(), 0.0);
+        reset(&mut self.ratios, groups * kind.bins(), 0.0);
     }
 
     /// Updates the models with the counted colors.

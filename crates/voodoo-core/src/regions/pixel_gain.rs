@@ -6,13 +6,14 @@
 use super::histogram::bin_of;
 use super::labels::{LimbLabels, NOTHING};
 use super::lines::NEARER_BY;
-use super::{ColorRegions, Posed, scan};
+use super::{ColorRegions, Posed};
 use crate::association::correspondence::RegionSupport;
 use crate::body::two_bone::TwoBone;
 use crate::camera::Camera;
-use crate::math::{Pose, Vec3, shifted};
+use crate::math::{Pose, Vec3, extrapolated, refill, shifted};
 use crate::observation::candidates::REFERENCE_PATCH;
 use crate::observation::frame::Frame;
+use crate::observation::picture::ColorImage;
 use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::ALONG_LIMB;
 
@@ -58,13 +59,10 @@ impl ColorRegions {
     /// Draws the `visible` limbs into the backdrop of each camera.
     pub(crate) fn draw(&self, frame: &Frame, posed: Posed, visible: impl Fn(usize) -> bool, backdrop: &mut Backdrop) {
         let Backdrop { planes, camera_from_limb, drawn } = backdrop;
-        drawn.clear();
-        drawn.extend((0..posed.poses.len()).map(&visible));
+        refill(drawn, (0..posed.poses.len()).map(&visible));
         planes.resize_with(frame.colors.len(), LimbLabels::default);
         for (picture, labels) in frame.colors.iter().zip(planes) {
-            let view = self.viewpoint(frame, picture, posed);
-            camera_from_limb.clear();
-            camera_from_limb.extend((0..posed.poses.len()).map(|limb| view.limb_pose(limb)));
+            refill(camera_from_limb, (0..posed.poses.len()).map(self.camera_from_limb(frame, picture, posed)));
             labels.draw(posed.body, camera_from_limb, picture.camera, BACKDROP_BITS, &visible);
         }
     }
@@ -86,10 +84,8 @@ impl ColorRegions {
         for (picture, labels) in frame.colors.iter().zip(&backdrop.planes) {
             let known = self.cameras.iter().find(|camera| camera.number == picture.number && camera.known);
             let Some(camera) = known.filter(|camera| camera.model.knows(group)) else { continue };
-            let (model, scene) = (&camera.model, camera.scene.as_ref());
-            let unit = camera.unit;
-            let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
-            let camera_from_limb = self.viewpoint(frame, picture, posed).limb_pose(limb);
+            let view = camera.view(picture, labels, &self.groups);
+            let camera_from_limb = self.camera_from_limb(frame, picture, posed)(limb);
             places(shape, &camera_from_limb, picture.camera, |[u, v], depth, area| {
                 gain.area += area;
                 let [width, height] = [picture.camera.width(), picture.camera.height()];
@@ -163,33 +159,21 @@ fn places(
     }
 }
 
-/// A camera's view of the limbs at the time of its image.
-pub(super) struct PictureViewpoint<'a> {
-    pub(super) posed: Posed<'a>,
-    /// Time from the frame to the image, as a fraction of the interval of the last motion.
-    pub(super) fraction: f64,
-    pub(super) camera_from_working: Pose,
-}
-
-impl PictureViewpoint<'_> {
-    pub(super) fn limb_pose(&self, limb: usize) -> Pose {
-        let now = &self.posed.poses[limb];
-        let before = self.posed.previous.get(limb).filter(|_| self.fraction != 0.0);
-        self.camera_from_working * before.map_or(*now, |before| super::moved_on(before, now, self.fraction))
-    }
-}
-
 impl ColorRegions {
-    /// A camera's view of a body.
-    pub(super) fn viewpoint<'a>(
+    /// The limbs' poses in a camera's frame at the time of its image.
+    pub(super) fn camera_from_limb<'a>(
         &self,
         frame: &Frame,
-        picture: &crate::observation::picture::ColorImage,
-        posed: Posed<'a>,
-    ) -> PictureViewpoint<'a> {
+        picture: &ColorImage,
+        Posed { poses, previous, origin, .. }: Posed<'a>,
+    ) -> impl Fn(usize) -> Pose + use<'a> {
+        // Time from the frame to the image, as a fraction of the interval of the last motion.
         let passed = self.stamp.map_or(f64::INFINITY, |stamp| frame.stamp - stamp);
         let fraction = (picture.stamp - frame.stamp) / passed;
-        let camera_from_working = shifted(&picture.world_from_sensor, posed.origin).inverse();
-        PictureViewpoint { posed, fraction, camera_from_working }
+        let camera_from_working = shifted(&picture.world_from_sensor, origin).inverse();
+        move |limb| {
+            let (now, before) = (&poses[limb], previous.get(limb).filter(|_| fraction != 0.0));
+            camera_from_working * before.map_or(*now, |before| extrapolated(before, now, fraction))
+        }
     }
 }

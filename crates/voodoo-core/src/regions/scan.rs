@@ -6,6 +6,7 @@ use super::labels::{LimbLabels, NOTHING};
 use super::lines::{BESIDE, Line, NEARER_BY};
 use super::models::ColorModel;
 use super::posterior::{ColorEdge, MOST_REACH, edge};
+use crate::camera::Camera;
 use crate::observation::picture::{ColorImage, ColorPixels};
 
 /// On a limb wider than this, each edge is searched for alone, units.
@@ -120,25 +121,20 @@ fn compare_locally(view: &ScanView, line: &Line, [start, every]: [f32; 2], ratio
     let picture = view.picture;
     let side = |from: f32, to: f32| {
         let steps = (to - from).max(0.0) as usize;
-        let mut walk = Walk::new(line, from * view.unit, view.unit);
-        Local::fit((0..steps).filter_map(|_| {
-            let pixel = walk.pixel(picture);
-            walk.advance();
-            pixel.map(|(column, row)| brightness(picture, column, row))
-        }))
+        let walk = Walk::new(picture, line, from * view.unit, view.unit).take(steps);
+        Local::fit(walk.flatten().map(|(column, row)| brightness(picture, column, row)))
     };
     let (inside, outside) = (side(-line.width.min(LOCAL), -1.0), side(1.0, LOCAL));
     if inside.count < 3.0 || outside.count < 3.0 {
         return;
     }
-    let mut walk = Walk::new(line, start * every * view.unit, every * view.unit);
-    for ratio in ratios {
-        if let Some((column, row)) = walk.pixel(picture).filter(|_| *ratio != 0.0) {
+    let walk = Walk::new(picture, line, start * every * view.unit, every * view.unit);
+    for (ratio, pixel) in ratios.iter_mut().zip(walk) {
+        if let Some((column, row)) = pixel.filter(|_| *ratio != 0.0) {
             let value = brightness(picture, column, row);
             let local = clamped(inside.log(value) - outside.log(value));
             *ratio = 0.5 * (*ratio + local);
         }
-        walk.advance();
     }
 }
 
@@ -162,10 +158,10 @@ impl ScanView<'_> {
         let (model, group) = (self.model, self.group(line.limb));
         let known = model.ratios(group);
         let mut r = start * every;
-        let mut walk = Walk::new(line, r * self.unit, every * self.unit);
-        for ratio in ratios {
+        let walk = Walk::new(self.picture, line, r * self.unit, every * self.unit);
+        for (ratio, pixel) in ratios.iter_mut().zip(walk) {
             *ratio = 0.0;
-            if let Some((column, row)) = walk.pixel(self.picture)
+            if let Some((column, row)) = pixel
                 && let Some(other) = self.other(line, r, column, row)
             {
                 let pixel = row * self.picture.camera.width() + column;
@@ -176,7 +172,6 @@ impl ScanView<'_> {
                     self.ratio(group, other, pixel, bin)
                 };
             }
-            walk.advance();
             r += every;
         }
     }
@@ -224,8 +219,9 @@ impl ScanView<'_> {
     }
 }
 
-/// Steps along a line, in fixed-point pixel coordinates.
-struct Walk {
+/// Steps along a line, in fixed-point pixel coordinates: column and row of each, if it is inside the image.
+struct Walk<'a> {
+    camera: &'a Camera,
     place: [i64; 2],
     step: [i64; 2],
 }
@@ -233,52 +229,41 @@ struct Walk {
 /// Fractional bits of the fixed-point coordinates.
 const FRACTION_BITS: u32 = 32;
 
-impl Walk {
+impl<'a> Walk<'a> {
     /// Starts `from` pixels outward, with `step` pixels per step.
-    fn new(line: &Line, from: f32, step: f32) -> Self {
+    fn new(picture: &ColorImage<'a>, line: &Line, from: f32, step: f32) -> Self {
         let part = |value: f32| (f64::from(value) * (1_i64 << FRACTION_BITS) as f64) as i64;
         let place = [0, 1].map(|axis| part(line.place[axis] + from * line.normal[axis] + 0.5));
-        Self { place, step: line.normal.map(|n| part(step * n)) }
-    }
-
-    /// Column and row of the current pixel, if it is inside the image.
-    #[inline(always)]
-    fn pixel(&self, picture: &ColorImage) -> Option<(usize, usize)> {
-        // Negative coordinates become huge unsigned numbers, so the bounds check rejects them.
-        let [column, row] = self.place.map(|place| (place >> FRACTION_BITS) as usize);
-        (column < picture.camera.width() && row < picture.camera.height()).then_some((column, row))
-    }
-
-    #[inline(always)]
-    fn advance(&mut self) {
-        self.place = [0, 1].map(|axis| self.place[axis] + self.step[axis]);
+        Self { camera: picture.camera, place, step: line.normal.map(|n| part(step * n)) }
     }
 }
 
-/// Counts the colors along a line: of the limb up to its middle, and of its surroundings.
-pub(super) fn count(
-    picture: &ColorImage,
-    labels: &LimbLabels,
-    groups: &[u16],
-    unit: f32,
-    line: &Line,
-    model: &mut ColorModel,
-) {
-    let group = usize::from(groups[usize::from(line.limb)]);
-    let inner = (0.5 * line.width).min(SURROUND);
-    let ColorModel { limbs, around, .. } = model;
-    for (histogram, visible, to, sign) in
-        [(&mut limbs[group], line.limb, inner, -1.0), (&mut around[group], NOTHING, SURROUND, 1.0)]
-    {
-        let mut walk = Walk::new(line, sign * LEARN_FROM * unit, sign * LEARN_EVERY * unit);
-        let steps = ((to - LEARN_FROM) / LEARN_EVERY + 1.0).max(0.0) as usize;
-        for _ in 0..steps {
-            if let Some((column, row)) = walk.pixel(picture)
-                && labels.at(column, row).0 == visible
+impl Iterator for Walk<'_> {
+    type Item = Option<(usize, usize)>;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        // Negative coordinates become huge unsigned numbers, so the bounds check rejects them.
+        let [column, row] = self.place.map(|place| (place >> FRACTION_BITS) as usize);
+        self.place = [0, 1].map(|axis| self.place[axis] + self.step[axis]);
+        Some((column < self.camera.width() && row < self.camera.height()).then_some((column, row)))
+    }
+}
+
+impl ColorModel {
+    /// Counts the colors along a line of a limb of this group: of the limb up to its middle, and of its surroundings.
+    pub(super) fn count(&mut self, picture: &ColorImage, labels: &LimbLabels, group: usize, unit: f32, line: &Line) {
+        let inner = (0.5 * line.width).min(SURROUND);
+        for (histogram, visible, to, sign) in
+            [(&mut self.limbs[group], line.limb, inner, -1.0), (&mut self.around[group], NOTHING, SURROUND, 1.0)]
+        {
+            let walk = Walk::new(picture, line, sign * LEARN_FROM * unit, sign * LEARN_EVERY * unit);
+            let steps = ((to - LEARN_FROM) / LEARN_EVERY + 1.0).max(0.0) as usize;
+            for (column, row) in
+                walk.take(steps).flatten().filter(|(column, row)| labels.at(*column, *row).0 == visible)
             {
                 histogram.count(bin_of(&picture.pixels, row * picture.camera.width() + column));
             }
-            walk.advance();
         }
     }
 }

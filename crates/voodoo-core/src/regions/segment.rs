@@ -5,7 +5,7 @@
 
 use super::histogram::bin_of;
 use super::labels::NOTHING;
-use super::{ColorRegions, Posed, scan};
+use super::{ColorRegions, Posed};
 use crate::association::correspondence::Correspondences;
 use crate::observation::frame::Frame;
 use crate::observation::picture::ColorImage;
@@ -18,13 +18,6 @@ const FARTHEST: f32 = 20.0;
 const NEIGHBORS: usize = 2;
 /// Costs of a step to a side neighbor and to a corner neighbor in the distance transform (Borgefors 1986), cells.
 const CHAMFER: [f32; 2] = [1.0, 1.414];
-
-/// A grid of cells around the body: the nearest limb, and the signed distance outside of the contour, units.
-struct Near {
-    columns: usize,
-    limb: Vec<u16>,
-    outside: Vec<f32>,
-}
 
 impl ColorRegions {
     /// Probability that each pixel of a frame's images shows the body, image after image, row by row, in [0, 1]. New cameras
@@ -43,33 +36,30 @@ impl ColorRegions {
 
     fn segment_picture(&mut self, frame: &Frame, picture: &ColorImage, posed: Posed) -> Vec<f32> {
         self.place_lines(frame, picture, posed);
-        let mut likely = vec![0.0; picture.camera.width() * picture.camera.height()];
+        let [width, height] = [picture.camera.width(), picture.camera.height()];
+        let mut likely = vec![0.0; width * height];
         let Some(camera) = self.cameras.iter().find(|camera| camera.number == picture.number) else { return likely };
-        let (model, labels, scene) = (&camera.model, &camera.labels, camera.scene.as_ref());
-        let unit = camera.unit;
-        let view = scan::ScanView { picture, model, labels, scene, groups: &self.groups, unit };
+        let view = camera.view(picture, &camera.labels, &self.groups);
         let cell = 1_usize << super::CELL_BITS;
-        let near = distances(labels, [picture.camera.width(), picture.camera.height()], cell as f32 / unit);
+        let (nearest, outside) = distances(&camera.labels, [width, height], cell as f32 / camera.unit);
+        let place = |index: usize| index / width / cell * width.div_ceil(cell) + index % width / cell;
         // Log ratios, and then their means along rows and columns.
         let mut ratios = vec![0.0_f32; likely.len()];
         for (index, ratio) in ratios.iter_mut().enumerate() {
-            let (column, row) = (index % picture.camera.width(), index / picture.camera.width());
-            let limb = near.limb[row / cell * near.columns + column / cell];
+            let limb = nearest[place(index)];
             if limb == NOTHING {
                 continue;
             }
             let group = usize::from(self.groups[usize::from(limb)]);
-            if model.knows(group) {
+            if camera.model.knows(group) {
                 *ratio = view.ratio(group, NOTHING, index, bin_of(&picture.pixels, index));
             }
         }
-        let across = means(&ratios, picture.camera.width(), 1);
-        let around = means(&across, picture.camera.width(), picture.camera.width());
+        let around = means(&means(&ratios, width, 1), width, width);
         for (index, likely) in likely.iter_mut().enumerate() {
-            let (column, row) = (index % picture.camera.width(), index / picture.camera.width());
-            let place = row / cell * near.columns + column / cell;
-            if near.limb[place] != NOTHING && near.outside[place] < FARTHEST {
-                let odds = ratios[index] + around[index] - near.outside[place] / FALL;
+            let place = place(index);
+            if nearest[place] != NOTHING && outside[place] < FARTHEST {
+                let odds = ratios[index] + around[index] - outside[place] / FALL;
                 *likely = 1.0 / (1.0 + (-odds).exp());
             }
         }
@@ -94,8 +84,8 @@ fn means(values: &[f32], width: usize, stride: usize) -> Vec<f32> {
     (0..values.len()).map(mean).collect()
 }
 
-/// Signed distances of all cells from the contour of what is drawn; a cell is `side` units wide.
-fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Near {
+/// Of every cell the nearest limb, and the signed distance outside of the contour of what is drawn; a cell is `side` units wide.
+fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> (Vec<u16>, Vec<f32>) {
     let cell = 1_usize << super::CELL_BITS;
     let [columns, rows] = size.map(|size| size.div_ceil(cell));
     let visible = |index: usize| labels.at(index % columns * cell, index / columns * cell).0;
@@ -106,7 +96,7 @@ fn distances(labels: &super::LimbLabels, size: [usize; 2], side: f32) -> Near {
     spread(&mut outward, Some(&mut limb), columns);
     spread(&mut inward, None, columns);
     let outside = outward.iter().zip(&inward).map(|(outward, inward)| side * (outward - inward)).collect();
-    Near { columns, limb, outside }
+    (limb, outside)
 }
 
 /// Distances to the nearest cell with distance zero, in two passes; each cell takes over the limb of its nearest one.

@@ -1,7 +1,7 @@
 //! A fast approximate distance, used to choose the limb of a point.
 
 use super::TaperedEllipticCylinder;
-use crate::math::{Mat3, Points, Pose, Vec3, widest};
+use crate::math::{Mat3, Points, Pose, Vec3, vectorized};
 
 impl TaperedEllipticCylinder {
     /// An approximate signed distance from `q` to the closed surface, limb frame, meters, negative inside.
@@ -38,15 +38,12 @@ impl TaperedEllipticCylinder {
     pub(crate) fn approximate_distances(&self, world_from_limb: &Pose, queries: &Points, out: &mut Vec<f32>) {
         out.resize(queries.len(), 0.0);
         let rough = Rough::new(self, world_from_limb);
-        widest(
-            #[inline(always)]
-            || {
-                let places = queries.x.iter().zip(&queries.y).zip(&queries.z);
-                for (((x, y), z), out) in places.zip(out.iter_mut()) {
-                    *out = rough.distance([*x, *y, *z]);
-                }
-            },
-        );
+        vectorized!({
+            let places = queries.x.iter().zip(&queries.y).zip(&queries.z);
+            for (((x, y), z), out) in places.zip(out.iter_mut()) {
+                *out = rough.distance([*x, *y, *z]);
+            }
+        });
     }
 }
 

@@ -2,9 +2,7 @@
 
 use super::TaperedEllipticCylinder;
 use super::kernel::{BLOCK, Block, BlockResult, Constants, FEW, MORE, SHORT, closest};
-#[cfg(target_arch = "x86_64")]
-use crate::math::has_avx512;
-use crate::math::{Points, Pose, Vec3, load, store};
+use crate::math::{Points, Pose, Vec3, load, store, widest_fused};
 use std::ops::Range;
 
 /// Largest [`TaperedEllipticCylinder::aspect_change`] at which results that the f32 kernel marks as settled are accepted: at 0.4
@@ -100,8 +98,8 @@ impl TaperedEllipticCylinder {
         let rest = count % BLOCK;
         let whole = if 2 * rest > BLOCK { count } else { count - rest };
         let mut batch = Batch { shape: self, world_from_limb, constants, out, unsettled: Few::new() };
-        batch.closest_blocks(kernel::<BLOCK, FEW>(), queries, 0..whole);
-        batch.closest_blocks(kernel::<SHORT, FEW>(), queries, whole..count);
+        batch.closest_blocks::<BLOCK>(queries, 0..whole);
+        batch.closest_blocks::<SHORT>(queries, whole..count);
         batch.refine_unsettled();
     }
 }
@@ -140,7 +138,18 @@ struct Batch<'a> {
 impl Batch<'_> {
     /// Closest points of the queries in `range`, block by block. Unsettled queries are processed whenever there are enough of
     /// them; the last ones wait.
-    fn closest_blocks<const N: usize>(&mut self, run: Kernel<N>, queries: &Points, range: Range<usize>) {
+    fn closest_blocks<const N: usize>(&mut self, queries: &Points, range: Range<usize>) {
+        widest_fused(
+            self,
+            #[inline(always)]
+            |batch| batch.run_blocks::<FMA, N>(queries, range.clone()),
+            #[inline(always)]
+            |batch| batch.run_blocks::<true, N>(queries, range.clone()),
+        );
+    }
+
+    #[inline(always)]
+    fn run_blocks<const FMA: bool, const N: usize>(&mut self, queries: &Points, range: Range<usize>) {
         let mut block = Block::ZERO;
         let mut found = BlockResult::ZERO;
         for start in range.clone().step_by(N) {
@@ -150,7 +159,7 @@ impl Batch<'_> {
             load(&mut block.x, &queries.x[span.clone()]);
             load(&mut block.y, &queries.y[span.clone()]);
             load(&mut block.z, &queries.z[span.clone()]);
-            run(&self.constants, &block, &mut found);
+            closest::<FMA, N, FEW>(&self.constants, &block, &mut found);
             let out = &mut *self.out;
             store(&mut out.points.x[span.clone()], &found.points.x);
             store(&mut out.points.y[span.clone()], &found.points.y);
@@ -176,7 +185,7 @@ impl Batch<'_> {
     fn refine_unsettled(&mut self) {
         let mut found = BlockResult::ZERO;
         if self.unsettled.count > 0 {
-            kernel::<SHORT, MORE>()(&self.constants, &self.unsettled.queries, &mut found);
+            run::<SHORT, MORE>(&self.constants, &self.unsettled.queries, &mut found);
         }
         for i in 0..self.unsettled.count {
             let (index, query) = (self.unsettled.indices[i], self.unsettled.queries.get(i));
@@ -192,71 +201,25 @@ impl Batch<'_> {
     }
 }
 
-type Kernel<const N: usize> = fn(&Constants, &Block<N>, &mut BlockResult<N>);
+/// Whether the target that the crate is compiled for has fused multiply-add: every aarch64 processor does.
+const FMA: bool = cfg!(any(target_arch = "aarch64", target_feature = "fma"));
 
-/// The fastest kernel this processor can run; the detection is cached by the standard library.
-fn kernel<const N: usize, const STEPS: usize>() -> Kernel<N> {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx512() && std::arch::is_x86_feature_detected!("fma") {
-        return |constants, queries, out| {
-            // SAFETY: the function is safe code that only needs AVX-512 and FMA, and this processor was found to have both.
-            #[allow(
-                unsafe_code,
-                reason = "a function compiled for an instruction set is called where the processor has it"
-            )]
-            unsafe {
-                closest_avx512::<N, STEPS>(constants, queries, out);
-            }
-        };
-    }
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-        return |constants, queries, out| {
-            // SAFETY: the function is safe code that only needs AVX2 and FMA, and this processor was found to have both.
-            #[allow(
-                unsafe_code,
-                reason = "a function compiled for an instruction set is called where the processor has it"
-            )]
-            unsafe {
-                closest_avx2::<N, STEPS>(constants, queries, out);
-            }
-        };
-    }
-    closest_baseline::<N, STEPS>
-}
-
-/// The kernel for the target that the crate is compiled for; every aarch64 processor has fused multiply-add.
-fn closest_baseline<const N: usize, const STEPS: usize>(
-    constants: &Constants,
-    queries: &Block<N>,
-    out: &mut BlockResult<N>,
-) {
-    closest::<{ cfg!(any(target_arch = "aarch64", target_feature = "fma")) }, N, STEPS>(constants, queries, out);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,fma")]
-fn closest_avx512<const N: usize, const STEPS: usize>(
-    constants: &Constants,
-    queries: &Block<N>,
-    out: &mut BlockResult<N>,
-) {
-    closest::<true, N, STEPS>(constants, queries, out);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn closest_avx2<const N: usize, const STEPS: usize>(
-    constants: &Constants,
-    queries: &Block<N>,
-    out: &mut BlockResult<N>,
-) {
-    closest::<true, N, STEPS>(constants, queries, out);
+/// [`closest`], compiled for the widest registers of this processor.
+fn run<const N: usize, const STEPS: usize>(constants: &Constants, queries: &Block<N>, out: &mut BlockResult<N>) {
+    widest_fused(
+        out,
+        #[inline(always)]
+        |out| closest::<FMA, N, STEPS>(constants, queries, out),
+        #[inline(always)]
+        |out| closest::<true, N, STEPS>(constants, queries, out),
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(target_arch = "x86_64")]
+    use crate::math::{compiled, has_avx512};
 
     /// Points on a grid around the side, from 2 cm inside to 4 cm outside.
     fn shell(shape: &TaperedEllipticCylinder) -> Vec<Block<BLOCK>> {
@@ -287,7 +250,7 @@ mod tests {
             let mut found = BlockResult::ZERO;
             let mut unsettled = 0;
             for queries in shell(&shape) {
-                kernel::<BLOCK, FEW>()(&constants, &queries, &mut found);
+                run::<BLOCK, FEW>(&constants, &queries, &mut found);
                 unsettled += found.unsettled.iter().filter(|&&flag| flag != 0).count();
             }
             let fraction = unsettled as f64 / (200 * BLOCK) as f64;
@@ -305,8 +268,8 @@ mod tests {
         let constants = Constants::new(&shape, &Pose::IDENTITY);
         let (mut fast, mut plain) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
-            kernel::<BLOCK, FEW>()(&constants, &queries, &mut fast);
-            closest_baseline::<BLOCK, FEW>(&constants, &queries, &mut plain);
+            run::<BLOCK, FEW>(&constants, &queries, &mut fast);
+            closest::<FMA, BLOCK, FEW>(&constants, &queries, &mut plain);
             for i in (0..BLOCK).filter(|&i| fast.unsettled[i] | plain.unsettled[i] == 0) {
                 assert!((fast.points.x[i] - plain.points.x[i]).abs() < 1e-6);
                 assert!((fast.points.y[i] - plain.points.y[i]).abs() < 1e-6);
@@ -328,11 +291,12 @@ mod tests {
         let constants = Constants::new(&shape, &Pose::IDENTITY);
         let (mut wider, mut wide) = (BlockResult::ZERO, BlockResult::ZERO);
         for queries in shell(&shape) {
-            // SAFETY: the processor was just found to have AVX-512 (hence AVX2) and FMA.
-            unsafe {
-                closest_avx512::<BLOCK, FEW>(&constants, &queries, &mut wider);
-                closest_avx2::<BLOCK, FEW>(&constants, &queries, &mut wide);
-            }
+            // The processor was just found to have AVX-512 (hence AVX2) and FMA.
+            compiled!(
+                "avx512f,avx512bw,avx512dq,avx512vl,fma",
+                closest::<true, BLOCK, FEW>(&constants, &queries, &mut wider)
+            );
+            compiled!("avx2,fma", closest::<true, BLOCK, FEW>(&constants, &queries, &mut wide));
             let bits = |found: &BlockResult<BLOCK>| {
                 [
                     &found.points.x,

@@ -30,7 +30,7 @@ use crate::math::Vec3;
 use thiserror::Error;
 
 pub use batch::SurfaceBatch;
-pub(crate) use section::FacingSection;
+pub(crate) use section::{FacingSection, Section};
 
 /// Minimum length, meters: the accuracy of the queries. A smaller value is an input error.
 pub(crate) const MIN_SIZE: f64 = 1e-6;

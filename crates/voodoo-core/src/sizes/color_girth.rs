@@ -21,42 +21,31 @@ const TIP_SIGMA: f64 = 0.03;
 /// Prior relative standard deviation of a limb's length where the lengths of the others are known.
 const PROPORTION_SIGMA: f64 = 0.05;
 
-/// Returns the weight of an edge.
-fn weight(pair: &RegionPair) -> f64 {
-    kernel(pair.distance) * pair.information / LINES_ALIKE
+/// An edge in the frame of its limb: foot, normal, distance, meters, and weight.
+type LimbEdge = (Vec3, Vec3, f64, f64);
+
+/// Returns the edges of a limb.
+fn edges_of(pairs: &[RegionPair], limb: usize, working_from_limb: Pose) -> impl Iterator<Item = LimbEdge> {
+    pairs.iter().filter(move |pair| pair.limb == limb).map(move |pair| {
+        let foot = working_from_limb.inverse_transform_point(pair.x);
+        let normal = working_from_limb.inverse_transform_vector(pair.normal);
+        (foot, normal, pair.distance, kernel(pair.distance) * pair.information / LINES_ALIKE)
+    })
 }
 
 /// Returns the normal equations of a limb's edges.
-fn system<'a>(
-    shape: &TaperedEllipticCylinder,
-    working_from_limb: &Pose,
-    pairs: impl Iterator<Item = &'a RegionPair>,
-) -> GirthSystem {
+fn system(shape: &TaperedEllipticCylinder, edges: impl Iterator<Item = LimbEdge>) -> GirthSystem {
     let mut system = GirthSystem::default();
-    for pair in pairs {
-        let foot = working_from_limb.inverse_transform_point(pair.x);
-        let n = working_from_limb.inverse_transform_vector(pair.normal);
-        system.add(shape, foot, n, pair.distance, weight(pair));
-    }
+    edges.for_each(|(foot, normal, distance, weight)| system.add(shape, foot, normal, distance, weight));
     system
 }
 
 /// Returns the factor by which a limb with a free distal end is longer, from the edges along the rim of that end.
-fn tip<'a>(
-    shape: &TaperedEllipticCylinder,
-    working_from_limb: &Pose,
-    pairs: impl Iterator<Item = &'a RegionPair>,
-) -> f64 {
+fn tip(shape: &TaperedEllipticCylinder, edges: impl Iterator<Item = LimbEdge>) -> f64 {
     let (mut h, mut g) = (1.0 / (TIP_SIGMA * TIP_SIGMA), 0.0);
-    for pair in pairs {
-        let foot = working_from_limb.inverse_transform_point(pair.x);
-        let along = working_from_limb.inverse_transform_vector(pair.normal).z;
-        if foot.z < shape.length() * 0.999 {
-            continue;
-        }
-        let weight = weight(pair);
-        h += weight * along * along;
-        g += weight * along * pair.distance;
+    for (_, normal, distance, weight) in edges.filter(|(foot, ..)| !(foot.z < shape.length() * 0.999)) {
+        h += weight * normal.z * normal.z;
+        g += weight * normal.z * distance;
     }
     1.0 + g / (h * shape.length())
 }
@@ -85,13 +74,13 @@ impl ColorGirths {
         for _ in 0..GIRTH_STEPS {
             fit.match_single_edges(setting.with_model(model), poses);
             for limb in 0..self.limbs.len() {
-                let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
+                let edges = || edges_of(&fit.correspondences().regions, limb, poses[limb]);
                 let part = &model.body.limbs()[limb];
                 if part.match_caps[1] {
-                    let longer = tip(&part.shape, &poses[limb], pairs.clone());
+                    let longer = tip(&part.shape, edges());
                     model.body.change_tip(limb, longer.clamp(TIP_FACTORS[0], TIP_FACTORS[1]));
                 }
-                let system = system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
+                let system = system(&model.body.limbs()[limb].shape, edges());
                 let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
                 if system.is_empty() {
                     continue;
@@ -113,8 +102,8 @@ impl ColorGirths {
         }
         fit.match_single_edges(setting.with_model(model), poses);
         for limb in 0..self.limbs.len() {
-            let pairs = fit.correspondences().regions.iter().filter(|pair| pair.limb == limb);
-            let system = system(&model.body.limbs()[limb].shape, &poses[limb], pairs);
+            let edges = edges_of(&fit.correspondences().regions, limb, poses[limb]);
+            let system = system(&model.body.limbs()[limb].shape, edges);
             let Some(prior) = GirthPrior::of(&model.body, limb, &self.limbs) else { continue };
             let frames = f64::from(GIRTHS_EVERY);
             if let Some(axes) = self.limbs[limb].follow(&system, AXIS_SIGMA, frames, Matrix3::zeros(), &prior) {

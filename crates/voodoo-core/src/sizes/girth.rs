@@ -9,7 +9,7 @@ use crate::association::contour::DepthEdge;
 use crate::association::correspondence::LimbMatches;
 use crate::body::Body;
 use crate::math::{Pose, Vec3};
-use crate::shape::TaperedEllipticCylinder;
+use crate::shape::{Section, TaperedEllipticCylinder};
 
 /// Gauss-Newton steps of the girth fit; points are matched to limbs anew in each.
 pub(super) const GIRTH_STEPS: usize = 6;
@@ -192,9 +192,7 @@ pub(super) fn side_system(
         let wider = edge.reach - edge.rim;
         system.add(shape, edge.foot, edge.side, wider, edge.weight * kernel(wider) / (EDGE_SIGMA * EDGE_SIGMA));
         let ahead = Vec3::new(-edge.side.y, edge.side.x, 0.0);
-        let t = edge.foot.z / shape.length();
-        let a = shape.a0() + t * (shape.a1() - shape.a0());
-        let b = shape.b0() + t * (shape.b1() - shape.b0());
+        let Section { a, b, .. } = shape.section(edge.foot.z / shape.length());
         let depth = (a * ahead.x).hypot(b * ahead.y);
         let front = Vec3::new(a * a * ahead.x / depth, b * b * ahead.y / depth, edge.foot.z);
         thickness += 0.5 * girth_row(shape, front, ahead);

@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::LARGEST_TURN;
+use super::{DAMPING, FLOOR, LARGEST_TURN};
 use crate::body::Body;
-use crate::body::kinematics::{Chain, exp, joint_axes, joint_turn, place, screw};
+use crate::body::kinematics::{Chain, exp, hinge_axis, joint_axes, joint_turn, place, screw};
 use crate::math::solve_in_place;
-use crate::math::{Pose, Quat, Vec3};
+use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory of the chain solver.
@@ -21,16 +21,8 @@ pub(crate) struct ChainSolver {
 
 impl ChainSolver {
     /// One damped step from the normal equations at `poses`, scaled by `stride`; afterwards the joints are exactly closed.
-    pub(crate) fn step(
-        &mut self,
-        body: &Body,
-        normal: &NormalEquations,
-        damping: f64,
-        stride: f64,
-        poses: &mut [Pose],
-    ) {
-        self.chain.layout(body);
-        self.assemble(body, normal, poses, damping);
+    pub(crate) fn step(&mut self, body: &Body, normal: &NormalEquations, stride: f64, poses: &mut [Pose]) {
+        self.assemble(body, normal, poses, DAMPING);
         if solve_in_place(&mut self.h, &mut self.step, self.chain.freedoms) {
             self.apply(body, stride, poses);
         }
@@ -38,44 +30,35 @@ impl ChainSolver {
 
     pub(super) fn assemble(&mut self, body: &Body, normal: &NormalEquations, poses: &[Pose], damping: f64) {
         let Self { chain, screws, composite, h, step } = self;
+        chain.layout(body);
         let n = chain.freedoms;
         list_screws(body, poses, screws);
         // Blocks of a limb and all its descendants, leaf to root.
-        composite.clear();
-        composite.extend(normal.limbs.iter().map(|block| (block.h, block.g)));
+        refill(composite, normal.limbs.iter().map(|block| (block.h, block.g)));
         for limb in (1..composite.len()).rev() {
             let (h, g) = composite[limb];
             let parent = &mut composite[chain.parent[limb]];
             parent.0 += h;
             parent.1 += g;
         }
-        h.clear();
-        h.resize(n * n, 0.0);
-        step.clear();
-        step.resize(n, 0.0);
+        reset(h, n * n, 0.0);
+        reset(step, n, 0.0);
         for limb in 0..composite.len() {
             let (block, gradient) = &composite[limb];
-            for row in chain.start[limb]..chain.start[limb] + chain.count[limb] {
+            for row in chain.unknowns(limb) {
                 let force = block * screws[row];
                 step[row] = -screws[row].dot(gradient);
                 // The degrees of freedom of every ancestor move this limb too.
-                let mut ancestor = limb;
-                loop {
-                    for column in chain.start[ancestor]..chain.start[ancestor] + chain.count[ancestor] {
-                        if column <= row {
-                            h[row * n + column] = force.dot(&screws[column]);
-                        }
+                for ancestor in chain.up_from(limb) {
+                    for column in chain.unknowns(ancestor).take_while(|column| *column <= row) {
+                        h[row * n + column] = force.dot(&screws[column]);
                     }
-                    if ancestor == 0 {
-                        break;
-                    }
-                    ancestor = chain.parent[ancestor];
                 }
             }
         }
         for limb in 1..composite.len() {
             let block = &normal.joints[limb];
-            let rows = chain.start[limb]..chain.start[limb] + chain.count[limb];
+            let rows = chain.unknowns(limb);
             for row in rows.clone() {
                 let turn = screws[row].fixed_rows::<3>(0);
                 let force = block.h * turn;
@@ -86,7 +69,7 @@ impl ChainSolver {
             }
         }
         for row in 0..n {
-            h[row * n + row] += damping * h[row * n + row] + 1e-6;
+            h[row * n + row] += damping * h[row * n + row] + FLOOR;
         }
     }
 
@@ -99,46 +82,32 @@ impl ChainSolver {
             .fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
         let shrink = stride.min(LARGEST_TURN / largest.max(f64::MIN_POSITIVE));
         let part = |index: usize| shrink * step[index];
-        let turns = |limb: usize| -> Vec3 {
-            let start = chain.start[limb];
-            Vec3::new(part(start), part(start + 1), part(start + 2))
-        };
-        let twist = Vector6::from_fn(|i, _| part(i));
         // Joint rotations are computed from the old poses before their parents move. Children come after parents, so iterate
         // backwards.
-        let limbs = body.limbs();
-        for index in (1..limbs.len()).rev() {
-            if let Some((parent, joint)) = &limbs[index].parent {
-                let turn = joint_turn(joint, &poses[*parent], &poses[index]);
-                let more = match chain.count[index] {
-                    1 => crate::body::kinematics::hinge_axis(joint) * part(chain.start[index]),
-                    _ => turns(index),
-                };
-                // The slot stores the joint's new rotation until the forward pass sets the limb pose.
-                poses[index] = Pose::from_rotation((Quat::from_scaled_axis(more) * turn).normalize());
-            }
+        for (limb, parent, joint) in body.joints().rev() {
+            let (turn, start) = (joint_turn(joint, &poses[parent], &poses[limb]), chain.start[limb]);
+            let more = match chain.count[limb] {
+                1 => hinge_axis(joint) * part(start),
+                _ => Vec3::new(part(start), part(start + 1), part(start + 2)),
+            };
+            // The slot stores the joint's new rotation until the forward pass sets the limb pose.
+            poses[limb] = Pose::from_rotation((Quat::from_scaled_axis(more) * turn).normalize());
         }
-        let motion = exp(&twist);
-        poses[0] = motion * poses[0];
+        poses[0] = exp(&Vector6::from_fn(|i, _| part(i))) * poses[0];
         poses[0].rotation = poses[0].rotation.normalize();
-        for (index, limb) in limbs.iter().enumerate() {
-            if let Some((parent, joint)) = &limb.parent {
-                poses[index] = place(joint, &poses[*parent], poses[index].rotation);
-                poses[index].rotation = poses[index].rotation.normalize();
-            }
+        for (limb, parent, joint) in body.joints() {
+            poses[limb] = place(joint, &poses[parent], poses[limb].rotation);
+            poses[limb].rotation = poses[limb].rotation.normalize();
         }
     }
 }
 
 /// The twist of every unknown: six of the root, then those of the joints.
 fn list_screws(body: &Body, poses: &[Pose], screws: &mut Vec<Vector6<f64>>) {
-    screws.clear();
-    screws.extend((0..6).map(|i| Vector6::ith(i, 1.0)));
-    for limb in &body.limbs()[1..] {
-        if let Some((parent, joint)) = &limb.parent {
-            let center = poses[*parent] * joint.parent_from_joint.translation;
-            let (axes, count) = joint_axes(joint, &poses[*parent]);
-            screws.extend(axes[..count].iter().map(|axis| screw(*axis, center)));
-        }
+    refill(screws, (0..6).map(|i| Vector6::ith(i, 1.0)));
+    for (_, parent, joint) in body.joints() {
+        let center = poses[parent] * joint.parent_from_joint.translation;
+        let (axes, count) = joint_axes(joint, &poses[parent]);
+        screws.extend(axes[..count].iter().map(|axis| screw(*axis, center)));
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::Vector6;
 use super::ChainSolver;
 use crate::body::kinematics::Chain;
 use crate::body::{Body, Pair};
-use crate::math::{Pose, Vec3, dot, factor, half_substitute, solve_in_place};
+use crate::math::{Pose, Vec3, dot, factor, half_substitute, reset, solve_in_place};
 use crate::terms::normal_equations::NormalEquations;
 
 /// Working memory.
@@ -30,7 +30,6 @@ impl ChainSolver {
         change: &mut [f64],
         work: &mut Lengths,
     ) -> bool {
-        self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
         work.couple(self, body, poses, pairs);
         if !work.eliminate(self, pairs.len()) {
@@ -81,41 +80,34 @@ impl Lengths {
         let ChainSolver { chain, screws, composite, .. } = solver;
         let (n, count) = (chain.freedoms, pairs.len());
         let Self { mixed, reduced, gradient, .. } = self;
-        mixed.clear();
-        mixed.resize(count * n, 0.0);
-        reduced.clear();
-        reduced.resize(count * count, 0.0);
-        gradient.clear();
-        gradient.resize(count, 0.0);
+        reset(mixed, count * n, 0.0);
+        reset(reduced, count * count, 0.0);
+        reset(gradient, count, 0.0);
         let group = |limb: usize| pairs.iter().position(|pair| pair.contains(&limb));
         for limb in 1..composite.len() {
             let Some(row) = group(chain.parent[limb]) else { continue };
             let slider = slide(body, poses, limb);
             let force = composite[limb].0 * slider;
             gradient[row] += slider.dot(&composite[limb].1);
-            let mut ancestor = limb;
-            loop {
-                for unknown in chain.start[ancestor]..chain.start[ancestor] + chain.count[ancestor] {
+            for ancestor in chain.up_from(limb) {
+                for unknown in chain.unknowns(ancestor) {
                     mixed[row * n + unknown] += force.dot(&screws[unknown]);
                 }
-                if ancestor == 0 {
-                    break;
-                }
-                if let Some(column) = group(chain.parent[ancestor]) {
+                if ancestor > 0
+                    && let Some(column) = group(chain.parent[ancestor])
+                {
                     let value = force.dot(&slide(body, poses, ancestor));
                     reduced[row * count + column] += value;
                     if ancestor != limb {
                         reduced[column * count + row] += value;
                     }
                 }
-                ancestor = chain.parent[ancestor];
             }
-            for below in limb + 1..composite.len() {
-                if hangs_on(&chain.parent, below, limb) {
-                    let force = composite[below].0 * slider;
-                    for unknown in chain.start[below]..chain.start[below] + chain.count[below] {
-                        mixed[row * n + unknown] += force.dot(&screws[unknown]);
-                    }
+            let is_below = |below: &usize| chain.up_from(*below).any(|ancestor| ancestor == limb);
+            for below in (limb + 1..composite.len()).filter(is_below) {
+                let force = composite[below].0 * slider;
+                for unknown in chain.unknowns(below) {
+                    mixed[row * n + unknown] += force.dot(&screws[unknown]);
                 }
             }
         }
@@ -142,13 +134,4 @@ impl Lengths {
         }
         true
     }
-}
-
-/// Whether a limb is a descendant of another; parents come first.
-fn hangs_on(parent: &[usize], below: usize, limb: usize) -> bool {
-    let mut ancestor = below;
-    while ancestor > limb {
-        ancestor = parent[ancestor];
-    }
-    ancestor == limb
 }

@@ -30,6 +30,8 @@ const LARGEST_TURN: f64 = 0.5;
 pub(crate) const LIMIT_SIGMA: f64 = 0.05;
 /// Relative damping of the normal matrix: unknowns with almost no measurements stay where they are.
 const DAMPING: f64 = 1e-3;
+/// Initial information of every unknown, so that nothing is singular.
+const FLOOR: f64 = 1e-6;
 
 /// Input of a solver: one ICP step of one frame.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use nalgebra::Matrix6;
 
 use super::ChainSolver;
 use crate::body::Body;
-use crate::math::{Pose, Vec3, factor};
+use crate::math::{Pose, Vec3, factor, refill};
 use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Columns of the half-solved system, one row per unknown.
@@ -25,7 +25,6 @@ impl ChainSolver {
         poses: &[Pose],
         own: &[f64],
     ) -> bool {
-        self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
         let n = self.chain.freedoms;
         for (index, information) in own.iter().enumerate() {
@@ -42,7 +41,6 @@ impl ChainSolver {
         poses: &[Pose],
         known: &mut [f64],
     ) -> bool {
-        self.chain.layout(body);
         self.assemble(body, normal, poses, 0.0);
         known.iter_mut().zip(&self.h).for_each(|(known, added)| *known += added);
         self.h.copy_from_slice(known);
@@ -69,12 +67,11 @@ impl Spread {
     /// Covariance of the unknowns of a limb's own joint, in their order; for the root: of its rotation, then of its translation.
     pub(crate) fn of_joint(&mut self, solver: &ChainSolver, limb: usize) -> Matrix6<f64> {
         self.list(solver, limb);
-        let start = solver.chain.start[limb];
         for unknown in &self.moving {
             self.rows[*unknown] = [0.0; 6];
         }
-        for own in 0..solver.chain.count[limb] {
-            self.rows[start + own][own] = 1.0;
+        for (own, unknown) in solver.chain.unknowns(limb).enumerate() {
+            self.rows[unknown][own] = 1.0;
         }
         self.solve_half(solver);
         self.gram()
@@ -98,16 +95,7 @@ impl Spread {
     fn list(&mut self, solver: &ChainSolver, limb: usize) {
         let chain = &solver.chain;
         self.rows.resize(chain.freedoms, [0.0; 6]);
-        self.moving.clear();
-        let mut ancestor = limb;
-        loop {
-            let start = chain.start[ancestor];
-            self.moving.extend((start..start + chain.count[ancestor]).rev());
-            if ancestor == 0 {
-                break;
-            }
-            ancestor = chain.parent[ancestor];
-        }
+        refill(&mut self.moving, chain.up_from(limb).flat_map(|limb| chain.unknowns(limb).rev()));
     }
 
     /// Solves `L^T y = b` for six columns; with `H = L^T L`, `b^T H^-1 b = y^T y`. Only unknowns that move the limb take part.

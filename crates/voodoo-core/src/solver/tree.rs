@@ -3,14 +3,11 @@
 
 use nalgebra::{Cholesky, Matrix6, Vector6};
 
-use super::LARGEST_TURN;
+use super::{DAMPING, FLOOR, LARGEST_TURN};
 use crate::body::kinematics::exp;
 use crate::body::{Body, Joint, JointKind};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations, line};
-
-/// Initial information of every unknown, so that nothing is singular.
-const FLOOR: f64 = 1e-6;
 
 /// The system of one step, and its solution.
 #[derive(Debug, Default)]
@@ -32,12 +29,11 @@ impl TreeSolver {
         &mut self,
         body: &Body,
         normal: &NormalEquations,
-        damping: f64,
         stride: f64,
         band_sigma: f64,
         poses: &mut [Pose],
     ) {
-        self.assemble(body, normal, damping, 1.0 / (band_sigma * band_sigma), poses);
+        self.assemble(body, normal, 1.0 / (band_sigma * band_sigma), poses);
         if !self.solve() {
             return;
         }
@@ -50,25 +46,22 @@ impl TreeSolver {
         }
     }
 
-    fn assemble(&mut self, body: &Body, normal: &NormalEquations, damping: f64, strength: f64, poses: &[Pose]) {
-        self.parent.clear();
-        self.parent.extend((0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
+    fn assemble(&mut self, body: &Body, normal: &NormalEquations, strength: f64, poses: &[Pose]) {
+        refill(&mut self.parent, (0..poses.len()).map(|limb| body.parent(limb).unwrap_or(0)));
         self.own.clone_from(&normal.limbs);
         for block in &mut self.own {
             for i in 0..6 {
-                block.h[(i, i)] += damping * block.h[(i, i)] + FLOOR;
+                block.h[(i, i)] += DAMPING * block.h[(i, i)] + FLOOR;
             }
         }
-        self.mixed.clear();
-        self.mixed.resize(poses.len(), Matrix6::zeros());
-        for (child, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &limb.parent else { continue };
+        reset(&mut self.mixed, poses.len(), Matrix6::zeros());
+        for (child, parent, joint) in body.joints() {
             for end in bands(joint) {
                 let on_child = poses[child] * (joint.limb_from_joint * end);
-                let on_parent = poses[*parent] * (joint.parent_from_joint * end);
-                self.add_band([child, *parent], strength, on_child, on_parent);
+                let on_parent = poses[parent] * (joint.parent_from_joint * end);
+                self.add_band([child, parent], strength, on_child, on_parent);
             }
-            self.add_turn([child, *parent], normal);
+            self.add_turn([child, parent], normal);
         }
     }
 
@@ -101,8 +94,7 @@ impl TreeSolver {
     /// unusable twists, when the matrix is not positive definite. Overwrites `own` and `mixed`.
     pub(crate) fn solve(&mut self) -> bool {
         let Self { parent, own, mixed, twist } = self;
-        twist.clear();
-        twist.resize(own.len(), Vector6::zeros());
+        reset(twist, own.len(), Vector6::zeros());
         for limb in (0..own.len()).rev() {
             let Some(factor) = Cholesky::new(own[limb].h) else { return false };
             twist[limb] = -factor.solve(&own[limb].g);

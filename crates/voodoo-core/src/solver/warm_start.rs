@@ -8,11 +8,11 @@
 //! by the information of its points: an arm that can reach its hand position does not move the trunk, and a leg without
 //! measurements moves with its parent.
 
-use super::{ChainSolver, DAMPING, LIMIT_SIGMA, Problem};
+use super::{ChainSolver, LIMIT_SIGMA, Problem};
 use crate::association::correspondence::SitePair;
 use crate::body::Body;
 use crate::body::kinematics::{joint_turn, place};
-use crate::math::Pose;
+use crate::math::{Pose, reset};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::terms::{Limits, Prior, Sites, Surface, Term};
 
@@ -44,10 +44,8 @@ impl WarmStart {
     /// Lets all limbs move, with points matched; returns false without sites.
     pub(crate) fn drives_all(&mut self, problem: &Problem) -> bool {
         let count = problem.body.limbs().len();
-        self.driven.clear();
-        self.driven.resize(count, true);
-        self.following.clear();
-        self.following.resize(count, false);
+        reset(&mut self.driven, count, true);
+        reset(&mut self.following, count, false);
         for pair in problem.correspondences.sites.iter().filter(|pair| pair.base_weight > 0.0) {
             self.following[pair.limb] = true;
             drive_from(problem.body, pair.limb, &mut self.following);
@@ -60,8 +58,7 @@ impl WarmStart {
         if problem.step == 0 {
             let far = |pair: &&SitePair| pair.weight > 0.0 && (pair.across * (pair.x - pair.p)).length() > from;
             self.following.clear();
-            self.driven.clear();
-            self.driven.resize(problem.body.limbs().len(), false);
+            reset(&mut self.driven, problem.body.limbs().len(), false);
             for pair in problem.correspondences.sites.iter().filter(far) {
                 drive_from(problem.body, pair.limb, &mut self.driven);
             }
@@ -73,8 +70,7 @@ impl WarmStart {
     pub(crate) fn step(&mut self, problem: &Problem, poses: &mut [Pose]) {
         let Problem { body, correspondences, config, .. } = problem;
         if problem.step == 0 {
-            self.start.clear();
-            self.start.extend_from_slice(poses);
+            poses.clone_into(&mut self.start);
             close(body, &mut self.start);
             self.closed.clone_from(&self.start);
         }
@@ -103,7 +99,7 @@ impl WarmStart {
             term.add(body, &self.closed, &mut self.normal);
         }
         self.before.clone_from(&self.closed);
-        self.chain.step(body, &self.normal, DAMPING, 1.0, &mut self.closed);
+        self.chain.step(body, &self.normal, 1.0, &mut self.closed);
         // Limbs that are not driven keep their poses.
         self.moved.clone_from(&self.closed);
         for (limb, part) in body.limbs().iter().enumerate() {
@@ -140,11 +136,9 @@ impl WarmStart {
 
 /// Closes the joints from the root outwards, keeping orientations.
 fn close(body: &Body, poses: &mut [Pose]) {
-    for (index, limb) in body.limbs().iter().enumerate() {
-        if let Some((parent, joint)) = &limb.parent {
-            let turn = joint_turn(joint, &poses[*parent], &poses[index]);
-            poses[index] = place(joint, &poses[*parent], turn);
-        }
+    for (limb, parent, joint) in body.joints() {
+        let turn = joint_turn(joint, &poses[parent], &poses[limb]);
+        poses[limb] = place(joint, &poses[parent], turn);
     }
 }
 

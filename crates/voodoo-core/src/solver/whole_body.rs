@@ -2,10 +2,10 @@
 
 use super::lengths::Lengths;
 use super::schedule::narrowed;
-use super::{ChainSolver, DAMPING, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
+use super::{ChainSolver, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
 
@@ -29,9 +29,6 @@ const HIDDEN_MOTION: f64 = 0.1;
 const TO_REST: f64 = 0.1;
 /// Minimum expected motion of a joint when only contours are measured, radians: no points hold a wrong shoulder there.
 const LEAST_MOTION: f64 = 0.1;
-/// When only contours are measured, joints with a small range are pulled to their rest position, with a standard deviation of
-/// this fraction of half of the range, times `motion_scale`.
-const POSTURE: f64 = 1.0;
 /// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
 /// length.
 pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
@@ -77,8 +74,8 @@ impl Solver for WholeBody {
         let follows = problem.step + 1 < problem.config.max_steps && !contours_alone(problem);
         let stride = if follows { OVER_RELAXATION } else { 1.0 };
         match &mut self.tree {
-            Some(tree) => tree.step(problem.body, &self.normal, DAMPING, stride, problem.config.band_sigma, poses),
-            None => self.chain.step(problem.body, &self.normal, DAMPING, stride, poses),
+            Some(tree) => tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
+            None => self.chain.step(problem.body, &self.normal, stride, poses),
         }
     }
 
@@ -128,10 +125,9 @@ impl WholeBody {
         let holds = self.stillness.prior_gains(problem, &free, poses, gain);
         let prior = Prior { holds, ..free };
         let limits = Limits { sigma: LIMIT_SIGMA };
-        self.spheres.clear();
-        self.spheres.extend(body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
+        refill(&mut self.spheres, body.limbs().iter().zip(poses).map(|(limb, pose)| limb.shape.sphere(pose)));
         let penetration = Penetration { sigma: OVERLAP_SIGMA, spheres: &self.spheres };
-        let posture = Posture { fraction: POSTURE * config.motion_scale };
+        let posture = Posture { fraction: config.motion_scale };
         let floor = problem.floor.map(|plane| Floor { plane, sigma: OVERLAP_SIGMA });
         // The cost function: a new term is a new file and a line here.
         let detected = DetectedJoints { pairs: &correspondences.detected };
@@ -152,23 +148,19 @@ impl WholeBody {
 
     /// A site gives information on every joint between it and the root: the position of a hand constrains the arm.
     fn weigh_sites(&mut self, problem: &Problem, limbs: usize, biased: bool) {
-        self.sites.clear();
-        self.sites.resize(limbs, 0.0);
+        reset(&mut self.sites, limbs, 0.0);
         for pair in problem.correspondences.sites.iter().filter(|pair| biased || pair.bias <= 0.0) {
             self.sites[pair.limb] += pair.weight;
         }
-        for (limb, part) in problem.body.limbs().iter().enumerate().rev() {
-            if let Some((parent, _)) = &part.parent {
-                self.sites[*parent] += self.sites[limb];
-            }
+        for (limb, parent, _) in problem.body.joints().rev() {
+            self.sites[parent] += self.sites[limb];
         }
     }
 
     /// Computes the standard deviation of every joint's motion.
     fn expect_motion(&mut self, problem: &Problem) {
         let information = 1.0 / (problem.config.point_sigma * problem.config.point_sigma);
-        self.edges.clear();
-        self.edges.resize(problem.body.limbs().len(), 0.0);
+        reset(&mut self.edges, problem.body.limbs().len(), 0.0);
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
@@ -204,8 +196,7 @@ impl Stillness {
         if anew || problem.step == STILL_FROM {
             prior.stillness(problem.body, poses, joints);
         }
-        holds.clear();
-        holds.extend(joints.iter().map(|stillness| gain * stillness));
+        refill(holds, joints.iter().map(|stillness| gain * stillness));
         holds
     }
 }

@@ -4,7 +4,7 @@ use super::{Term, surface::geman_mcclure};
 use crate::association::correspondence::ContourPair;
 use crate::body::Body;
 use crate::math::Pose;
-use crate::terms::normal_equations::NormalEquations;
+use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Distances of edges along their direction, under the Geman-McClure kernel.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ impl Term for Contour<'_> {
             let (rho, kernel) = geman_mcclure(pair.distance, self.scale);
             let information = self.information * pair.weight;
             normal.cost += information * rho;
-            let row = crate::terms::normal_equations::line(pair.x, pair.normal);
+            let row = line(pair.x, pair.normal);
             normal.limbs[pair.limb].add_row(information * kernel, &row, -pair.distance);
         }
     }

@@ -18,24 +18,10 @@ pub(crate) struct Limits {
 impl Term for Limits {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
         let weight = 1.0 / (self.sigma * self.sigma);
-        for (index, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &limb.parent else { continue };
-            let Some(limits) = &joint.limits else { continue };
-            let (world_from_joint, v) = turn_in_joint(joint, &poses[*parent], &poses[index]);
-            for (axis, [low, high]) in limits.iter().enumerate() {
-                let excess = if v[axis] < *low {
-                    v[axis] - low
-                } else if v[axis] > *high {
-                    v[axis] - high
-                } else {
-                    continue;
-                };
-                // d v = J^-1 (relative rotation in the joint frame); one row of the inverse left Jacobian.
-                let row = inverse_left_jacobian_row(v, axis);
-                normal.joints[index].add_row(weight, world_from_joint * row, excess);
-                normal.cost += weight * excess * excess;
-            }
-        }
+        add_angles(body, poses, normal, |angle, [low, high]| {
+            let excess = angle - angle.clamp(low, high);
+            (excess.abs() > 0.0).then_some((weight, excess))
+        });
     }
 
     fn cost(&self, body: &Body, poses: &[Pose], limb: usize) -> f64 {
@@ -48,8 +34,28 @@ impl Term for Limits {
     }
 }
 
+/// Adds a row for every component of the rotation of every joint with limits. `row` returns weight and residual for the component
+/// and its limits.
+pub(super) fn add_angles(
+    body: &Body,
+    poses: &[Pose],
+    normal: &mut NormalEquations,
+    row: impl Fn(f64, [f64; 2]) -> Option<(f64, f64)>,
+) {
+    for (limb, parent, joint) in body.joints() {
+        let Some(limits) = &joint.limits else { continue };
+        let (world_from_joint, v) = turn_in_joint(joint, &poses[parent], &poses[limb]);
+        for (axis, limits) in limits.iter().enumerate() {
+            let Some((weight, residual)) = row(v[axis], *limits) else { continue };
+            // d v = J^-1 (relative rotation in the joint frame); one row of the inverse left Jacobian.
+            normal.joints[limb].add_row(weight, world_from_joint * inverse_left_jacobian_row(v, axis), residual);
+            normal.cost += weight * residual * residual;
+        }
+    }
+}
+
 /// The joint's axes in the world frame, and the rotation vector of its rotation in the joint frame, radians.
-pub(super) fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat, Vec3) {
+fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat, Vec3) {
     let world_from_joint = parent.rotation * joint.parent_from_joint.rotation;
     let turned = world_from_joint.inverse() * limb.rotation * joint.limb_from_joint.rotation;
     (world_from_joint, rotation_vector(turned))
@@ -57,7 +63,7 @@ pub(super) fn turn_in_joint(joint: &Joint, parent: &Pose, limb: &Pose) -> (Quat,
 
 /// Row `axis` of the inverse left Jacobian of the rotation vector `v`: `J^-1 = I - [v]/2 + k [v]^2` with
 /// `k = (1 - (t/2) cot(t/2)) / t^2`, `t = |v|`.
-pub(super) fn inverse_left_jacobian_row(v: Vec3, axis: usize) -> Vec3 {
+fn inverse_left_jacobian_row(v: Vec3, axis: usize) -> Vec3 {
     let square = v.length_squared();
     let k = if square < 1e-6 {
         1.0 / 12.0

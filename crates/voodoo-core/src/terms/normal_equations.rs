@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, reset};
 
 /// Normal equations of one limb's twist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,10 +40,8 @@ pub(crate) struct NormalEquations {
 impl NormalEquations {
     /// Clears the system for `limbs` limbs.
     pub(crate) fn clear(&mut self, limbs: usize) {
-        self.limbs.clear();
-        self.limbs.resize(limbs, LimbBlock::default());
-        self.joints.clear();
-        self.joints.resize(limbs, JointBlock::default());
+        reset(&mut self.limbs, limbs, LimbBlock::default());
+        reset(&mut self.joints, limbs, JointBlock::default());
         self.cost = 0.0;
     }
 }

@@ -5,7 +5,7 @@
 //! nothing pulls them back.
 
 use super::Term;
-use super::limits::{inverse_left_jacobian_row, turn_in_joint};
+use super::limits::add_angles;
 use crate::body::Body;
 use crate::math::Pose;
 use crate::terms::normal_equations::NormalEquations;
@@ -23,23 +23,13 @@ pub(crate) struct Posture {
 
 impl Term for Posture {
     fn add(&self, body: &Body, poses: &[Pose], normal: &mut NormalEquations) {
-        for (index, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &limb.parent else { continue };
-            let Some(limits) = &joint.limits else { continue };
-            let (world_from_joint, v) = turn_in_joint(joint, &poses[*parent], &poses[index]);
-            for (axis, [low, high]) in limits.iter().enumerate() {
-                let range = high - low;
-                if !(range > 0.0 && range < SWINGS) {
-                    continue;
-                }
-                let sigma = 0.5 * range * self.fraction;
-                let weight = 1.0 / (sigma * sigma);
-                // At rest the rotation is zero, or the nearest value within the limits.
-                let off = v[axis] - 0.0_f64.clamp(*low, *high);
-                normal.joints[index].add_row(weight, world_from_joint * inverse_left_jacobian_row(v, axis), off);
-                normal.cost += weight * off * off;
-            }
-        }
+        add_angles(body, poses, normal, |angle, [low, high]| {
+            let range = high - low;
+            let sigma = 0.5 * range * self.fraction;
+            // At rest the rotation is zero, or the nearest value within the limits.
+            let off = angle - 0.0_f64.clamp(low, high);
+            (range > 0.0 && range < SWINGS).then_some((1.0 / (sigma * sigma), off))
+        });
     }
 }
 

@@ -11,7 +11,7 @@ use super::Term;
 use super::surface::geman_mcclure;
 use crate::body::{Body, Joint};
 use crate::math::{Pose, Vec3, rotation_vector};
-use crate::terms::normal_equations::NormalEquations;
+use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Deviation, in standard deviations of the expected motion, at which the stillness is a quarter: smaller ones count as noise.
 const WELL: f64 = 0.6;
@@ -78,12 +78,11 @@ impl Term for Prior<'_> {
         for (i, axis) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
             block.h[(i, i)] += turn;
             block.g[i] += turn * r[i];
-            block.add_row(shift, &crate::terms::normal_equations::line(poses[0].translation, axis), d[i]);
+            block.add_row(shift, &line(poses[0].translation, axis), d[i]);
         }
-        for (index, limb) in body.limbs().iter().enumerate() {
-            let Some((parent, joint)) = &limb.parent else { continue };
+        for (index, parent, joint) in body.joints() {
             // In world axes its derivative with respect to the relative rotation is one.
-            let r = poses[*parent].rotation * self.turn(poses, *parent, index, joint);
+            let r = poses[parent].rotation * self.turn(poses, parent, index, joint);
             let weight = information(self.joints[index], hold(index));
             normal.joints[index].add_turn(weight, r);
             normal.cost += weight * r.length_squared();

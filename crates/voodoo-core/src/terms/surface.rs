@@ -3,7 +3,7 @@
 use super::{PATCH, Term};
 use crate::association::correspondence::{Correspondences, LimbMatches};
 use crate::body::Body;
-use crate::math::{LANES, Mat3, Pose, widest};
+use crate::math::{LANES, Mat3, Pose, vectorized};
 use crate::terms::normal_equations::{LimbBlock, NormalEquations};
 use crate::visibility::EXPLAINED;
 
@@ -30,10 +30,7 @@ pub(super) fn geman_mcclure(r: f64, scale: f64) -> (f64, f64) {
 impl Term for Surface<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for (matches, block) in self.correspondences.limbs.iter().zip(&mut normal.limbs) {
-            let sums = widest(
-                #[inline(always)]
-                || self.sum(matches),
-            );
+            let sums = vectorized!(self.sum(matches));
             normal.cost += sums.add_to(block);
         }
     }

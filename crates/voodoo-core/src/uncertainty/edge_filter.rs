@@ -10,7 +10,7 @@ use crate::body::kinematics::freedoms;
 use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Model};
 use crate::config::Config;
-use crate::math::{Pose, Vec3, factor};
+use crate::math::{Pose, Vec3, factor, refill, reset};
 use crate::solver::{ChainSolver, SITE_SCALE, Spread};
 use crate::terms::normal_equations::NormalEquations;
 use crate::terms::{Regions, Sites, Term};
@@ -81,8 +81,7 @@ impl EdgeFilter {
         still.clear();
         for limb in body.limbs() {
             let sigma = limb.parent.as_ref().map_or(MAX_SIGMA, |(_, joint)| USUAL_MOTION * joint.motion * time_scale);
-            let count = limb.parent.as_ref().map_or(6, |(_, joint)| freedoms(joint));
-            still.extend((0..count).map(|_| 1.0 / (sigma * sigma)));
+            still.extend((0..freedoms(limb)).map(|_| 1.0 / (sigma * sigma)));
         }
         let n = still.len();
         if known.len() != n * n {
@@ -92,8 +91,7 @@ impl EdgeFilter {
         // (A^-1 + Q)^-1 = A - A (A + Q^-1)^-1 A, with A + Q^-1 = L^T L and L^T Y = A: A - Y^T Y.
         factored.clone_from(known);
         factored.iter_mut().step_by(n + 1).zip(&*still).for_each(|(value, still)| *value += still);
-        solved.clear();
-        solved.extend((0..n * n).map(|index| known[(index / n).max(index % n) * n + (index / n).min(index % n)]));
+        refill(solved, (0..n * n).map(|index| known[(index / n).max(index % n) * n + (index / n).min(index % n)]));
         if !factor(factored, n) {
             know_alone(known, n, MAX_SIGMA);
             return;
@@ -141,8 +139,7 @@ impl EdgeFilter {
 
 /// Diagonal information: each of `n` unknowns is known independently.
 fn know_alone(known: &mut Vec<f64>, n: usize, sigma: f64) {
-    known.clear();
-    known.resize(n * n, 0.0);
+    reset(known, n * n, 0.0);
     known.iter_mut().step_by(n + 1).for_each(|value| *value = 1.0 / (sigma * sigma));
 }
 

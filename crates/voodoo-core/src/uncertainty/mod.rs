@@ -95,8 +95,7 @@ impl Uncertainty {
         for (limb, part) in found.body.limbs().iter().enumerate() {
             let pose = &found.poses[limb];
             let own = spread.of_joint(system, limb);
-            let count = part.parent.as_ref().map_or(6, |(_, joint)| freedoms(joint));
-            variance.extend((0..count).map(|index| own[(index, index)]));
+            variance.extend((0..freedoms(part)).map(|index| own[(index, index)]));
             let axes = part
                 .parent
                 .as_ref()
@@ -142,10 +141,7 @@ impl Uncertainty {
                         (0..3).for_each(|_| expect(config.motion_scale * sigma));
                     }
                 }
-                Some((_, joint)) => {
-                    let count = freedoms(joint);
-                    (0..count).for_each(|_| expect(USUAL_MOTION * joint.motion));
-                }
+                Some((_, joint)) => (0..freedoms(limb)).for_each(|_| expect(USUAL_MOTION * joint.motion)),
             }
         }
     }

@@ -7,9 +7,8 @@
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::math::Pose;
+use crate::math::{Pose, refill, reset};
 use crate::observation::depth_view::{DepthView, DepthViews};
-use crate::shape::TaperedEllipticCylinder;
 use crate::visibility::EXPLAINED;
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
@@ -47,16 +46,12 @@ pub(crate) fn measure_support(
     raycasters: &mut Vec<LimbRaycaster>,
     supports: &mut Vec<LimbSupport>,
 ) {
-    supports.clear();
-    supports.resize(poses.len(), LimbSupport::default());
+    reset(supports, poses.len(), LimbSupport::default());
     for view in views.iter() {
-        raycasters.clear();
-        let limbs = body.limbs().iter().zip(poses);
-        raycasters
-            .extend(limbs.map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.working_from_camera))));
+        refill(raycasters, LimbRaycaster::of_body(body, poses, view.working_from_camera));
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
-                let in_view = support_in_view(&view, &body.limbs()[limb].shape, &poses[limb], limb, chain, raycasters);
+                let in_view = support_in_view(&view, &poses[limb], limb, chain, raycasters);
                 let support = &mut supports[limb];
                 for part in 0..2 {
                     support.own[part] = support.own[part].max(in_view.own[part]);
@@ -71,7 +66,6 @@ pub(crate) fn measure_support(
 /// Returns the evidence of one camera on a limb of a chain.
 fn support_in_view(
     view: &DepthView,
-    shape: &TaperedEllipticCylinder,
     working_from_limb: &Pose,
     limb: usize,
     chain: &TwoBone,
@@ -80,7 +74,7 @@ fn support_in_view(
     let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
     let mut support = LimbSupport::default();
     let outer_sections = ALONG_LIMB.iter().filter(|t| **t > 0.5).count();
-    for row in surface_rows(shape, &camera_from_limb) {
+    for row in surface_rows(&raycasters[limb].shape, &camera_from_limb) {
         let t = row.t;
         // The weights of all points sum to one, in the whole limb and in the outer part.
         let lever = t / (ALONG_LIMB.iter().sum::<f64>() * ACROSS_LIMB.len() as f64);

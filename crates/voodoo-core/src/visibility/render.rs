@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use crate::body::Body;
 use crate::camera::Camera;
 use crate::error::TrackError;
-use crate::math::{LANES, Pose, Vec3, is_rigid, widest};
+use crate::math::{LANES, Pose, Vec3, is_rigid, refill, reset, vectorized};
+use crate::observation::frame::check_pose;
 use crate::shape::TaperedEllipticCylinder;
 
 /// Value of a pixel that shows no limb.
@@ -111,39 +112,24 @@ impl Rendering {
         view: &Viewpoint,
         pool: Option<&rayon::ThreadPool>,
     ) -> Result<(), TrackError> {
-        if !is_rigid(&view.world_from_sensor) {
-            let found = format!("{:?}", view.world_from_sensor);
-            return Err(TrackError::measurement("world_from_sensor", "a rigid transform", found));
-        }
-        let limbs = body.limbs();
-        if world_from_limb.len() != limbs.len() || !world_from_limb.iter().all(is_rigid) {
-            let found = format!("{} poses for {} limbs, or one not finite", world_from_limb.len(), limbs.len());
-            return Err(TrackError::measurement("world_from_limb", "one rigid pose a limb", found));
-        }
+        check_pose(|| "world_from_sensor".into(), &view.world_from_sensor)?;
+        let [poses, limbs] = [world_from_limb.len(), body.limbs().len()];
+        let found = || format!("{poses} poses for {limbs} limbs, or one not finite");
+        let valid = poses == limbs && world_from_limb.iter().all(is_rigid);
+        TrackError::unless(valid, || "world_from_limb".into(), "one rigid pose a limb", found)?;
         let Self { width, depth, limb, raycasters } = self;
         *width = view.camera.width();
-        depth.clear();
-        depth.resize(view.camera.pixels(), 0.0);
-        limb.clear();
-        limb.resize(view.camera.pixels(), NO_LIMB);
-        raycasters.clear();
-        raycasters.extend(
-            limbs
-                .iter()
-                .zip(world_from_limb)
-                .map(|(limb, pose)| LimbRaycaster::new(limb.shape, pose.inv_mul(&view.world_from_sensor))),
-        );
+        reset(depth, view.camera.pixels(), 0.0);
+        reset(limb, view.camera.pixels(), NO_LIMB);
+        refill(raycasters, LimbRaycaster::of_body(body, world_from_limb, view.world_from_sensor));
         let raycasters = &*raycasters;
         let size = view.camera.width() * ROWS_TOGETHER;
         let work = |(band, (depth, limb)): (usize, (&mut [f32], &mut [u16]))| {
-            widest(
-                #[inline(always)]
-                || {
-                    for (index, raycaster) in (0..).zip(raycasters) {
-                        raycaster.fill(view, band * ROWS_TOGETHER, index, depth, limb);
-                    }
-                },
-            );
+            vectorized!({
+                for (index, raycaster) in (0..).zip(raycasters) {
+                    raycaster.fill(view, band * ROWS_TOGETHER, index, depth, limb);
+                }
+            });
         };
         match pool {
             Some(pool) => pool.install(|| {
@@ -158,7 +144,7 @@ impl Rendering {
 /// A limb as observed by one camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimbRaycaster {
-    shape: TaperedEllipticCylinder,
+    pub(super) shape: TaperedEllipticCylinder,
     /// The camera's center and axes in the limb frame.
     origin: Vec3,
     axes: [Vec3; 3],
@@ -172,6 +158,12 @@ pub(crate) struct LimbRaycaster {
 }
 
 impl LimbRaycaster {
+    /// Those of all limbs of a body, for a sensor in the frame of the poses.
+    pub(crate) fn of_body(body: &Body, poses: &[Pose], sensor: Pose) -> impl Iterator<Item = Self> {
+        let limbs = body.limbs().iter().zip(poses);
+        limbs.map(move |(limb, pose)| Self::new(limb.shape, pose.inv_mul(&sensor)))
+    }
+
     /// Prepares the intersection of a camera's rays with a limb of this shape.
     pub(crate) fn new(shape: TaperedEllipticCylinder, limb_from_sensor: Pose) -> Self {
         let sensor_from_limb = limb_from_sensor.inverse();

@@ -93,7 +93,7 @@ fn bands_carry_a_pull_through_the_body() {
             normal.joints[limb].h += nalgebra::Matrix3::identity();
         }
         normal.joints[0] = Default::default();
-        tree.step(&body, &normal, 1e-3, 1.0, 0.001, &mut poses);
+        tree.step(&body, &normal, 1.0, 0.001, &mut poses);
     }
     assert!((poses[hand].translation - target).length() < 0.02);
     assert!((poses[upper].rotation.inverse() * start[upper].rotation).w.abs() < 0.9999, "the upper arm has not turned");

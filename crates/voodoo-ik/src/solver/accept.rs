@@ -1,24 +1,17 @@
 //! Step acceptance: no level may become worse than the levels above it require.
 
-use super::{IkProblem, IkSolver, SETTLED};
+use super::{Active, IkProblem, IkSolver, SETTLED};
 use voodoo_core::math::dot;
 
 impl IkSolver {
-    /// Takes the whole step, or as much of it as leaves no level worse than the levels above it require. Without the image there is
-    /// at least one level.
-    pub(super) fn advance(
-        &mut self,
-        problem: &IkProblem,
-        count: usize,
-        image: bool,
-        slack: bool,
-        angles: &mut [f64],
-    ) -> f64 {
+    /// Takes the whole step, or as much of it as leaves no level worse than the levels above it require.
+    pub(super) fn advance(&mut self, problem: &IkProblem, active: Active, angles: &mut [f64]) -> f64 {
+        let Active { levels: count, image, slack } = active;
         let n = angles.len();
         let last = if image { count } else { count - 1 };
         self.propose(problem, angles, last, 1.0);
         self.evaluate(problem);
-        let Some(failed) = self.first_failure(n, count, image, slack, last) else {
+        let Some(failed) = self.first_failure(n, active, last) else {
             for level in 0..count {
                 // Slow progress indicates an unreachable goal, where less damping would overshoot.
                 let shrink = if self.trial.cost[level] < 0.9 * self.here.cost[level] { 0.3 } else { 0.8 };
@@ -39,9 +32,8 @@ impl IkSolver {
             }
             self.propose(problem, angles, stage, fraction);
             self.evaluate(problem);
-            if (fraction == 0.0 && slack)
-                || self.first_failure(n, count.min(failed + 1), image && failed == count, slack, stage).is_none()
-            {
+            let above = Active { levels: count.min(failed + 1), image: image && failed == count, slack };
+            if (fraction == 0.0 && slack) || self.first_failure(n, above, stage).is_none() {
                 return self.take_trial(angles);
             }
         }
@@ -61,20 +53,20 @@ impl IkSolver {
     }
 
     /// The first level that the trial leaves worse than it was before its own part, beyond the second-order effect of the other
-    /// levels' parts; `count` stands for the image.
-    fn first_failure(&self, n: usize, count: usize, image: bool, slack: bool, stage: usize) -> Option<usize> {
+    /// levels' parts; their number stands for the image.
+    fn first_failure(&self, n: usize, active: Active, stage: usize) -> Option<usize> {
         let length = |from: Option<usize>| -> f64 {
             let step = &self.stages[stage * n..(stage + 1) * n];
             (0..n).map(|i| step[i] - from.map_or(0.0, |from| self.stages[from * n + i])).map(|d| d * d).sum()
         };
-        for level in 0..count.min(stage + 1) {
+        for level in 0..active.levels.min(stage + 1) {
             let rise = match level {
                 0 if stage == 0 => 0.0,
                 0 => length(Some(0)),
                 _ => length(None),
             };
             let limit = match self.levels.best.get(level) {
-                Some(best) if !slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
+                Some(best) if !active.slack => (best + 0.1 * SETTLED).max(self.levels.before[level]),
                 _ => self.levels.before[level] + rise + 1e-13,
             };
             let residual = self.trial.cost[level].sqrt();
@@ -82,7 +74,7 @@ impl IkSolver {
                 return Some(level);
             }
         }
-        if image && stage == self.levels.ranges.len() {
+        if active.image && stage == self.levels.ranges.len() {
             let above =
                 if stage == 0 { 0.0 } else { dot(&self.here.gradient, &self.stages[(stage - 1) * n..stage * n]) };
             if self.trial.h.is_nan() || self.trial.h > self.here.h + above.max(0.0) + 1e-9 {

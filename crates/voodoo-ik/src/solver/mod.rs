@@ -11,7 +11,7 @@ use super::goal::{Goal, level_cost, level_ranges};
 use super::image::Criterion;
 use super::linear::{Damped, Taken};
 use super::model::{ChainModel, Kinematics};
-use voodoo_core::math::Pose;
+use voodoo_core::math::{Pose, reset};
 
 pub use rest::Rest;
 
@@ -127,6 +127,17 @@ struct LinearSystem {
     part: Vec<f64>,
 }
 
+/// What a step may move for.
+#[derive(Clone, Copy, Debug)]
+struct Active {
+    /// Number of levels; without the image there is at least one.
+    levels: usize,
+    /// Whether the image follows them.
+    image: bool,
+    /// Whether levels above may rise by the second-order effect of a step, which the next step corrects.
+    slack: bool,
+}
+
 struct IkProblem<'a> {
     model: &'a ChainModel,
     base: &'a Pose,
@@ -179,8 +190,7 @@ impl IkSolver {
         self.report
     }
 
-    /// Steps with the first `phase + 1` levels, or with all levels and the image. With `slack`, levels above may rise by the
-    /// second-order effect of a step, which the next step corrects.
+    /// Steps with the first `phase + 1` levels, or with all levels and the image.
     fn phase(&mut self, problem: &IkProblem, phase: usize, slack: bool, angles: &mut [f64]) {
         let (count, options) = (self.levels.ranges.len(), problem.options);
         let image = phase == count;
@@ -196,7 +206,7 @@ impl IkSolver {
             }
             self.report.steps += 1;
             let before = self.here.h;
-            let moved = self.step(problem, active, image, slack, angles);
+            let moved = self.step(problem, Active { levels: active, image, slack }, angles);
             idle = if image && before - self.here.h < LEAST_FALL * before { idle + 1 } else { 0 };
             if moved >= options.still && idle < STALLED_STEPS {
                 continue;
@@ -231,7 +241,7 @@ impl IkSolver {
                     break;
                 }
                 moved = true;
-                if self.step(problem, active, false, true, angles) < 1e-12 {
+                if self.step(problem, Active { levels: active, image: false, slack: true }, angles) < 1e-12 {
                     break;
                 }
             }
@@ -256,17 +266,13 @@ impl IkSolver {
         problem.model.normalize(angles);
         level_ranges(problem.goals, &mut self.levels.ranges);
         let count = self.levels.ranges.len();
-        self.levels.trust.clear();
-        self.levels.trust.resize(count, 0.1);
-        self.levels.before.clear();
-        self.levels.before.resize(count, 0.0);
+        reset(&mut self.levels.trust, count, 0.1);
+        reset(&mut self.levels.before, count, 0.0);
         for vector in [&mut self.linear.part, &mut self.here.gradient, &mut self.trial.gradient, &mut self.trial_angles]
         {
-            vector.clear();
-            vector.resize(n, 0.0);
+            reset(vector, n, 0.0);
         }
-        self.stages.clear();
-        self.stages.resize((count + 1) * n, 0.0);
+        reset(&mut self.stages, (count + 1) * n, 0.0);
         self.levels.best.clear();
         (self.report, self.comparing) = (Report { converged: true, ..Report::default() }, false);
         self.gain = problem.options.gain;

@@ -3,6 +3,7 @@
 use super::super::goal::level_rows;
 use super::super::linear::largest;
 use super::{IkProblem, IkSolver};
+use voodoo_core::math::refill;
 
 /// Allowed rise of the image criterion, pixels: rounding.
 const LEVEL: f64 = 1e-9;
@@ -30,8 +31,7 @@ impl IkSolver {
     #[inline(never)]
     pub(super) fn pull_to_rest(&mut self, problem: &IkProblem, angles: &mut [f64]) {
         // Improvements that lower levels made in higher ones also count.
-        self.levels.best.clear();
-        self.levels.best.extend(self.here.cost.iter().map(|cost| cost.sqrt()));
+        refill(&mut self.levels.best, self.here.cost.iter().map(|cost| cost.sqrt()));
         let most = self.here.h + LEVEL;
         let mut rest = false;
         for _ in 0..problem.options.steps {

@@ -2,7 +2,7 @@
 
 use super::super::goal::level_rows;
 use super::super::linear::largest;
-use super::{IkProblem, IkSolver};
+use super::{Active, IkProblem, IkSolver};
 use voodoo_core::math::dot;
 
 /// Minimum damping, m^2: small relative to `J J^T` of any visible motion, so that the last steps are Newton steps.
@@ -10,14 +10,8 @@ const LEAST_DAMPING: f64 = 1e-10;
 
 impl IkSolver {
     /// Computes one step of the first `count` levels, and of the image. Returns the largest change of an unknown.
-    pub(super) fn step(
-        &mut self,
-        problem: &IkProblem,
-        count: usize,
-        image: bool,
-        slack: bool,
-        angles: &mut [f64],
-    ) -> f64 {
+    pub(super) fn step(&mut self, problem: &IkProblem, active: Active, angles: &mut [f64]) -> f64 {
+        let Active { levels: count, image, .. } = active;
         let n = angles.len();
         self.linear.taken.clear(n);
         for level in 0..count {
@@ -29,7 +23,7 @@ impl IkSolver {
         if image {
             self.image_part(problem, count, angles);
         }
-        let moved = self.advance(problem, count, image, slack, angles);
+        let moved = self.advance(problem, active, angles);
         problem.model.normalize(angles);
         moved
     }
