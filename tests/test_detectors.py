@@ -160,6 +160,7 @@ def test_ctrl_c_in_a_detector_is_not_swallowed(someone):
         ([DetectedPerson({}, 2.0)], "confidence: expected a probability"),
         ([DetectedPerson({}, 0.9, facing="yes")], "facing: expected a probability"),
         ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, joint_sigma=-1.0)], "sigma: expected finite meters > 0"),
+        ([DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, visible=2.0)], "visible: expected 0 to 1, found 2"),
         (
             [DetectedPerson({"l_shoulder": (0, 1, 0)}, 0.9, mask=np.ones((3, 3), bool))],
             "mask: expected an array of shape",

@@ -149,6 +149,9 @@ fn check(index: usize, detection: &Detection, map: &JointMap, image: &DepthImage
         if !(joint.sigma > 0.0 && joint.sigma.is_finite()) {
             return wrong(&format!("joints[{number}].sigma"), "finite meters > 0".into(), joint.sigma.to_string());
         }
+        if !(0.0..=1.0).contains(&joint.visible) {
+            return wrong(&format!("joints[{number}].visible"), "0 to 1".into(), joint.visible.to_string());
+        }
     }
     if let Some(pair) = lengths.iter().find(|pair| !pair.iter().all(|value| *value > 0.0 && value.is_finite())) {
         return wrong("lengths", "finite numbers > 0".into(), format!("{pair:?}"));

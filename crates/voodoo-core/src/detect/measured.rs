@@ -4,7 +4,7 @@
 use super::{Detected, DetectedJoint};
 use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
 use crate::body::Body;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, reset};
 use crate::visibility::FEW;
 
 /// By how many times its own a detected joint's information grows where the detection doubts the pose, see [`Detected::doubt`]:
@@ -38,6 +38,19 @@ impl Detected<'_> {
         (sum / count.max(1.0) - 1.0).clamp(0.0, 1.0)
     }
 
+    /// Writes the probability that each limb is visible: the largest of its detected joints; 1 where none was detected.
+    pub(crate) fn visible_limbs(&self, body: &Body, limbs: &mut Vec<f32>) {
+        reset(limbs, body.limbs().len(), f32::NAN);
+        let found = |joint: usize| Some((self.map.site(joint)?, self.joint(joint)?));
+        for (site, joint) in (0..self.detection.joints.len()).filter_map(found) {
+            for limb in joined_limbs(body, site) {
+                // The larger of a number and `NAN` is the number.
+                limbs[limb] = limbs[limb].max(joint.visible as f32);
+            }
+        }
+        limbs.iter_mut().filter(|visible| visible.is_nan()).for_each(|visible| *visible = 1.0);
+    }
+
     /// Writes the joints to `joints`, for a body that is expected at these poses, working frame. `last` are the matches of the last
     /// frame: limbs whose points lay on them are doubted less.
     pub(crate) fn measure(
@@ -52,13 +65,18 @@ impl Detected<'_> {
         let off = |limb: usize| last.get(limb).map_or(1.0, roughness);
         let found = |joint: usize| Some((self.map.site(joint)?, self.joint(joint)?));
         joints.extend((0..self.detection.joints.len()).filter_map(found).map(|(site, joint)| {
-            let limb = body.sites()[site].limb;
-            let parent = body.limbs()[limb].parent.as_ref().map_or(limb, |(parent, _)| *parent);
+            let [limb, parent] = joined_limbs(body, site);
             let factor = 1.0 + DOUBTED * doubt * off(limb).max(off(parent));
             let DetectedJoint { position, sigma, visible } = *joint;
             MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
         }));
     }
+}
+
+/// The limb of a joint's site and its parent, or twice the limb of the root.
+fn joined_limbs(body: &Body, site: usize) -> [usize; 2] {
+    let limb = body.sites()[site].limb;
+    [limb, body.parent(limb).unwrap_or(limb)]
 }
 
 /// Mean square of the distances of a limb's points in units of `UNLIKE_SURFACE`; at most 1, also where there are hardly any points.
@@ -104,5 +122,19 @@ mod tests {
         let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma)[0].information * sigma * sigma;
         assert!((factor(0.0, 0.03) - 1.0).abs() < 1e-9 && (factor(0.1, 0.1) - 1.0).abs() < 1e-9);
         assert!((factor(0.2, 0.03) - 1.0 - DOUBTED).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_limb_is_as_visible_as_the_better_seen_of_its_joints() {
+        let (model, poses) = standing();
+        let body = &model.body;
+        let names = ["l_shoulder", "l_elbow", "l_wrist"].map(String::from);
+        let map = JointMap::new(body, &names, &[]);
+        let joint = |visible| Some(DetectedJoint { position: poses[0].translation, sigma: 0.1, visible });
+        let detection = Detection { joints: [0.9, 0.5, 0.25].map(joint).to_vec(), ..Detection::default() };
+        let mut limbs = Vec::new();
+        Detected { detection: &detection, map: &map }.visible_limbs(body, &mut limbs);
+        let of = |name| limbs[body.limbs().iter().position(|limb| limb.name == name).unwrap_or_default()];
+        assert_eq!(["l_upperarm", "l_forearm", "l_hand", "r_forearm"].map(of), [0.9, 0.5, 0.25, 1.0]);
     }
 }

@@ -39,6 +39,9 @@ pub(crate) struct Fit {
     regions: regions::ColorRegions,
     /// Joints that a detector found in this frame.
     detected: Vec<MeasuredJoint>,
+    /// Probability that each limb is visible, by the detection of this frame; empty without one. Points are a limb's own with it:
+    /// others, of furniture, would hold a hidden limb.
+    visible: Vec<f32>,
     band_weights: Vec<f64>,
     threads: Threads,
 }
@@ -54,6 +57,7 @@ impl Fit {
             contours: Contours::default(),
             regions: regions::ColorRegions::default(),
             detected: Vec::new(),
+            visible: Vec::new(),
             band_weights: Vec::new(),
             threads: Threads::new(config)?,
         })
@@ -62,7 +66,9 @@ impl Fit {
     /// Sets the detection of this frame, if there is one, whose joints are fitted as well; `poses` are the expected ones.
     pub(crate) fn set_detected(&mut self, detected: Option<Detected>, body: &Body, poses: &[Pose], origin: Vec3) {
         self.detected.clear();
+        self.visible.clear();
         if let Some(detected) = detected {
+            detected.visible_limbs(body, &mut self.visible);
             detected.measure(body, poses, origin, &self.correspondences.limbs, &mut self.detected);
         }
     }
@@ -253,13 +259,16 @@ impl Fit {
     /// call.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
         let Context { config, model, observation, .. } = context;
-        let Self { solver, assignment, correspondences, threads, .. } = self;
+        let Self { solver, assignment, correspondences, threads, visible, .. } = self;
         let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), observation.candidates);
         let whole_body = solver.schedule(config).whole_body;
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
         let work = |(index, matches): (usize, &mut LimbMatches)| {
             if anew {
                 assignment.sample_limb(index, candidates, config, matches);
+                if let Some(visible) = visible.get(index) {
+                    matches.base_weight.iter_mut().for_each(|weight| *weight *= visible);
+                }
             }
             match_limb(&limbs[index], &poses[index], gate.distance, whole_body, matches);
             if visible_side {
