@@ -158,9 +158,9 @@ def cut(output: Output) -> dict[str, float]:
 def people(output: Output) -> dict[str, float]:
     """All recordings of several persons."""
     table = [line.strip().strip("|").split("|") for line in output.text.splitlines() if line.startswith("|")]
-    names, last = [name.strip() for name in table[0]], table[-1]
-    cell = {name: last[at] for at, name in enumerate(names)}
-    return {"mota": number(cell["MOTA"]), "idf1": number(cell["IDF1"]), "switches": number(cell["id switches"])}
+    cell = {name.strip(): table[-1][at] for at, name in enumerate(table[0])}
+    names = {"mota": "MOTA", "idf1": "IDF1", "switches": "id switches", "mean_cm": "joint error, cm"}
+    return {value: number(cell[name]) for value, name in names.items()}
 
 
 RUNS: dict[str, tuple[str, Callable[[Output], Values]]] = {
