@@ -59,8 +59,8 @@ def test_commits_and_scripts_of_the_runs_are_there():
         assert displayed.stdout.strip() == run.date, f"{run.id}: {run.commit} {displayed.stderr}"
 
 
-def test_values_are_read_from_what_the_commands_print(tmp_path):
-    assert set(measure.RUNS) <= set(RUNS)
+def test_values_are_read_from_what_the_commands_print():
+    assert set(measure.READ) <= set(RUNS)
     printed = {
         "disturbed": "mean 2.02 cm; 1 of 64 runs end with a joint lost\n76 limbs off by 10 cm: 97.4 % not called measured\n"
         "9000 limbs nearer: 4.0 % not called measured\n",
@@ -76,7 +76,7 @@ def test_values_are_read_from_what_the_commands_print(tmp_path):
         },
     }  # fmt: skip
     for name, text in printed.items():
-        read = measure.RUNS[name][1]
-        assert read(measure.Output(text, tmp_path)) == expected[name]
+        read = measure.READ[name]
+        assert read(measure.Output(text)) == expected[name]
         with pytest.raises(ValueError, match="expected"):
-            read(measure.Output("", tmp_path))
+            read(measure.Output(""))

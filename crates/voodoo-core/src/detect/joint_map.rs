@@ -131,6 +131,11 @@ impl<'a> Detected<'a> {
         self.detection.joints.get(index)?.as_ref()
     }
 
+    /// The detected joints that the body has, each with its site.
+    pub(crate) fn on_sites(&self) -> impl Iterator<Item = (usize, &'a DetectedJoint)> + '_ {
+        (0..self.detection.joints.len()).filter_map(|joint| Some((self.map.site(joint)?, self.joint(joint)?)))
+    }
+
     /// The joint between a limb and its parent.
     pub(crate) fn hangs_by(&self, limb: usize) -> Option<&'a DetectedJoint> {
         self.joint(self.map.hangs_by.get(limb).copied().flatten()?)

@@ -41,8 +41,7 @@ impl Detected<'_> {
     /// Writes the probability that each limb is visible: the largest of its detected joints; 1 where none was detected.
     pub(crate) fn visible_limbs(&self, body: &Body, limbs: &mut Vec<f32>) {
         reset(limbs, body.limbs().len(), f32::NAN);
-        let found = |joint: usize| Some((self.map.site(joint)?, self.joint(joint)?));
-        for (site, joint) in (0..self.detection.joints.len()).filter_map(found) {
+        for (site, joint) in self.on_sites() {
             for limb in joined_limbs(body, site) {
                 // The larger of a number and `NAN` is the number.
                 limbs[limb] = limbs[limb].max(joint.visible as f32);
@@ -63,8 +62,7 @@ impl Detected<'_> {
     ) {
         let doubt = self.doubt(body, poses, origin);
         let off = |limb: usize| last.get(limb).map_or(1.0, roughness);
-        let found = |joint: usize| Some((self.map.site(joint)?, self.joint(joint)?));
-        joints.extend((0..self.detection.joints.len()).filter_map(found).map(|(site, joint)| {
+        joints.extend(self.on_sites().map(|(site, joint)| {
             let [limb, parent] = joined_limbs(body, site);
             let factor = 1.0 + DOUBTED * doubt * off(limb).max(off(parent));
             let DetectedJoint { position, sigma, visible } = *joint;
