@@ -202,14 +202,13 @@ fn in_lanes<const N: usize>(first: &[f32], second: &[f32], values: impl Fn(f32, 
 }
 
 impl Correspondences {
-    /// Reserves as much capacity for surface matches and edges as `other` has.
-    pub(crate) fn reserve_as(&mut self, other: &Self) {
-        self.regions.reserve(other.regions.capacity().saturating_sub(self.regions.len()));
-        self.region_support.reserve(other.region_support.capacity().saturating_sub(self.region_support.len()));
+    /// Reserves capacity for `points` surface matches of each limb, and as much for color edges as `other` has.
+    pub(crate) fn reserve(&mut self, points: usize, other: &Self) {
+        // Exactly as much: each of two that are exchanged would otherwise grow beyond the other.
+        self.regions.reserve_exact(other.regions.capacity().saturating_sub(self.regions.len()));
+        self.region_support.reserve_exact(other.region_support.capacity().saturating_sub(self.region_support.len()));
         self.limbs.resize_with(other.limbs.len(), LimbMatches::default);
-        for (own, other) in self.limbs.iter_mut().zip(&other.limbs) {
-            own.reserve(other.candidate.capacity());
-        }
+        self.limbs.iter_mut().for_each(|limb| limb.reserve(points));
     }
 
     /// Total weight of a limb's measurements: its points and its sites.
@@ -257,5 +256,27 @@ impl Correspondences {
         let weight: f64 = self.regions.iter().map(|pair| pair.information).sum();
         let sum: f64 = self.regions.iter().map(|pair| pair.information * pair.distance * pair.distance).sum();
         (weight > 0.0).then(|| sum / weight)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correspondences_that_are_exchanged_and_reserve_for_each_other_do_not_grow() {
+        let with_room = |edges: usize| Correspondences {
+            regions: Vec::with_capacity(edges),
+            limbs: vec![LimbMatches { candidate: Vec::with_capacity(10 * edges), ..LimbMatches::default() }],
+            ..Correspondences::default()
+        };
+        let (mut current, mut tried) = (with_room(7), with_room(10));
+        for _ in 0..40 {
+            tried.reserve(80, &current);
+            std::mem::swap(&mut current, &mut tried);
+        }
+        let limb = &current.limbs[0];
+        let room = [current.regions.capacity(), limb.candidate.capacity(), limb.measured.x.capacity()];
+        assert!(room[0] <= 20 && room[1] <= 160 && room[2] <= 160, "{room:?}");
     }
 }

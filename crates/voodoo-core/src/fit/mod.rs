@@ -65,12 +65,17 @@ impl Fit {
 
     /// Sets the detection of this frame, if there is one, whose joints are fitted as well; `poses` are the expected ones.
     pub(crate) fn set_detected(&mut self, detected: Option<Detected>, body: &Body, poses: &[Pose], origin: Vec3) {
-        self.detected.clear();
-        self.visible.clear();
+        self.forget_detected();
         if let Some(detected) = detected {
             detected.visible_limbs(body, &mut self.visible);
             detected.measure(body, poses, origin, &self.correspondences.limbs, &mut self.detected);
         }
+    }
+
+    /// Forgets the detection: poses are compared by what the sensors measure.
+    pub(crate) fn forget_detected(&mut self) {
+        self.detected.clear();
+        self.visible.clear();
     }
 
     /// Returns the solver's schedule for the loop.

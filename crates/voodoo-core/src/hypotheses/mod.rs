@@ -143,7 +143,7 @@ impl Hypotheses {
             }
             self.color_directions.make_room(limbs);
         }
-        self.refined.matched.reserve_as(fit.correspondences());
+        self.refined.matched.reserve(most.min(context.config.max_limb_points), fit.correspondences());
     }
 
     /// Whether the frame contradicts an arm or leg: its alternatives are tested.

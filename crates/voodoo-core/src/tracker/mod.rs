@@ -357,6 +357,7 @@ impl BodyTracker {
         let previous = if motion.stamp.is_some() { &motion.poses[..] } else { &[] };
         let setting = Setting { config, observation, previous, time_scale: 1.0 };
         let lost = assessor.status() == Status::Lost;
+        fit.forget_detected();
         let is_there = relocalizer.try_detected(setting.with_model(model), fit, &motion.predicted, lost);
         if is_there {
             let Own { image, pixels } = relocalizer.own_pixels();
