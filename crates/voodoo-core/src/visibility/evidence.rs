@@ -4,9 +4,9 @@
 //! insufficient: a limb hidden inside the torso violates nothing, and a limb in empty space leaves few points unexplained.
 
 use crate::body::Limb;
-use crate::math::Pose;
+use crate::math::{Pose, Vec3};
 use crate::observation::candidates::REFERENCE_PATCH;
-use crate::observation::depth_view::DepthViews;
+use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ALONG_LIMB, LIMB_RIM};
 
@@ -21,28 +21,49 @@ pub(crate) struct Patches {
     pub front_facing: f64,
 }
 
+impl Patches {
+    /// Adds those in another image.
+    pub(crate) fn add(&mut self, other: Self) {
+        self.free_space += other.free_space;
+        self.occluded += other.occluded;
+        self.front_facing += other.front_facing;
+    }
+}
+
 /// Returns the patches of a limb's surface that are visible to the cameras, occluded, and in free space.
 pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb: &Pose) -> Patches {
+    let mut found = Patches::default();
+    views.iter().for_each(|view| found.add(limb_visibility_in(&view, limb, working_from_limb, |_| false)));
+    found
+}
+
+/// Like [`limb_visibility`], in one image. Patches that another limb hides, at points (camera frame) for which `hidden` is true,
+/// are occluded as well.
+pub(crate) fn limb_visibility_in(
+    view: &DepthView,
+    limb: &Limb,
+    working_from_limb: &Pose,
+    hidden: impl Fn(Vec3) -> bool,
+) -> Patches {
     let (shape, across) = (&limb.shape, [-LIMB_RIM, 0.0, LIMB_RIM]);
     let mut found = Patches::default();
-    for view in views.iter() {
-        let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
-        for row in surface_rows(shape, &camera_from_limb) {
-            let section = row.facing.section;
-            let (a, b) = (section.a, section.b);
-            // A limb viewed obliquely covers less of the image, and yields fewer points by the same factor.
-            let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
-            let patches = aslant * 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
-                / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
-            for place in row.places(&view, across) {
-                match place.sight() {
-                    PatchVisibility::Unknown => continue,
-                    PatchVisibility::FreeSpace => found.free_space += patches,
-                    PatchVisibility::Occluded => found.occluded += patches,
-                    PatchVisibility::Consistent => {}
-                }
-                found.front_facing += patches;
+    let camera_from_limb = view.working_from_camera.inverse() * *working_from_limb;
+    for row in surface_rows(shape, &camera_from_limb) {
+        let section = row.facing.section;
+        let (a, b) = (section.a, section.b);
+        // A limb viewed obliquely covers less of the image, and yields fewer points by the same factor.
+        let aslant = row.facing.across.length() / (camera_from_limb * section.center()).length();
+        let patches = aslant * 2.0 * a.min(b).max(0.5 * a.max(b)) * shape.length()
+            / (REFERENCE_PATCH * (ALONG_LIMB.len() * across.len()) as f64);
+        for place in row.places(view, across) {
+            match place.sight() {
+                PatchVisibility::Unknown => continue,
+                PatchVisibility::FreeSpace => found.free_space += patches,
+                PatchVisibility::Occluded => found.occluded += patches,
+                PatchVisibility::Consistent if hidden(place.point) => found.occluded += patches,
+                PatchVisibility::Consistent => {}
             }
+            found.front_facing += patches;
         }
     }
     found
@@ -52,7 +73,7 @@ pub(crate) fn limb_visibility(views: DepthViews, limb: &Limb, working_from_limb:
 mod tests {
     use super::*;
     use crate::body::{Body, HumanModel};
-    use crate::math::{Quat, Vec3};
+    use crate::math::Quat;
     use crate::observation::background::Backgrounds;
     use crate::observation::frame::{DepthImage, DepthPixels, Frame};
     use crate::testing::pinhole;
@@ -85,14 +106,9 @@ mod tests {
         let frame = Frame { images: &images, ..Frame::empty(0.0) };
         let views =
             DepthViews { frame: &frame, backgrounds: &Backgrounds::default(), segmented: &[false], origin: Vec3::ZERO };
-        body.limbs().iter().zip(poses).map(|(limb, pose)| limb_visibility(views, limb, pose)).fold(
-            Patches::default(),
-            |all, one| Patches {
-                free_space: all.free_space + one.free_space,
-                occluded: all.occluded + one.occluded,
-                front_facing: all.front_facing + one.front_facing,
-            },
-        )
+        let mut all = Patches::default();
+        body.limbs().iter().zip(poses).for_each(|(limb, pose)| all.add(limb_visibility(views, limb, pose)));
+        all
     }
 
     /// A person who faces the camera, 2.5 m before it, arms hanging.

@@ -7,19 +7,20 @@
 
 use crate::body::Body;
 use crate::body::two_bone::TwoBone;
-use crate::math::{Pose, refill, reset};
+use crate::math::{Pose, Vec3, refill, reset};
 use crate::observation::depth_view::{DepthView, DepthViews};
 use crate::visibility::EXPLAINED;
+use crate::visibility::evidence::{Patches, limb_visibility_in};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::surface::{PatchVisibility, surface_rows};
 use crate::visibility::{ACROSS_LIMB, ALONG_LIMB, OVERLAP};
 
-/// Evidence of the cameras on a limb: fractions of the points on its surface that face a camera. Of several cameras, the largest
-/// fraction counts for each.
+/// Evidence of the cameras on a limb.
 ///
-/// The first value is for the whole limb, with each point weighted by its distance from the proximal joint: this is its lever on
-/// the distal joint, and a point at the proximal joint does not constrain the limb's direction. The second is for the points in
-/// the outer two fifths alone: a limb that is hidden in the trunk from its middle on may end anywhere in it.
+/// `own` and `free_space` are fractions of the points on its surface that face a camera. Of several cameras, the largest fraction
+/// counts for each. The first value is for the whole limb, with each point weighted by its distance from the proximal joint: this is
+/// its lever on the distal joint, and a point at the proximal joint does not constrain the limb's direction. The second is for the
+/// points in the outer two fifths alone: a limb that is hidden in the trunk from its middle on may end anywhere in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LimbSupport {
     /// Fraction observed at the predicted depth and explained by no limb of the trunk or of another arm or leg.
@@ -28,6 +29,8 @@ pub(crate) struct LimbSupport {
     pub free_space: [f64; 2],
     /// Whether any image gives evidence for or against the limb.
     pub known: bool,
+    /// Its patches in all images, those that other limbs hide among the occluded ones.
+    pub patches: Patches,
 }
 
 impl LimbSupport {
@@ -37,7 +40,8 @@ impl LimbSupport {
     }
 }
 
-/// Evaluates the upper and lower limbs of all `chains`; `supports` gets one entry per limb, `raycasters` is working memory.
+/// Evaluates the upper and lower limbs of all `chains`, and counts the patches of every limb; `supports` gets one entry per limb,
+/// `raycasters` is working memory.
 pub(crate) fn measure_support(
     views: DepthViews,
     body: &Body,
@@ -49,6 +53,10 @@ pub(crate) fn measure_support(
     reset(supports, poses.len(), LimbSupport::default());
     for view in views.iter() {
         refill(raycasters, LimbRaycaster::of_body(body, poses, view.working_from_camera));
+        for (limb, support) in supports.iter_mut().enumerate() {
+            let hidden = |point| is_hidden(raycasters, limb, point);
+            support.patches.add(limb_visibility_in(&view, &body.limbs()[limb], &poses[limb], hidden));
+        }
         for chain in chains {
             for limb in [chain.upper, chain.lower] {
                 let in_view = support_in_view(&view, &poses[limb], limb, chain, raycasters);
@@ -61,6 +69,12 @@ pub(crate) fn measure_support(
             }
         }
     }
+}
+
+/// Whether another limb hides a point of a limb, camera frame.
+fn is_hidden(raycasters: &[LimbRaycaster], limb: usize, point: Vec3) -> bool {
+    let hides = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z) < point.z - OVERLAP;
+    raycasters.iter().enumerate().any(|(other, caster)| other != limb && hides(caster))
 }
 
 /// Returns the evidence of one camera on a limb of a chain.
@@ -86,15 +100,15 @@ fn support_in_view(
                 continue;
             }
             support.known = true;
-            let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
-            let others = || raycasters.iter().enumerate().filter(|(other, _)| *other != limb);
-            if others().any(|(_, other)| depth(other) < point.z - OVERLAP) {
+            if is_hidden(raycasters, limb, point) {
                 continue;
             }
+            let depth = |other: &LimbRaycaster| other.depth_at(point.x / point.z, point.y / point.z);
             if sight == PatchVisibility::FreeSpace {
                 count(&mut support.free_space);
             } else if let Some(z) = place.depth_within(EXPLAINED) {
-                let mut unrelated = others().filter(|(other, _)| !chain.limbs().any(|kin| kin == *other));
+                let unrelated = |other: &usize| *other != limb && !chain.limbs().any(|kin| kin == *other);
+                let mut unrelated = raycasters.iter().enumerate().filter(|(other, _)| unrelated(other));
                 if !unrelated.any(|(_, other)| (depth(other) - z).abs() < EXPLAINED) {
                     count(&mut support.own);
                 }

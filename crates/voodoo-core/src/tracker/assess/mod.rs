@@ -27,7 +27,6 @@ use crate::fit::{Context, Matched};
 use crate::math::{Pose, Vec3};
 use crate::terms::APART;
 use crate::uncertainty::{EdgeFilter, Uncertainty};
-use crate::visibility::evidence::limb_visibility;
 use crate::visibility::limb_support::{LimbSupport, measure_support};
 use crate::visibility::render::LimbRaycaster;
 use crate::visibility::roundness::roundness;
@@ -193,7 +192,7 @@ impl Assessor {
         self.exclusive.count(body, poses, context.observation.candidates);
         measure_support(views, body, poses, &context.model.extremities, &mut self.raycasters, &mut self.supports);
         for (limb, history) in self.limbs.iter_mut().enumerate() {
-            let visibility = limb_visibility(views, &body.limbs()[limb], &poses[limb]);
+            let visibility = self.supports[limb].patches;
             let visible = visibility.front_facing - visibility.occluded;
             let exclusive = self.exclusive.weight[limb];
             let mut now = if visibility.front_facing > 0.0 {
