@@ -9,11 +9,8 @@ use crate::regions::{Backdrop, Posed};
 
 /// Number of ICP steps that refine a hypothesis: more than a frame has, because a hypothesis starts farther from the solution.
 pub(crate) const REFINE: usize = 8;
-/// Step at which a hypothesis is rejected if it costs more than the current pose. A test in an earlier step rejected correct ones
-/// that started far away.
-const GIVE_UP_AFTER: usize = 6;
 /// Number of first steps that use a subsample of the points. The final cost uses all points.
-const ROUGH_STEPS: usize = GIVE_UP_AFTER;
+const ROUGH_STEPS: usize = 6;
 /// A hypothesis whose arms and legs all come within this distance of the current pose is the same pose, meters.
 const SAME_POSE: f64 = 0.05;
 
@@ -55,9 +52,7 @@ impl Refined {
         current: f64,
         hypothesis: &[Pose],
     ) -> (usize, bool) {
-        // With color images alone, the cost of intermediate steps is not informative.
-        let most = if context.pictures_alone() { f64::INFINITY } else { current };
-        let (steps, cost) = self.refine_against(context, fit, hypothesis, Some((most, poses)));
+        let (steps, cost) = self.refine_against(context, fit, hypothesis, Some(poses));
         fit.swap_matches(&mut self.matched);
         if steps < REFINE || cost >= current - MARGIN {
             return (steps, false);
@@ -85,21 +80,19 @@ impl Refined {
         self.refine_against(context, fit, hypothesis, None).1
     }
 
-    /// Like [`Self::refine`], but stops early at the other pose of `rival`, and where the cost exceeds that of the other. Returns
-    /// the number of ICP steps and the cost.
+    /// Like [`Self::refine`], but stops early at the pose `rival`. Returns the number of ICP steps and the cost.
     fn refine_against(
         &mut self,
         context: Context,
         fit: &mut Fit,
         hypothesis: &[Pose],
-        rival: Option<(f64, &[Pose])>,
+        rival: Option<&[Pose]>,
     ) -> (usize, f64) {
         self.poses.clear();
         self.poses.extend_from_slice(hypothesis);
         fit.swap_matches(&mut self.matched);
-        let most = rival.map_or(f64::INFINITY, |(most, _)| most);
         for step in 0..REFINE {
-            if rival.is_some_and(|(_, other)| !is_another(context, &self.poses, other)) {
+            if rival.is_some_and(|other| !is_another(context, &self.poses, other)) {
                 return (step, f64::INFINITY);
             }
             // The last step is as at the end of a frame.
@@ -111,24 +104,13 @@ impl Refined {
             } else {
                 fit.match_again(here, &self.poses, at);
             }
-            if step == GIVE_UP_AFTER && most.is_finite() {
-                let cost = self.own_cost(context, fit);
-                if cost > most {
-                    return (step, cost);
-                }
-            }
             fit.solve(here, hypothesis, &mut self.poses, at);
         }
         fit.match_last(context, &self.poses);
-        (REFINE, self.own_cost(context, fit))
-    }
-
-    /// Cost of `self.poses`.
-    fn own_cost(&mut self, context: Context, fit: &Fit) -> f64 {
         let poses = std::mem::take(&mut self.poses);
         let cost = self.cost(context, fit, &poses);
         self.poses = poses;
-        cost
+        (REFINE, cost)
     }
 
     /// Cost of matched poses, nats.
