@@ -139,7 +139,7 @@ def test_ctrl_c_ends_an_evaluation_at_once_and_keeps_what_is_done(tmp_path):
         took = time.perf_counter() - began
     assert running.returncode == 130, err
     done = int(err.split("interrupted: ")[1].split(" of 300")[0])
-    assert not done or f": {done} sequences" in out
+    assert not done or f": {done} sequence" in out
     assert took < 2.0, f"{took:.1f} s"  # on an idle machine 0.3 s
     if done:
         assert len((tmp_path / "report" / "sequences.csv").read_text().splitlines()) == 1 + done
