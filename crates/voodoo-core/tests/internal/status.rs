@@ -110,6 +110,23 @@ fn an_arm_turned_away_any_way_proves_less_than_half() {
 }
 
 #[test]
+fn what_another_limb_hides_counts_as_occluded() {
+    let body = Body::human(1.75, HumanModel::Full).unwrap();
+    let [front, _] = cameras();
+    let mut poses = scene::standing(&body);
+    let neck = body.limb_index("neck").unwrap();
+    let seen = |poses: &[Pose]| {
+        let patches = proofs(&body, poses, &[(shoot(&body, poses, front), front)])[neck].patches;
+        patches.occluded / patches.front_facing
+    };
+    let upright = seen(&poses);
+    // The neck lies in the head, whose surface is less than the tolerance of the depth image before it.
+    poses[neck].translation = poses[body.limb_index("head").unwrap()].translation;
+    let inside = seen(&poses);
+    assert!(upright < 0.5 && inside > 0.9, "{upright} {inside}");
+}
+
+#[test]
 fn what_one_camera_cannot_prove_another_can() {
     let body = Body::human(1.75, HumanModel::Full).unwrap();
     let [front, back] = cameras();
