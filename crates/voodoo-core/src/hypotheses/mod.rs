@@ -27,7 +27,7 @@ use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
 
-/// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of it, where 5 % are usual.
+/// Cost of an unexplained patch below which a frame shows clearly more than the body: 7 % of its points, where 5 % are usual.
 const UNLIKE_FRAME: f64 = 0.85;
 
 /// Tests every arm and leg in every frame.
@@ -63,7 +63,12 @@ impl Hypotheses {
         self.branch.follow(context, fit)
     }
 
-    /// Whether the last frame showed clearly more than the body explains.
+    /// Whether the last frame showed more that the body does not explain than is usual.
+    pub(crate) fn has_excess(&self) -> bool {
+        self.unexplained.clutter < 1.0
+    }
+
+    /// Whether it was clearly more.
     pub(crate) fn unlike(&self) -> bool {
         self.unexplained.clutter < UNLIKE_FRAME
     }

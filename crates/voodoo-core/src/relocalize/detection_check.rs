@@ -4,7 +4,7 @@ use crate::body::Body;
 use crate::detect::{Detected, Detection};
 use crate::math::{Pose, Vec3};
 
-/// Time for which a track is new, seconds. It is also the interval between detections for a suspect limb.
+/// Time for which a track is new, seconds.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;
 /// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two.
 const EVERY: f64 = 0.12;
@@ -24,13 +24,11 @@ pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 /// What the frame before gave as reasons to run the detector.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Reasons {
-    /// A limb was not supported in its pose.
-    pub(crate) limb_suspect: bool,
-    /// It was uncertain whether one was.
-    pub(crate) pose_uncertain: bool,
+    /// A limb was not supported in its pose, or it was uncertain whether one was, or the frame showed more than the body explains.
+    pub(crate) uncertain: bool,
     /// The body may be anywhere.
     pub(crate) anywhere: bool,
-    /// The person's surface is not that of the body, for example in a skirt: with a suspect limb, every frame needs a detection.
+    /// The person's surface is not that of the body, for example in a skirt: every frame needs a detection.
     pub(crate) unlike: bool,
 }
 
@@ -113,7 +111,7 @@ impl DetectionCheck {
     }
 
     /// Whether the detection of this frame is compared with the pose. For a new track only some detections are, because a
-    /// comparison may restart the track and discard its motion; the other detections are for suspect limbs.
+    /// comparison may restart the track and discard its motion; the other detections are for uncertain limbs.
     pub(super) fn compares(&self) -> bool {
         self.compares
     }
@@ -125,16 +123,12 @@ impl DetectionCheck {
 
     /// Counts a frame and returns whether the detector is due.
     pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons) -> bool {
-        let Reasons { limb_suspect, pose_uncertain, anywhere, unlike } = reasons;
+        let Reasons { uncertain, anywhere, unlike } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
-        let waited = |last_detection: Option<f64>, every: f64| {
-            last_detection.is_none_or(|last_detection| stamp - last_detection >= every)
-        };
-        let comparison_due = new_track && waited(self.last_comparison, EVERY);
-        let every = if pose_uncertain || anywhere { EVERY } else { NEW_TRACK_AGE };
-        let suspect = limb_suspect || pose_uncertain || anywhere;
-        self.counts = comparison_due || suspect && waited(self.last_detection, every);
+        let waited = |last: Option<f64>| last.is_none_or(|last| stamp - last >= EVERY);
+        let comparison_due = new_track && waited(self.last_comparison);
+        self.counts = comparison_due || (uncertain || anywhere) && waited(self.last_detection);
         self.compares = comparison_due || !new_track;
         if comparison_due {
             self.last_comparison = Some(stamp);
@@ -142,7 +136,7 @@ impl DetectionCheck {
         if self.counts {
             self.last_detection = Some(stamp);
         }
-        self.counts || limb_suspect && unlike
+        self.counts || unlike
     }
 
     /// Compares a detection with the trunk at these poses, whose frame has its origin at `origin` in the world.
@@ -186,20 +180,19 @@ mod tests {
 
     #[test]
     fn new_lost_and_uncertain_tracks_are_checked_often_and_confident_ones_never() {
-        let count = |from: f64, [limb_suspect, pose_uncertain, anywhere]: [bool; 3]| {
-            let reasons = Reasons { limb_suspect, pose_uncertain, anywhere, unlike: false };
+        let count = |from: f64, reasons: Reasons| {
             let mut check = DetectionCheck::default();
             check.is_due(0.0, Reasons::default());
             (1..=28).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
         };
-        let none = [false; 3];
-        assert_eq!([count(0.0, none), count(2.0, [false, false, true]), count(2.0, [false, true, false])], [7; 3]);
-        assert_eq!([count(2.0, [true, false, false]), count(2.0, none)], [1, 0]);
+        let none = Reasons::default();
+        let [uncertain, anywhere] = [Reasons { uncertain: true, ..none }, Reasons { anywhere: true, ..none }];
+        assert_eq!([count(0.0, none), count(2.0, uncertain), count(2.0, anywhere), count(2.0, none)], [7, 7, 7, 0]);
     }
 
     #[test]
-    fn a_suspect_limb_of_an_unlike_person_is_detected_in_every_frame_and_few_of_these_count_against_the_person() {
-        let reasons = Reasons { limb_suspect: true, unlike: true, ..Reasons::default() };
+    fn an_unlike_person_is_detected_in_every_frame_and_few_of_these_count_against_the_person() {
+        let reasons = Reasons { uncertain: true, unlike: true, ..Reasons::default() };
         let mut check = DetectionCheck::default();
         check.is_due(0.0, Reasons::default());
         let mut counted = 0;
@@ -207,7 +200,7 @@ mod tests {
             assert!(check.is_due(2.0 + f64::from(frame) / 30.0, reasons));
             counted += usize::from(check.counts);
         }
-        assert_eq!(counted, 1);
+        assert_eq!(counted, 7);
     }
 
     #[test]

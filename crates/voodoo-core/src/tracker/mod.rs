@@ -244,11 +244,11 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
+        // Beside other persons, what the body does not explain may be theirs.
+        let suspect = ownership.alone && (hypotheses.has_excess() || assessor.has_suspect_limb());
         let reasons = Reasons {
-            limb_suspect: assessor.has_suspect_limb() || sizes.is_uncertain(),
-            pose_uncertain: assessor.is_uncertain(),
+            uncertain: suspect || assessor.is_uncertain() || sizes.is_uncertain(),
             anywhere: interrupted,
-            // Beside other persons, what the body does not explain may be theirs.
             unlike: ownership.alone && hypotheses.unlike(),
         };
         // A lost body is searched for with everybody's detections, see `crate::People`.
