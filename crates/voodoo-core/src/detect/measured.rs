@@ -65,8 +65,8 @@ impl Detected<'_> {
         joints.extend(self.on_sites().map(|(site, joint)| {
             let [limb, parent] = joined_limbs(body, site);
             let factor = 1.0 + DOUBTED * doubt * off(limb).max(off(parent));
-            let DetectedJoint { position, sigma, .. } = *joint;
-            MeasuredJoint { site, position, sigma, information: factor / (sigma * sigma) }
+            let DetectedJoint { position, sigma, visible } = *joint;
+            MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
         }));
     }
 }
