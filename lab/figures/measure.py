@@ -1,8 +1,7 @@
 """Measure figures again: `python -m lab.figures.measure [ID ...] [--data D] [--jobs 2]`.
 
 Runs the commands of runs of runs.json (by default of all whose output is read here) with this build, and writes the values, the
-commit and the date. Runs that share a command share its output. What takes a quiet machine (times), training or a look (pictures
-of rooms and of people) is not here.
+commit and the date. Runs that share a command share its output. What takes a quiet machine (times) or training is not here.
 """
 
 from __future__ import annotations
@@ -23,6 +22,8 @@ from pathlib import Path
 
 from lab.figures.pages import HERE, ROOT
 
+COVERED_CM = 7
+"""Below this error a person was found again."""
 ANYBODY = {"child": "ab_d1", "wheelchair": "ab_d2", "desk": "ab_d3", "skirt": "ab_d4", "heavy": "ab_d5"}
 
 
@@ -164,15 +165,48 @@ def empty_rooms(output: Output) -> dict[str, float]:
     return {"seconds": number(output.row("together")[1]), "false_bodies": number(output.row("together")[2])}
 
 
+def covered(output: Output) -> dict[str, float]:
+    """Cases whose error is small half a second later, with and without relocalization."""
+    cases = [[number(cell) for cell in row[3:5]] for row in output.rows if row[0].startswith("dev_")]
+    back, no_search = (sum(case[kind] < COVERED_CM for case in cases) for kind in (0, 1))
+    return {"cases": len(cases), "back": back, "limit_cm": COVERED_CM, "no_search": no_search}
+
+
+def stress(output: Output) -> dict[str, float]:
+    """The default strength of the jitter penalty, and none."""
+    [_, lost, mean, *_] = output.row("0.25")
+    [of, joints] = lost.split(" of ")
+    values = {"mean_mm": number(mean.split(" / ")[0]), "lost": number(of), "joints": number(joints)}
+    return values | {"no_prior_mm": number(output.row("100 ")[2].split(" / ")[0])}
+
+
+def real(output: Output) -> dict[str, float]:
+    """Persons found in images of one, of five, and of head and shoulders; false bodies in those of none."""
+    persons = {row[0]: number(row[1]) for row in output.rows[2:]}
+    single = [found for name, found in persons.items() if name.startswith(("uc_alberto", "uc_juggling"))]
+    rooms = [number(row[2]) for row in output.rows if row[0].startswith(("neg_", "uc_empty"))]
+    group, near = persons["pcl_five"], persons["pcl_person"]
+    return {
+        "images": len(single), "found": sum(found == 1 for found in single), "group": 5, "group_found": group,
+        "near": 1, "near_found": near, "rooms": len(rooms), "false_bodies": sum(rooms),
+    }  # fmt: skip
+
+
+def rooms(output: Output) -> dict[str, float]:
+    """Images of rooms without a person."""
+    of = real(output)
+    return {"images": of["rooms"], "false_bodies": of["false_bodies"]}
+
+
 READ: dict[str, Read] = {
     **dict.fromkeys(("rendered", "rendered-auto", "kinect", "kinect-auto", "kinect-others"), evaluated),
-    **dict.fromkeys(("kinect-others-status", "sitting"), evaluated),
+    **dict.fromkeys(("kinect-others-status", "rendered-status", "sitting"), evaluated),
     **dict.fromkeys(("disturbed", "backwards", "every-second"), disturbed),
     **dict.fromkeys(("anybody", "anybody-given"), anybody),
     **dict.fromkeys(("wrong-start-rendered", "wrong-start-kinect"), wrong_starts),
     **{"missing": changed("missing"), "missing-noise": changed("noise"), "missing-pixel": changed("pixel")},
     **{"people": people, "made-up-people": made_up, "passer-by": passed_by, "cut-pictures": cut},
-    "empty-rooms": empty_rooms,
+    **{"empty-rooms": empty_rooms, "covered": covered, "stress": stress, "real-people": real, "real-rooms": rooms},
 }
 """How the values of a run of runs.json are read from what its command prints."""
 
