@@ -192,12 +192,6 @@ def real(output: Output) -> dict[str, float]:
     }  # fmt: skip
 
 
-def rooms(output: Output) -> dict[str, float]:
-    """Images of rooms without a person."""
-    of = real(output)
-    return {"images": of["rooms"], "false_bodies": of["false_bodies"]}
-
-
 READ: dict[str, Read] = {
     **dict.fromkeys(("rendered", "rendered-auto", "kinect", "kinect-auto", "kinect-others"), evaluated),
     **dict.fromkeys(("kinect-others-status", "rendered-status", "sitting"), evaluated),
@@ -206,7 +200,7 @@ READ: dict[str, Read] = {
     **dict.fromkeys(("wrong-start-rendered", "wrong-start-kinect"), wrong_starts),
     **{"missing": changed("missing"), "missing-noise": changed("noise"), "missing-pixel": changed("pixel")},
     **{"people": people, "made-up-people": made_up, "passer-by": passed_by, "cut-pictures": cut},
-    **{"empty-rooms": empty_rooms, "covered": covered, "stress": stress, "real-people": real, "real-rooms": rooms},
+    **{"empty-rooms": empty_rooms, "covered": covered, "stress": stress, "real-people": real, "real-rooms": real},
 }
 """How the values of a run of runs.json are read from what its command prints."""
 

@@ -63,12 +63,12 @@ impl Hypotheses {
         self.branch.follow(context, fit)
     }
 
-    /// Whether the last frame showed more that the body does not explain than is usual.
+    /// Whether the body left more of the last frame unexplained than is usual.
     pub(crate) fn has_excess(&self) -> bool {
         self.unexplained.clutter < 1.0
     }
 
-    /// Whether it was clearly more.
+    /// Whether it left clearly more.
     pub(crate) fn unlike(&self) -> bool {
         self.unexplained.clutter < UNLIKE_FRAME
     }
