@@ -100,6 +100,12 @@ impl PyEstimate {
         mapping(py, &self.names.limbs, self.estimate.limb_status.iter().map(|status| status.name()))
     }
 
+    #[doc = stub!("Estimate.limb_probability")]
+    #[getter]
+    fn limb_probability<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        mapping(py, &self.names.limbs, self.estimate.limb_probability.iter())
+    }
+
     #[doc = stub!("Estimate.steps")]
     #[getter]
     fn steps(&self) -> usize {

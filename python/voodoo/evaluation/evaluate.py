@@ -41,7 +41,7 @@ _OF_TERMINALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGHUP") if 
 """Signals of Ctrl-C and of a terminal that is closed."""
 
 
-_CARRIER = {
+CARRIER = {
     f"{side}_{joint}": f"{side}_{limb}"
     for side in ("l", "r")
     for joint, limb in (("elbow", "upperarm"), ("wrist", "forearm"), ("knee", "thigh"), ("ankle", "calf"))
@@ -104,19 +104,19 @@ def compare(recording: Recording, result: Track, *, at_best_lag: bool = False) -
 def differences(recording: Recording, result: Track, *, at_best_lag: bool = False) -> FloatArray:
     """Errors by coordinate, (F, 12, 3): estimate minus reference."""
     positions = metrics.places_of(result.joint_names, result.joints)
-    reference = _reference_positions(recording, result.stamps)
+    reference = reference_positions(recording, result.stamps)
     lag = metrics.best_lag(positions, reference) if at_best_lag else 0
     return np.asarray(positions - metrics.shifted(reference, lag))
 
 
 def called_measured(estimate: Estimate) -> BoolArray:
     """For metrics.JOINTS (12,), whether the status of the limb that ends there is "measured"; False for joints of the trunk."""
-    return np.array([estimate.limb_status.get(_CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
+    return np.array([estimate.limb_status.get(CARRIER.get(name, "")) == "measured" for name in metrics.JOINTS])
 
 
 def limb_ends(errors: FloatArray, *, far: bool) -> BoolArray:
     """Masks (F, 12) of the joints at ends of limbs that are farther than LIMIT_EXACT_M from the truth, and of the nearer ones."""
-    ends = np.array([name in _CARRIER for name in metrics.JOINTS])
+    ends = np.array([name in CARRIER for name in metrics.JOINTS])
     return np.asarray(np.isfinite(errors) & ends & ((errors > LIMIT_EXACT_M) == far))
 
 
@@ -204,7 +204,7 @@ def _score(
     stamp, status, time, seen, joints, known, spread = zip(*steps, strict=True)
     stamps, seconds, positions, measured, sigma = map(np.array, (stamp, time, joints, known, spread))
     overlaps, within = (np.array([getattr(one, name) for one in seen]) for name in ("iou", "within"))
-    whole = _reference_positions(recording, stamps)
+    whole = reference_positions(recording, stamps)
     exact = None if recording.reference is None else recording.reference.exact
     reference = metrics.without_contradictions(whole) if exact is False else whole
     lag = metrics.best_lag(positions, reference)
@@ -283,7 +283,7 @@ def _first_pose(
     return max(float(stamps[found[0]] - stamps[known[0]]), 0.0), metrics.mean_or_nan(errors[found[0]])
 
 
-def _reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
+def reference_positions(recording: Recording, stamps: FloatArray) -> FloatArray:
     """Reference of the twelve joints at the stamps, (F, 12, 3); NaN where there is none."""
     reference = recording.reference
     if reference is None:

@@ -120,6 +120,8 @@ pub struct Estimate {
     pub status: Status,
     /// Reliability of every limb's pose.
     pub limb_status: Vec<LimbStatus>,
+    /// Probability that the distal end of every limb is within 10 cm of its position. The status is `Measured` from 0.8 on.
+    pub limb_probability: Vec<f64>,
     /// Pose of every limb.
     pub world_from_limb: Vec<Pose>,
     /// Position of every site.
@@ -147,6 +149,7 @@ impl Default for Estimate {
             stamp: f64::NAN,
             status: Status::default(),
             limb_status: Vec::new(),
+            limb_probability: Vec::new(),
             world_from_limb: Vec::new(),
             sites: Vec::new(),
             mean_squared_distance: f64::NAN,

@@ -247,7 +247,7 @@ impl BodyTracker {
         // Beside other persons, what the body does not explain may be theirs.
         let suspect = ownership.alone && (hypotheses.has_excess() || assessor.has_suspect_limb());
         let reasons = Reasons {
-            uncertain: suspect || assessor.is_uncertain() || sizes.is_uncertain(),
+            uncertain: suspect || assessor.is_uncertain(&model.extremities) || sizes.is_uncertain(),
             anywhere: interrupted,
             unlike: ownership.alone && hypotheses.unlike(),
         };

@@ -4,8 +4,6 @@
 use super::Assessor;
 use crate::association::correspondence::RegionSupport;
 use crate::body::Model;
-use crate::body::two_bone::TwoBone;
-use crate::tracker::estimate::LimbStatus;
 use crate::uncertainty::FittedPose;
 use crate::visibility::EXPLAINED;
 
@@ -27,97 +25,94 @@ impl Assessor {
         let FittedPose { poses, correspondences, time_scale, config, .. } = found;
         let points = correspondences.limbs.iter().any(|matches| !matches.candidate.is_empty());
         let pictures = !correspondences.region_support.is_empty();
-        if points || !pictures && self.edge_uncertainty.is_empty() {
+        if points || !pictures && !self.by_edges {
             self.forget_edges();
             return;
         }
+        self.by_edges = true;
         self.edges.observe(model, poses, correspondences, time_scale, config);
-        let Self { edges, edge_uncertainty, .. } = self;
-        edge_uncertainty.resize(poses.len(), f64::NAN);
-        for (limb, known) in edge_uncertainty.iter_mut().enumerate() {
-            let support = correspondences.region_support.get(limb).copied();
-            let RegionSupport { own, visible, .. } = support.unwrap_or_default();
-            let sigma = edges.end_sigma(limb) * branch_distance(limb).map_or(1.0, sigma_factor);
-            // A standard deviation of `EXPLAINED` suffices. Full support of a limb by color reduces its uncertainty by a factor
-            // of e.
-            *known = (sigma / EXPLAINED).ln() - own[0] * visible;
+        let Self { edges, log_odds, .. } = self;
+        for chain in &model.extremities {
+            for limb in [chain.upper, chain.lower] {
+                let support = correspondences.region_support.get(limb).copied();
+                let RegionSupport { own, visible, .. } = support.unwrap_or_default();
+                let sigma = edges.end_sigma(limb) * branch_distance(limb).map_or(1.0, sigma_factor);
+                // A standard deviation of `EXPLAINED` suffices. Full support of a limb by color reduces its uncertainty by a factor
+                // of e.
+                log_odds[limb] = own[0] * visible - (sigma / EXPLAINED).ln();
+            }
+            chain.ends.iter().for_each(|end| log_odds[*end] = log_odds[chain.lower]);
         }
     }
 
     /// Discards all evidence from color edges.
     pub(super) fn forget_edges(&mut self) {
         self.edges.forget();
-        self.edge_uncertainty.clear();
-    }
-
-    /// Whether color edges are the only evidence.
-    pub(super) fn is_by_edges_alone(&self) -> bool {
-        !self.edge_uncertainty.is_empty()
-    }
-
-    /// Sets the status of arms and legs from color-edge uncertainty when no other evidence is available.
-    pub(super) fn report_edges(&self, extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
-        for chain in extremities.iter().filter(|_| self.is_by_edges_alone()) {
-            for limb in [chain.upper, chain.lower] {
-                statuses[limb] = match statuses[limb] {
-                    _ if self.edge_uncertainty[limb] < 0.0 => LimbStatus::Measured,
-                    LimbStatus::Measured => LimbStatus::Inferred,
-                    limb_suspect => limb_suspect,
-                };
-            }
-            chain.ends.iter().for_each(|end| statuses[*end] = statuses[chain.lower]);
-        }
+        self.by_edges = false;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::association::correspondence::{Correspondences, RegionPair};
+    use crate::association::correspondence::{Correspondences, LimbMatches, RegionPair};
     use crate::config::Config;
-    use crate::math::Vec3;
+    use crate::math::{Pose, Vec3};
     use crate::testing::{first_arm, standing};
 
-    #[test]
-    fn arms_and_legs_are_measured_where_edges_are_sharp() {
-        let (model, poses) = standing();
-        let chain = &model.extremities[0];
-        let statuses = |internal: LimbStatus, sure: bool| {
-            let mut assessor =
-                Assessor { edge_uncertainty: vec![if sure { -1.0 } else { 1.0 }; poses.len()], ..Assessor::default() };
-            let mut statuses = vec![internal; poses.len()];
-            assessor.report_edges(&model.extremities, &mut statuses);
-            assessor.forget_edges();
-            let mut forgotten = vec![internal; poses.len()];
-            assessor.report_edges(&model.extremities, &mut forgotten);
-            assert_eq!(forgotten, vec![internal; poses.len()], "edges only count as the only evidence");
-            (statuses[0], [chain.upper, chain.lower, chain.ends[0]].map(|limb| statuses[limb]))
-        };
-        let (measured, inferred, lost) = (LimbStatus::Measured, LimbStatus::Inferred, LimbStatus::Lost);
-        assert_eq!(statuses(measured, false), (measured, [inferred; 3]));
-        assert_eq!(statuses(lost, false), (lost, [lost; 3]));
-        assert_eq!(statuses(lost, true), (lost, [measured; 3]));
-    }
-
-    #[test]
-    fn a_limb_is_uncertain_where_the_second_branch_ends_elsewhere() {
-        let (model, poses) = standing();
+    /// Edges of this information on every limb, 1/m^2.
+    fn edges_of(model: &Model, poses: &[Pose], information: f64) -> Correspondences {
         let mut correspondences = Correspondences::default();
         for (limb, part) in model.body.limbs().iter().enumerate() {
             for (step, normal) in (0..8).flat_map(|step| Vec3::AXES.map(|normal| (step, normal))) {
                 let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
-                correspondences.regions.push(RegionPair {
-                    limb,
-                    x,
-                    normal,
-                    distance: 0.0,
-                    information: 5e3,
-                    source: 0,
-                });
+                let (distance, source) = (0.0, 0);
+                correspondences.regions.push(RegionPair { limb, x, normal, distance, information, source });
             }
             let support = RegionSupport { own: [0.6; 2], visible: 0.6, ..RegionSupport::default() };
             correspondences.region_support.push(support);
         }
+        correspondences
+    }
+
+    /// Log odds of an arm, and of its hand, after a frame with these edges; `apart` is the distance of the second branch.
+    fn log_odds(information: f64, apart: Option<f64>) -> [f64; 3] {
+        let (model, poses) = standing();
+        let (body, config) = (&model.body, Config::default());
+        let found = FittedPose {
+            body,
+            poses: &poses,
+            correspondences: &edges_of(&model, &poses, information),
+            pairs: &[],
+            sizes_found: false,
+            time_scale: 1.0,
+            config: &config,
+        };
+        let mut assessor = Assessor { log_odds: vec![f64::NAN; poses.len()], ..Assessor::default() };
+        assessor.follow_edges(&model, found, |_| apart);
+        let arm = &model.extremities[first_arm(&model)];
+        assert!(assessor.by_edges && assessor.log_odds[0].is_nan(), "the trunk's odds are kept");
+        [arm.upper, arm.lower, arm.ends[0]].map(|limb| assessor.log_odds[limb])
+    }
+
+    #[test]
+    fn arms_are_supported_where_edges_are_sharp() {
+        let (sharp, blurred) = (log_odds(5e3, None), log_odds(1.0, None));
+        assert!(sharp.iter().all(|sharp| *sharp > 0.0) && blurred.iter().all(|blurred| *blurred < 0.0));
+        assert_eq!(sharp[1].to_bits(), sharp[2].to_bits(), "the hand's odds are the forearm's");
+    }
+
+    #[test]
+    fn a_limb_is_uncertain_where_the_second_branch_ends_elsewhere() {
+        let [alone, agreed, elsewhere] = [None, Some(0.0), Some(5.0)].map(|apart| log_odds(5e3, apart)[1]);
+        assert!(agreed > alone && alone > 0.0 && elsewhere < 0.0, "{agreed} {alone} {elsewhere}");
+    }
+
+    #[test]
+    fn points_replace_edges() {
+        let (model, poses) = standing();
+        let mut correspondences = edges_of(&model, &poses, 5e3);
+        correspondences.limbs.push(LimbMatches { candidate: vec![0], ..LimbMatches::default() });
         let (body, config) = (&model.body, Config::default());
         let found = FittedPose {
             body,
@@ -128,17 +123,8 @@ mod tests {
             time_scale: 1.0,
             config: &config,
         };
-        let arm = &model.extremities[first_arm(&model)];
-        let mut assessor = Assessor::default();
-        let mut status = |apart: Option<f64>| {
-            assessor.follow_edges(&model, found, |_| apart);
-            let mut statuses = vec![LimbStatus::Measured; poses.len()];
-            assessor.report_edges(&model.extremities, &mut statuses);
-            (statuses[arm.lower] == LimbStatus::Measured, assessor.edge_uncertainty[arm.lower])
-        };
-        let (alone, agreed) = (status(None), status(Some(0.0)));
-        assert!(alone.0 && agreed.0 && agreed.1 < alone.1, "{alone:?} {agreed:?}");
-        let branch_distance = status(Some(5.0));
-        assert!(!branch_distance.0 && branch_distance.1 > alone.1, "{branch_distance:?}");
+        let mut assessor = Assessor { by_edges: true, log_odds: vec![2.0; poses.len()], ..Assessor::default() };
+        assessor.follow_edges(&model, found, |_| None);
+        assert_eq!((assessor.by_edges, assessor.log_odds), (false, vec![2.0; poses.len()]));
     }
 }

@@ -1,20 +1,22 @@
 //! Assesses every limb, and from the limbs the body: measured, inferred or lost.
 //!
+//! Each limb has a filter of the odds that its pose is right. Its probability is a fitted function of them, and its status a cut of
+//! that.
+//!
 //! A limb that overlaps another one explains points that the other explains as well, and it is visible to the cameras in its
 //! pose; neither is evidence that its pose is right. Evidence for a limb is what it alone explains, compared with the visible
 //! part of its surface. A free-space violation is evidence against it. For arms and legs, `limb_support` evaluates the depth
-//! images in more detail; without any depth image, the status of an arm or leg follows from its parent.
+//! images in more detail.
 //!
 //! A lower limb is right only if the whole arm or leg is: without evidence for the upper arm, a forearm may have been fitted to
 //! any object. The distal end of an upper limb is supported where its outer part is visible or where its lower limb begins.
 //!
-//! The internal status of the body depends on support alone, because a lost body starts a search and arms in front of the trunk
-//! must not start one. However, a body with more than a quarter of its limbs not measured is never reported as tracked.
+//! A body with more than a quarter of its limbs not measured is not tracked.
 
 mod detected;
 mod edges;
 mod exclusive;
-mod limb_history;
+mod limb_filter;
 mod spread;
 mod two_state;
 
@@ -33,7 +35,7 @@ use crate::visibility::roundness::roundness;
 use crate::visibility::{EXPLAINED, FEW, LITTLE};
 use detected::detection_log_odds;
 use exclusive::Exclusive;
-use limb_history::LimbHistory;
+use limb_filter::LimbFilter;
 use two_state::{EVEN, all_log_odds, any_log_odds, support_log_odds};
 
 /// Weight of past frames in the running mean of the roundness: a single blurred frame must not make the body flat.
@@ -41,26 +43,34 @@ const ROUNDNESS_MEMORY: f64 = 0.9;
 /// Limits for the fraction of limbs. A tracked body has at most this fraction not measured. A body is lost if less than this
 /// fraction is measured, or, where the root is not measured, less than twice this fraction.
 const SOME: f64 = 0.25;
+/// Weight of the fraction of its surface that a limb explains exclusively by points, relative to the one that patches support.
+const OF_EXCLUSIVE: f64 = 0.5;
+/// Logarithm of the odds that the distal end of a limb is within 10 cm of its position: this constant, plus this multiple of the log
+/// odds that measurements support the limb. Fitted by `lab/experiments/limb_probability.py`.
+const WITHIN_10_CM: [f64; 2] = [1.38, 0.43];
 /// A body is not tracked if it misses the measurements of a source by more than this, root mean square, meters.
 const MISSED: f64 = 0.15;
 
-/// Assesses every frame and keeps running means of past assessments.
+/// Assesses every frame and keeps the odds of every limb.
 #[derive(Debug, Default)]
 pub(super) struct Assessor {
-    limbs: Vec<LimbHistory>,
+    limbs: Vec<LimbFilter>,
     /// Running mean of the roundness of the surface observed at the tracked pose.
     round: Option<f64>,
     /// Internal status of the body and of its limbs, which the tracker itself uses; `internal` is empty before the first frame.
     status: Status,
     internal: Vec<LimbStatus>,
+    /// Log odds that each limb is right, of which its reported status and probability are functions.
+    log_odds: Vec<f64>,
+    /// Evidence of this frame for each limb, other than that of patches for arms and legs: log odds.
+    evidence: Vec<f64>,
     exclusive: Exclusive,
     raycasters: Vec<LimbRaycaster>,
     supports: Vec<LimbSupport>,
     uncertainty: Uncertainty,
     edges: EdgeFilter,
-    /// Logarithm of each limb's uncertainty from color edges, relative to its limit: a limb is uncertain above 0. Empty unless
-    /// color edges are the only evidence.
-    edge_uncertainty: Vec<f64>,
+    /// Whether color edges are the only evidence.
+    by_edges: bool,
 }
 
 impl Assessor {
@@ -98,6 +108,7 @@ impl Assessor {
     fn give_up(&mut self) {
         self.status = Status::Lost;
         self.internal.fill(LimbStatus::Lost);
+        self.log_odds.fill(f64::NEG_INFINITY);
     }
 
     /// Internal status of the body, which the tracker itself uses.
@@ -106,8 +117,9 @@ impl Assessor {
     }
 
     /// Whether the status of an arm or leg has low confidence.
-    pub(super) fn is_uncertain(&self) -> bool {
-        self.limbs.iter().any(LimbHistory::is_uncertain)
+    pub(super) fn is_uncertain(&self, extremities: &[TwoBone]) -> bool {
+        let limbs = extremities.iter().flat_map(|chain| [chain.upper, chain.lower]);
+        limbs.filter_map(|limb| self.limbs.get(limb)).any(LimbFilter::is_uncertain)
     }
 
     /// Whether the tracker relies on a limb: its internal status is measured.
@@ -123,22 +135,19 @@ impl Assessor {
             self.limbs.clear();
         }
         self.update_limbs(context, matched, detected);
-        let extremities = &context.model.extremities;
-        let Self { limbs, internal, .. } = self;
+        let Self { limbs, internal, log_odds, .. } = self;
+        log_odds.clear();
+        log_odds.extend(limbs.iter().map(|limb| limb.log_odds()[0]));
         internal.clear();
-        internal.extend(limbs.iter().map(LimbHistory::supported));
-        for chain in extremities {
-            if internal[chain.lower] == LimbStatus::Measured {
-                internal[chain.lower] = internal[chain.upper];
+        internal.extend(limbs.iter().zip(log_odds.iter()).map(|(limb, log_odds)| limb.status(*log_odds)));
+        for chain in &context.model.extremities {
+            // Hands and feet have too few patches for odds of their own.
+            for end in &chain.ends {
+                internal[*end] = internal[chain.lower];
+                log_odds[*end] = limbs[chain.lower].log_odds()[1];
             }
         }
-        inherit_status(extremities, internal);
-        // By support alone: a lost body starts a search, and arms in front of the trunk must not start one.
         self.status = overall(internal, |limb| limbs[limb].is_visible());
-        for limb in extremities.iter().flat_map(|chain| [chain.upper, chain.lower]) {
-            internal[limb] = limbs[limb].status(internal[limb]);
-        }
-        inherit_status(extremities, internal);
         if let Some(now) = roundness(context.observation.views, &context.model.body, matched.poses) {
             let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
             self.round = Some(self.round.map_or(now, mixed));
@@ -152,26 +161,19 @@ impl Assessor {
     /// does. A body with too many limbs not measured, far from a source's measurements, or without any that match, is not
     /// reported as tracked.
     pub(super) fn report_status(&self, model: &Model, estimate: &mut Estimate) {
-        let statuses = &mut estimate.limb_status;
+        let Estimate { limb_status: statuses, limb_probability: probabilities, .. } = estimate;
         statuses.clear();
+        probabilities.clear();
         if self.internal.is_empty() {
             // A pose that was set, before its first frame.
             statuses.resize(model.body.limbs().len(), LimbStatus::Inferred);
+            probabilities.resize(model.body.limbs().len(), probability(0.0));
             estimate.status = self.status;
             return;
         }
-        statuses.extend_from_slice(&self.internal);
-        self.report_edges(&model.extremities, statuses);
-        // If all limbs are lost, the ends stay lost, too.
-        if statuses.iter().any(|status| *status != LimbStatus::Lost) {
-            for chain in &model.extremities {
-                // The inner part of a forearm may be measured while its distal end and the hand are not.
-                let hidden =
-                    statuses[chain.lower] == LimbStatus::Measured && !self.limbs[chain.lower].is_end_supported();
-                chain.ends.iter().filter(|_| hidden).for_each(|end| statuses[*end] = LimbStatus::Inferred);
-            }
-        }
-        let status = if self.is_by_edges_alone() { overall(statuses, |_| true) } else { self.status };
+        statuses.extend(self.limbs.iter().zip(&self.log_odds).map(|(limb, log_odds)| limb.status(*log_odds)));
+        probabilities.extend(self.log_odds.iter().map(|log_odds| probability(*log_odds)));
+        let status = if self.by_edges { overall(statuses, |_| true) } else { self.status };
         // Nothing may match a pose that was set, however much was measured.
         let sources = &estimate.sources;
         let missed = sources.iter().any(|source| source.residual > MISSED)
@@ -185,73 +187,82 @@ impl Assessor {
         self.internal.clear();
     }
 
-    /// Updates the history of every limb with this frame.
+    /// Updates the filter of every limb with this frame.
     fn update_limbs(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
         let (body, views, poses) = (&context.model.body, context.observation.views, matched.poses);
-        self.limbs.resize(poses.len(), LimbHistory::default());
+        self.limbs.resize(poses.len(), LimbFilter::default());
         self.exclusive.count(body, poses, context.observation.candidates);
         measure_support(views, body, poses, &context.model.extremities, &mut self.raycasters, &mut self.supports);
-        for (limb, history) in self.limbs.iter_mut().enumerate() {
-            let visibility = self.supports[limb].patches;
-            let visible = visibility.front_facing - visibility.occluded;
+        self.evidence.clear();
+        for (limb, filter) in self.limbs.iter_mut().enumerate() {
+            let support = &mut self.supports[limb];
+            let patches = support.patches;
+            let visible = patches.front_facing - patches.occluded;
             let exclusive = self.exclusive.weight[limb];
-            let mut now = if visibility.front_facing > 0.0 {
-                let past = visibility.free_space / visibility.front_facing;
-                [exclusive / visible.max(FEW), past, visible / visibility.front_facing]
+            let unseen = patches.front_facing == 0.0;
+            // Evidence for the limb, evidence against it and its unoccluded part, as fractions of its surface.
+            let mut now = if unseen {
+                [EVEN * exclusive / FEW, 0.0, 0.0]
             } else {
-                [2.0 * EVEN * exclusive / FEW, 0.0, 0.0]
+                let past = patches.free_space / patches.front_facing;
+                [OF_EXCLUSIVE * ((exclusive / visible.max(FEW)).min(1.0) - past), past, visible / patches.front_facing]
             };
             let near = |pair: &SitePair| pair.weight > 0.0 && (pair.x - pair.p).length() < APART;
             let site = |pair: &SitePair| pair.limb == limb && near(pair);
             // Hip sites measure the pelvis, and shoulder sites the clavicles, where no depth image covers these limbs.
-            let unseen = visibility.front_facing == 0.0;
             let joined = |pair: &SitePair| unseen && near(pair) && limb_joined_at(body, poses, pair) == Some(limb);
-            let support = &mut self.supports[limb];
             if matched.correspondences.sites.iter().any(|pair| site(pair) || joined(pair)) {
-                now = [1.0, 0.0, 1.0];
+                now = [OF_EXCLUSIVE, 0.0, 1.0];
                 support.known = false;
             }
             // Without depth coverage, color images give the evidence.
             if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
-                now = [colors.own[0] * colors.visible, colors.against[0], colors.visible];
+                now = [OF_EXCLUSIVE * colors.own[0] * colors.visible, colors.against[0], colors.visible];
             }
             // Depth images do not contradict a limb that point clouds of other sensors measure.
             support.known &= self.exclusive.clouds[limb] < FEW;
-            history.update(now.map(|value| value.min(1.0)));
+            filter.see(now[1], now[2]);
+            self.evidence.push(support_log_odds(now[0]));
             let far_end =
                 |poses: &[Pose]| poses.get(limb).map(|pose| *pose * (body.limbs()[limb].shape.length() * Vec3::Z));
-            history
+            filter
                 .moved(far_end(poses).zip(far_end(context.previous)).map_or(Vec3::ZERO, |(now, before)| now - before));
         }
-        self.weigh_images(context, matched, detected);
+        self.weigh_evidence(context, matched, detected);
     }
 
-    /// Updates arms and legs with the evidence of this frame's images and of a detection, if there is one.
-    fn weigh_images(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
+    /// Updates the odds of every limb with the evidence of this frame and of a detection, if there is one.
+    fn weigh_evidence(&mut self, context: Context, matched: Matched, detected: Option<Detected>) {
         let poses = matched.poses;
-        let Self { limbs, supports, .. } = self;
+        let Self { limbs, supports, evidence, .. } = self;
         let (model, origin) = (context.model, context.observation.origin());
+        for (limb, filter) in limbs.iter_mut().enumerate() {
+            if model.extremities.iter().all(|chain| chain.limbs().all(|own| own != limb)) {
+                filter.observe([evidence[limb]; 2], 0.0, 0.0);
+            }
+        }
         for chain in &model.extremities {
-            let log_odds = |limb: usize, part: usize| {
+            let both = [chain.upper, chain.lower];
+            // By images, of each limb and of its outer part; what no image shows does not speak against the others.
+            let [[upper, upper_end], [lower, lower_end]] = both.map(|limb| {
                 let support = &supports[limb];
-                if support.known { support_log_odds(support.net_support()[part]) } else { f64::INFINITY }
-            };
-            let [upper, lower] = [chain.upper, chain.lower].map(|limb| log_odds(limb, 0));
-            let [upper_end, lower_end] = [chain.upper, chain.lower].map(|limb| log_odds(limb, 1));
-            let of_upper = all_log_odds(&[upper, any_log_odds(upper_end, lower)]);
-            let of_lower = [all_log_odds(&[upper, lower]), all_log_odds(&[upper, lower, lower_end])];
+                if support.known { support.net_support().map(support_log_odds) } else { [f64::INFINITY; 2] }
+            });
+            let images = [
+                [all_log_odds(&[upper, any_log_odds(upper_end, lower)]); 2],
+                [all_log_odds(&[upper, lower]), all_log_odds(&[upper, lower, lower_end])],
+            ];
+            let others = [evidence[chain.upper], all_log_odds(&both.map(|limb| evidence[limb]))];
             let unexpected = limbs[chain.upper].unexpected().max(limbs[chain.lower].unexpected());
             let next = [Some(chain.lower), chain.ends.first().copied()];
-            for ((limb, evidence), next) in
-                [(chain.upper, [of_upper; 2]), (chain.lower, of_lower)].into_iter().zip(next)
-            {
+            for (number, limb) in both.into_iter().enumerate() {
                 if !supports[limb].known {
-                    limbs[limb].clear_states();
+                    limbs[limb].observe([others[number]; 2], 0.0, 0.0);
                     continue;
                 }
-                let log_odds = detected
-                    .map(|detected| detection_log_odds(detected, &model.body, poses, origin, [Some(limb), next]));
-                limbs[limb].observe(evidence, log_odds.unwrap_or_default(), unexpected);
+                let there = [Some(limb), next[number]];
+                let log_odds = detected.map(|detected| detection_log_odds(detected, &model.body, poses, origin, there));
+                limbs[limb].observe(images[number], log_odds.unwrap_or_default(), unexpected);
             }
         }
     }
@@ -265,11 +276,9 @@ fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize>
     ((pair.x - center).length() < EXPLAINED).then_some(*parent)
 }
 
-/// Sets the status of hands and feet to that of the lower limb: they have too few patches for a status of their own.
-fn inherit_status(extremities: &[TwoBone], statuses: &mut [LimbStatus]) {
-    for chain in extremities {
-        chain.ends.iter().for_each(|end| statuses[*end] = statuses[chain.lower]);
-    }
+/// Returns the probability that a limb is within 10 cm of its position, from the log odds that measurements support it.
+fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-WITHIN_10_CM[0] - WITHIN_10_CM[1] * log_odds).exp())
 }
 
 fn measured_fraction(limbs: &[LimbStatus]) -> f64 {
