@@ -172,6 +172,12 @@ def covered(output: Output) -> dict[str, float]:
     return {"cases": len(cases), "back": back, "limit_cm": COVERED_CM, "no_search": no_search}
 
 
+def reliability(output: Output) -> dict[str, float]:
+    """Percent of limb ends within 10 cm, by the probability that was reported."""
+    ranges = {"below_50": "0.0 to 0.5", "from_50": "0.5 to 0.8", "from_80": "0.8 to 0.95", "from_95": "0.95 to 1.0"}
+    return {name: number(output.row(cell)[3]) for name, cell in ranges.items()}
+
+
 def stress(output: Output) -> dict[str, float]:
     """The default strength of the jitter penalty, and none."""
     [_, lost, mean, *_] = output.row("0.25")
@@ -199,6 +205,7 @@ READ: dict[str, Read] = {
     **dict.fromkeys(("anybody", "anybody-given"), anybody),
     **dict.fromkeys(("wrong-start-rendered", "wrong-start-kinect"), wrong_starts),
     **{"missing": changed("missing"), "missing-noise": changed("noise"), "missing-pixel": changed("pixel")},
+    **dict.fromkeys(("probability-rendered", "probability-kinect"), reliability),
     **{"people": people, "made-up-people": made_up, "passer-by": passed_by, "cut-pictures": cut},
     **{"empty-rooms": empty_rooms, "covered": covered, "stress": stress, "real-people": real, "real-rooms": real},
 }
