@@ -27,7 +27,7 @@ from voodoo.pipeline.start import start_tracker
 from voodoo.recordings import open_recording
 from voodoo.sensors.settings import FrontEndSettings
 
-WITHIN_10_CM = (1.38, 0.43)
+WITHIN_10_CM = (2.0 * np.log(2.0), 0.43)
 """As in the core, from which they are taken back."""
 EDGES = (0.0, 0.5, 0.8, 0.95, 1.0)
 Array = npt.NDArray[np.float64]

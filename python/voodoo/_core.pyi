@@ -794,8 +794,8 @@ class Estimate:
         estimated pose, but is not)."""
     @property
     def limb_probability(self) -> Mapping[str, float]:
-        """Probability that the distal end of every limb is within 10 cm of its position; {} while searching. From 0.8 on the
-        limb's status is "measured"."""
+        """Probability that the distal end of every limb is within 10 cm of its position, fitted to depth images; NaN before the
+        first frame, {} while searching. From 0.8 on the limb's status is "measured"."""
     @property
     def covariance(self) -> Mapping[str, npt.NDArray[np.float64]]:
         """Covariance (3, 3) [m^2] of the position of every joint and site, world frame; NaN before the first frame."""

@@ -120,7 +120,8 @@ pub struct Estimate {
     pub status: Status,
     /// Reliability of every limb's pose.
     pub limb_status: Vec<LimbStatus>,
-    /// Probability that the distal end of every limb is within 10 cm of its position. The status is `Measured` from 0.8 on.
+    /// Probability that the distal end of every limb is within 10 cm of its position, fitted to depth images; NaN before the first
+    /// frame. The status is `Measured` from 0.8 on.
     pub limb_probability: Vec<f64>,
     /// Pose of every limb.
     pub world_from_limb: Vec<Pose>,

@@ -75,21 +75,24 @@ mod tests {
         correspondences
     }
 
-    /// Log odds of an arm, and of its hand, after a frame with these edges; `apart` is the distance of the second branch.
+    /// Follows a frame with these correspondences; `apart` is the distance of the second branch.
+    fn follow(
+        assessor: &mut Assessor,
+        model: &Model,
+        poses: &[Pose],
+        correspondences: &Correspondences,
+        apart: Option<f64>,
+    ) {
+        let (body, config, pairs) = (&model.body, &Config::default(), &[]);
+        let found = FittedPose { body, poses, correspondences, pairs, sizes_found: false, time_scale: 1.0, config };
+        assessor.follow_edges(model, found, |_| apart);
+    }
+
+    /// Log odds of an arm, and of its hand, after a frame with these edges.
     fn log_odds(information: f64, apart: Option<f64>) -> [f64; 3] {
         let (model, poses) = standing();
-        let (body, config) = (&model.body, Config::default());
-        let found = FittedPose {
-            body,
-            poses: &poses,
-            correspondences: &edges_of(&model, &poses, information),
-            pairs: &[],
-            sizes_found: false,
-            time_scale: 1.0,
-            config: &config,
-        };
         let mut assessor = Assessor { log_odds: vec![f64::NAN; poses.len()], ..Assessor::default() };
-        assessor.follow_edges(&model, found, |_| apart);
+        follow(&mut assessor, &model, &poses, &edges_of(&model, &poses, information), apart);
         let arm = &model.extremities[first_arm(&model)];
         assert!(assessor.by_edges && assessor.log_odds[0].is_nan(), "the trunk's odds are kept");
         [arm.upper, arm.lower, arm.ends[0]].map(|limb| assessor.log_odds[limb])
@@ -113,18 +116,8 @@ mod tests {
         let (model, poses) = standing();
         let mut correspondences = edges_of(&model, &poses, 5e3);
         correspondences.limbs.push(LimbMatches { candidate: vec![0], ..LimbMatches::default() });
-        let (body, config) = (&model.body, Config::default());
-        let found = FittedPose {
-            body,
-            poses: &poses,
-            correspondences: &correspondences,
-            pairs: &[],
-            sizes_found: false,
-            time_scale: 1.0,
-            config: &config,
-        };
         let mut assessor = Assessor { by_edges: true, log_odds: vec![2.0; poses.len()], ..Assessor::default() };
-        assessor.follow_edges(&model, found, |_| None);
+        follow(&mut assessor, &model, &poses, &correspondences, None);
         assert_eq!((assessor.by_edges, assessor.log_odds), (false, vec![2.0; poses.len()]));
     }
 }

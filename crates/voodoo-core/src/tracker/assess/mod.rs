@@ -36,7 +36,7 @@ use crate::visibility::{EXPLAINED, FEW, LITTLE};
 use detected::detection_log_odds;
 use exclusive::Exclusive;
 use limb_filter::LimbFilter;
-use two_state::{EVEN, all_log_odds, any_log_odds, support_log_odds};
+use two_state::{EVEN, all_log_odds, any_log_odds, probability, support_log_odds};
 
 /// Weight of past frames in the running mean of the roundness: a single blurred frame must not make the body flat.
 const ROUNDNESS_MEMORY: f64 = 0.9;
@@ -45,9 +45,10 @@ const ROUNDNESS_MEMORY: f64 = 0.9;
 const SOME: f64 = 0.25;
 /// Weight of the fraction of its surface that a limb explains exclusively by points, relative to the one that patches support.
 const OF_EXCLUSIVE: f64 = 0.5;
-/// Logarithm of the odds that the distal end of a limb is within 10 cm of its position: this constant, plus this multiple of the log
-/// odds that measurements support the limb. Fitted by `lab/experiments/limb_probability.py`.
-const WITHIN_10_CM: [f64; 2] = [1.38, 0.43];
+/// Log odds that the distal end of a limb is within 10 cm of its position: this constant, and this multiple of the log odds that
+/// measurements support the limb. Fitted to depth images by `lab/experiments/limb_probability.py`; the first is the logarithm of 4,
+/// so that a limb that is measured has a probability of 0.8 or more.
+const WITHIN_10_CM: [f64; 2] = [2.0 * std::f64::consts::LN_2, 0.43];
 /// A body is not tracked if it misses the measurements of a source by more than this, root mean square, meters.
 const MISSED: f64 = 0.15;
 
@@ -167,12 +168,13 @@ impl Assessor {
         if self.internal.is_empty() {
             // A pose that was set, before its first frame.
             statuses.resize(model.body.limbs().len(), LimbStatus::Inferred);
-            probabilities.resize(model.body.limbs().len(), probability(0.0));
+            probabilities.resize(model.body.limbs().len(), f64::NAN);
             estimate.status = self.status;
             return;
         }
         statuses.extend(self.limbs.iter().zip(&self.log_odds).map(|(limb, log_odds)| limb.status(*log_odds)));
-        probabilities.extend(self.log_odds.iter().map(|log_odds| probability(*log_odds)));
+        let [even, factor] = WITHIN_10_CM;
+        probabilities.extend(self.log_odds.iter().map(|log_odds| probability(even + factor * log_odds)));
         let status = if self.by_edges { overall(statuses, |_| true) } else { self.status };
         // Nothing may match a pose that was set, however much was measured.
         let sources = &estimate.sources;
@@ -276,11 +278,6 @@ fn limb_joined_at(body: &Body, poses: &[Pose], pair: &SitePair) -> Option<usize>
     ((pair.x - center).length() < EXPLAINED).then_some(*parent)
 }
 
-/// Returns the probability that a limb is within 10 cm of its position, from the log odds that measurements support it.
-fn probability(log_odds: f64) -> f64 {
-    1.0 / (1.0 + (-WITHIN_10_CM[0] - WITHIN_10_CM[1] * log_odds).exp())
-}
-
 fn measured_fraction(limbs: &[LimbStatus]) -> f64 {
     limbs.iter().filter(|limb| **limb == LimbStatus::Measured).count() as f64 / limbs.len() as f64
 }
@@ -339,6 +336,7 @@ mod tests {
         let estimate = reported(&trusting());
         assert_eq!(estimate.status, Status::Tracking);
         assert_eq!(estimate.limb_status, vec![LimbStatus::Inferred; standing().1.len()]);
+        assert!(estimate.limb_probability.iter().all(|p| p.is_nan()) && !estimate.limb_probability.is_empty());
         assert!(!trusting().is_reliable(0), "nothing was measured");
         assert_eq!(reported(&Assessor::default()).status, Status::Searching);
     }
@@ -357,6 +355,7 @@ mod tests {
                 continue;
             }
             assert_eq!((*status, assessor.is_reliable(limb)), (LimbStatus::Measured, true), "{}", own.name);
+            assert!(estimate.limb_probability[limb] > 0.8, "{}", own.name);
         }
     }
 
@@ -422,6 +421,7 @@ mod tests {
         assert_eq!(estimate.status, Status::Tracking);
         for limb in [arm.lower, arm.ends[0]] {
             assert_eq!((estimate.limb_status[limb], assessor.is_reliable(limb)), (LimbStatus::Inferred, false));
+            assert!(estimate.limb_probability[limb] < 0.8);
         }
     }
 
@@ -455,6 +455,7 @@ mod tests {
         assert_eq!(reported(&assessor).status, Status::Lost);
         assert!((0..poses.len()).all(|limb| !assessor.is_reliable(limb)));
         assert_eq!(reported(&assessor).limb_status, vec![LimbStatus::Lost; poses.len()]);
+        assert_eq!(reported(&assessor).limb_probability, vec![0.0; poses.len()]);
         assessor.moved();
         assess_frames(&mut assessor, &pixels, &poses, 1);
         assert_eq!(reported(&assessor).status, Status::Tracking);

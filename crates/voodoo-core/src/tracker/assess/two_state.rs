@@ -66,7 +66,8 @@ fn max_log_odds() -> f64 {
     ((1.0 - CHANGES) / CHANGES).ln()
 }
 
-fn probability(log_odds: f64) -> f64 {
+/// Returns the probability of an event with these log odds.
+pub(super) fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
