@@ -48,11 +48,21 @@ def test_every_joint_and_limb_has_a_symmetric_positive_covariance(estimates):
             assert np.allclose(estimate.joint_sigma[name], np.sqrt(np.diag(estimate.covariance[name])), rtol=1e-12)
 
 
+def test_a_limb_is_measured_where_it_is_probably_right(estimates):
+    for estimate in estimates[0]:
+        assert tuple(estimate.limb_probability) == estimate.limb_names
+        for limb, probability in estimate.limb_probability.items():
+            assert 0.0 <= probability < 1.0, limb
+            assert (estimate.limb_status[limb] == "measured") == (probability >= 0.8), limb
+
+
 def test_nothing_is_known_before_the_first_frame_and_of_nobody():
     tracker = voodoo.Tracker(voodoo.Body.human())
-    assert tracker.estimate.covariance == {} and tracker.estimate.joint_covariances.shape == (0, 3, 3)
+    assert tracker.estimate.limb_probability == {} and tracker.estimate.covariance == {}
+    assert tracker.estimate.joint_covariances.shape == (0, 3, 3)
     recording = open_recording(sample_path())
     set_there = tracker.reset(joints=recording.start["joints"])
+    assert np.isnan(list(set_there.limb_probability.values())).all()
     assert np.isnan(set_there.joint_covariances).all() and np.isnan(set_there.limb_covariance["pelvis"]).all()
     assert all(np.isnan(sigma) for sigma in set_there.length_sigma.values())
 
@@ -88,6 +98,7 @@ def test_an_estimate_keeps_it_in_pickles(estimates):
         assert np.array_equal(again.limb_covariance["head"], estimate.limb_covariance["head"])
         assert np.array_equal(again.angle_covariance["l_hip"], estimate.angle_covariance["l_hip"])
         assert again.length_sigma["l_calf"] == estimate.length_sigma["l_calf"]
+        assert again.limb_probability == estimate.limb_probability
 
 
 def test_results_keep_it(tmp_path, estimates):
