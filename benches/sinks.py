@@ -1,5 +1,5 @@
-"""What live sinks cost: processor time of a frame of four people with each and all, and how late poses are beside receivers that
-hang.
+"""What live sinks cost: processor time of a frame of four people without and with all, and how late poses are beside receivers
+that hang.
 
     python benches/sinks.py [--seconds 4] [--rounds 3]
 
@@ -96,7 +96,7 @@ def session(recording: MadeUpRecording, outputs: Sequence[Output], told: list[st
 
 
 def cost(recording: MadeUpRecording, rounds: int) -> None:
-    """Print the time of a frame without sinks, with each, and with all."""
+    """Print the time of a frame without sinks and with all."""
     last = {(os.cpu_count() or 1) - 1}
     os.environ |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": "94"}
     receivers: list[subprocess.Popen[bytes]] = []
@@ -105,40 +105,42 @@ def cost(recording: MadeUpRecording, rounds: int) -> None:
         command = [sys.executable, "-c", code, *words]
         receivers.append(subprocess.Popen(command, preexec_fn=lambda: os.sched_setaffinity(0, last)))
 
-    outputs: dict[str, list[Output]] = {"without": []}
+    sinks: list[Output] = []
     for address in ("ros2://", "vmc://127.0.0.1:39540", "ws://:0", "foxglove://:0"):
         try:
             sink = sink_of(address, root_frame=lambda: "base_link", on_message=lambda words: None)
         except VoodooError as error:
             print(f"without {address}: {error}")
             continue
-        outputs[address] = [sink]
+        sinks.append(sink)
         if hasattr(sink, "port"):
             receive(CLIENT, f"ws://127.0.0.1:{sink.port}", *["foxglove"] * address.startswith("fox"))
         else:
             receive(ROS if address == "ros2://" else OSC)
-    outputs["all"] = [sink for one in outputs.values() for sink in one]
     time.sleep(2.0)
     os.sched_setaffinity(0, {0})
-    tracked: dict[str, list[float]] = {name: [] for name in outputs}
-    used: dict[str, list[float]] = {name: [] for name in outputs}
-    for name in [*outputs] * rounds:
+    tracked: dict[bool, list[float]] = {False: [], True: []}
+    used: dict[bool, list[float]] = {False: [], True: []}
+    for turn in range(2 * rounds):
+        on = turn % 4 in (1, 2)
         steps, at = list[Step](), list[float]()
         taken = Watched("steps", lambda step, steps=steps, at=at: (steps.append(step), at.append(time.process_time())))
-        beside = [Watched(one.name, one.publish, prompt=one.prompt, waits=one.waits) for one in outputs[name]]
+        beside = [Watched(one.name, one.publish, prompt=one.prompt, waits=one.waits) for one in sinks if on]
         report = session(recording, [taken, *beside], []).report()
         first = len(steps) // 3  # everybody is found
-        used[name].append(1e3 * (at[-1] - at[first]) / (len(steps) - first - 1))
-        tracked[name] += [1e3 * step.seconds for step in steps[first:]]
-        if name == "all":
+        used[on].append(1e3 * (at[-1] - at[first]) / (len(steps) - first - 1))
+        tracked[on] += [1e3 * step.seconds for step in steps[first:]]
+        if on:
             print(f"{len(steps[-1].estimates)} people; poses missed: {report['late_outputs']}")
-    for name, times in used.items():
+    for on, times in used.items():
         # A quarter of the frames had the core for themselves, whatever else the machine does.
-        track, least = np.percentile(tracked[name], 25), min(times)
-        more = 100.0 * (np.median(np.array(times) / used["without"]) - 1.0)
+        track = np.percentile(tracked[on], 25)
         print(
-            f"{name}: tracking {track:.2f} ms a frame; processor, all threads, {least:.2f} ms, {more:+.1f} % in turns"
+            f"{'with all' if on else 'without'}: tracking {track:.2f} ms a frame; all threads {np.median(times):.2f} ms"
         )
+    more = 100.0 * (np.array(used[True]) / used[False] - 1.0)
+    low, middle, high = np.percentile(more, [25, 50, 75])
+    print(f"processor time of pairs of sessions: {middle:+.1f} % in the median, quartiles {low:+.1f} and {high:+.1f} %")
     for receiver in receivers:
         receiver.kill()
 

@@ -34,10 +34,13 @@ def test_numbers_and_stamps_are_replaced_wherever_they_are():
     assert short.filled([np.array([0.25, 3.0])], b"") == [struct.pack(">ff", 0.25, 3.0)]
 
 
-def test_a_text_gets_whole_numbers():
-    assert _core.with_numbers("a \0, \0e-5 \0", [np.array([1.4, -2.6]), np.array([[3.0]])]) == "a 1, -3e-5 3"
-    with pytest.raises(MeasurementError, match="expected 1, found 0"):
-        _core.with_numbers("\0", [])
+def test_a_text_gets_whole_numbers_and_words():
+    numbers = [np.array([1.4, -2.6]), np.array([[3.0]])]
+    assert _core.with_values("a \0, \1\0e-5 \0 \1!", numbers, ["b ", ""]) == "a 1, b -3e-5 3 !"
+    with pytest.raises(MeasurementError, match="numbers: expected 1, found 0"):
+        _core.with_values("\0", [], [])
+    with pytest.raises(MeasurementError, match="words: expected 1, found 2"):
+        _core.with_values("\1", [], ["a", "b"])
 
 
 def test_plans_and_arrays_that_do_not_fit_are_refused():

@@ -44,7 +44,7 @@ __all__ = [
     "quaternions",
     "render_depth",
     "skeleton",
-    "with_numbers",
+    "with_values",
 ]
 
 __version__: str
@@ -291,8 +291,8 @@ class Template:
     def filled(self, numbers: Sequence[npt.NDArray[np.float64]], stamp: bytes) -> list[bytes]:
         """The messages with other numbers, in arrays one after the other, and another stamp that takes as many bytes."""
 
-def with_numbers(text: str, numbers: Sequence[npt.NDArray[np.float64]]) -> str:
-    """A text whose null characters are replaced by the rounded numbers of arrays, one after the other."""
+def with_values(text: str, numbers: Sequence[npt.NDArray[np.float64]], words: Sequence[str]) -> str:
+    """A text whose characters 0 are replaced by the rounded numbers of arrays, and its characters 1 by words, in their order."""
 
 def quaternions(rotations: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], bool]:
     """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3), whose largest entry is positive; and whether one of

@@ -201,7 +201,7 @@ class People:
         if core is None:
             there = ", ".join(str(other.id) for other in self._estimate) or "nobody"
             raise BodyError(f"person: expected one of those who are there ({there}), found {person}")
-        return Body(core)
+        return Body(core, same=self._prototype)
 
 
 class Followed:

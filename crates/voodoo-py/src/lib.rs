@@ -53,7 +53,7 @@ mod _core {
         sites::{PySiteGate, PySiteRay, expected_sites},
         skeleton::{cylinders, euler_angles, joint_angles, moved_covariances, placed, quaternions, skeleton},
         skin::PySkinCue,
-        template::{Template, with_numbers},
+        template::{Template, with_values},
         tracker::{PyTracker, body_before},
     };
 

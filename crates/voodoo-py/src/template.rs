@@ -1,5 +1,7 @@
 //! Messages of live outputs, in which only numbers change.
 
+use std::io::Write;
+
 use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -97,14 +99,28 @@ impl Template {
     }
 }
 
-#[doc = stub!("with_numbers")]
+#[doc = stub!("with_values")]
 #[pyfunction]
-pub(crate) fn with_numbers(text: &str, numbers: Vec<PyReadonlyArrayDyn<'_, f64>>) -> PyResult<String> {
-    let all = all(&numbers, text.matches('\0').count())?;
-    let whole = all.map(|number| (number.round_ties_even() as i64).to_string());
-    Ok(text
-        .split('\0')
-        .zip(whole.chain([String::new()]))
-        .flat_map(|(part, number)| [part.to_owned(), number])
-        .collect())
+pub(crate) fn with_values(
+    text: &str,
+    numbers: Vec<PyReadonlyArrayDyn<'_, f64>>,
+    words: Vec<String>,
+) -> PyResult<String> {
+    let mut numbers = all(&numbers, text.matches('\0').count())?;
+    let expected = text.matches('\u{1}').count();
+    if words.len() != expected {
+        return Err(MeasurementError::new_err(format!("words: expected {expected}, found {}", words.len())));
+    }
+    let (mut written, mut words) = (Vec::with_capacity(2 * text.len()), words.iter());
+    for &byte in text.as_bytes() {
+        match byte {
+            0 => {
+                let number = numbers.next().map_or(0.0, |number| number.round_ties_even()) as i64;
+                write!(written, "{number}")?;
+            }
+            1 => written.extend_from_slice(words.next().map_or(b"", |word| word.as_bytes())),
+            other => written.push(other),
+        }
+    }
+    Ok(String::from_utf8(written)?)
 }

@@ -36,7 +36,7 @@ class HumanFrames(NamedTuple):
 
 def human_frames(joint_names: tuple[str, ...], joints: FloatArray, posed: Skeleton) -> HumanFrames:
     """Frames of poses with joints (F, J, 3)."""
-    names, parents, plan = _plan(joint_names, posed.limbs)
+    names, parents, plan = _plan(joint_names, posed.body.limb_tree)
     points = np.concatenate([posed.heads, joints], axis=1)
     return HumanFrames(names, parents, *_core.placed(posed.rotations, points, plan))
 

@@ -88,12 +88,6 @@ class Skeleton:
         """The body at rest."""
         return bones(self.body)
 
-    @cached_property
-    def limbs(self) -> tuple[tuple[str, int | None], ...]:
-        """Name of each bone, and the number of its parent."""
-        names = self.body.limb_names
-        return tuple((limb.name, None if limb.parent is None else names.index(limb.parent)) for limb in self.body.limbs)
-
     def of_frames(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Skeleton:
         """The skeleton of some frames: a mask (F,), or their numbers."""
         return Skeleton(self.body, self.stamps[chosen], self.rotations[chosen], self.heads[chosen])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -33,22 +34,49 @@ class Limb:
     shape: TaperedEllipticCylinder
 
 
+_Names = tuple[str, tuple[str, ...], tuple[tuple[str, int | None], ...], tuple[str | None, ...], tuple[str, ...]]
+
+
+def _names(core: _core.Body) -> _Names:
+    name, limbs, sites = core.parts()
+    names = tuple(limb[0] for limb in limbs)
+    tree = tuple((limb, None if parent is None else names.index(parent)) for limb, parent, *_ in limbs)
+    joints = tuple(limb[3] and limb[3][0] for limb in limbs)
+    return name, names, tree, joints, tuple(site[0] for site in sites)
+
+
 class Body:
-    """A body to track. Immutable; made by `human`, `load` or `from_toml`."""
+    """A body to track. Immutable; made by `human`, `load` or `from_toml`.
 
-    def __init__(self, core: _core.Body) -> None:
-        """Wrap a body of the core; use `human`, `load` or `from_toml` instead."""
+    Attributes:
+        name: its own name.
+        limb_names: names of the limbs, parents first.
+        limb_tree: of each limb the name, and the number of its parent; None for the root.
+        limb_joints: of each limb the name of its joint to the parent; None for the root.
+        site_names: names of the joints and sites that have a position.
+    """
+
+    name: str
+    limb_names: tuple[str, ...]
+    limb_tree: tuple[tuple[str, int | None], ...]
+    limb_joints: tuple[str | None, ...]
+    site_names: tuple[str, ...]
+
+    def __init__(self, core: _core.Body, *, same: Body | None = None) -> None:
+        """Wrap a body of the core; use `human`, `load` or `from_toml` instead.
+
+        Args:
+            core: what it wraps.
+            same: a body with the same names, in other sizes.
+        """
         self.core = core
-        name, limbs, sites = core.parts()
-        self.name: str = name
-        self.limbs: tuple[Limb, ...] = tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in limbs)
-        self.limb_joints: tuple[str | None, ...] = tuple(joint and joint[0] for _, _, _, joint, _ in limbs)
-        self.site_names: tuple[str, ...] = tuple(site[0] for site in sites)
+        self._names: _Names = _names(core) if same is None else same._names
+        self.name, self.limb_names, self.limb_tree, self.limb_joints, self.site_names = self._names
 
-    @property
-    def limb_names(self) -> tuple[str, ...]:
-        """Names of the limbs, parents first."""
-        return tuple(limb.name for limb in self.limbs)
+    @cached_property
+    def limbs(self) -> tuple[Limb, ...]:
+        """The limbs, parents first."""
+        return tuple(Limb(name, parent, shape) for name, parent, shape, _, _ in self.core.parts()[1])
 
     @classmethod
     def human(cls, height: float = 1.75, *, model: HumanModel = "measured") -> Body:
@@ -104,7 +132,7 @@ class Body:
         Raises:
             BodyError: not a number, or the result is not a valid body.
         """
-        return Body(self.core.scaled(number_of("factor", factor)))
+        return Body(self.core.scaled(number_of("factor", factor)), same=self)
 
     def to_toml(self) -> str:
         """The body as TOML; `from_toml` reads it back unchanged up to rounding at 1e-9 m."""

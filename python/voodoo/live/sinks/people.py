@@ -71,17 +71,16 @@ def shown(step: Step, root_frame: str) -> Shown | None:
 
 @lru_cache(maxsize=2)
 def _shown(step: Step, root_frame: str) -> Shown | None:
-    there = {number: one for number, one in step.estimates.items() if len(one.joint_positions)}
+    there = [(number, one, places) for number, one in step.estimates.items() if len(places := one.joint_positions)]
     if not there:
         return None
-    numbers, estimates = tuple(there), tuple(there.values())
-    joints = np.array([one.joint_positions for one in estimates])
-    poses = np.array([one.limb_poses for one in estimates])
+    numbers, estimates, positions = zip(*there, strict=True)
+    joints, poses = np.array(positions), np.array([one.limb_poses for one in estimates])
     turn, frame = _turn(step, root_frame), upright_frame(step, root_frame)
     if turn.words:
         joints, poses = joints @ turn.pose[:3, :3].T + turn.pose[:3, 3], turn.pose @ poses
     bodies = [step.bodies[number] for number in numbers]
-    stamps = np.full(len(numbers), step.stamp)
+    stamps = np.array([step.stamp] * len(numbers))
     posed = skeleton_of(bodies, stamps, poses, tuple(estimates[0].joint_names), joints)
     return Shown(frame, turn, numbers, estimates, bodies, joints, poses, posed)
 

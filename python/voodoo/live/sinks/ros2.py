@@ -44,6 +44,8 @@ from voodoo.pipeline.front_end import nobody
 ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
+_LOOK_S = 0.5
+"""How often sizes, and whether somebody subscribes to markers, are looked at."""
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -87,6 +89,8 @@ class Ros2Sink(Output):
         self._topics: dict[str, Publication] = {}
         self._displayed: dict[int, Body] = {}
         self._described: dict[int, float] = {}
+        self._marked: dict[int, int] = {}
+        self._looked = 0.0
         self._template_of = lru_cache(8)(self._make_template)
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
@@ -112,28 +116,35 @@ class Ros2Sink(Output):
         if people is not None and len(there := people.present):
             observed = {people.numbers[index]: people.bodies[index] for index in there}
             (joints, angles), (names, parents, _, rows) = people.angles, people.frames
-            sure = there[np.isfinite(people.covariances[there]).all(axis=(1, 2))]
+            sure = there[np.isfinite(people.covariances[there, 0, 0])]
             about = tuple(person_id(people.numbers[index]) for index in sure), names, parents, joints
             numbers = [np.array(root_on_parent(people.turn.pose))] if frame != root else []
             numbers += [rows[there], angles[there]]
             numbers.append(np.concatenate([rows[sure, 0], people.covariances[sure].reshape(-1, 36)], axis=1))
-        topics, made = self._template_of(tuple(map(person_id, observed)), root, frame, *about)
+        publications, made = self._template_of(tuple(map(person_id, observed)), root, frame, *about)
         # Together: what follows takes longer, and the network wakes once.
-        for (topic, kind), message in zip(topics, made.filled(numbers, _stamp(round(step.stamp * 1e9))), strict=True):
-            self._publish_on(topic, kind).write(message)
+        messages = made.filled(numbers, _stamp(round(step.stamp * 1e9)))
+        for publication, message in zip(publications, messages, strict=True):
+            publication.write(message)
+        displayed = self._displayed | observed  # markers of persons who left are deleted once
+        if displayed.keys() != self._marked.keys() or abs(step.stamp - self._looked) > _LOOK_S:
+            self._looked = step.stamp
+            self._describe(observed)
+            self._marked = {number: self._publish_on(_markers(number), _MARKERS).subscribers for number in displayed}
+        for number in displayed:
+            if self._marked[number]:
+                estimate = step.estimates[number] if number in observed else nobody(step.stamp)
+                how: Any = {"root_frame": root, "person": person_id(number), "turn": step.turn}
+                topic = _markers(number)
+                self._write({topic: instant(estimate, displayed[number], **how)[topic]})
+        self._displayed = observed
+
+    def _describe(self, observed: Mapping[int, Body]) -> None:
         for number, body in observed.items():
             size = float(body.core.sizes()[:, 0].sum())
             if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
                 self._write(description(body, person_id(number)))
                 self._described[number] = size
-        for number, body in (self._displayed | observed).items():
-            # Those of persons who left are deleted once.
-            topic = f"{BODIES}/{person_id(number)}/markers"
-            if self._publish_on(topic, _MARKERS).subscribers:
-                estimate = step.estimates[number] if number in observed else nobody(step.stamp)
-                how: Any = {"root_frame": root, "person": person_id(number), "turn": step.turn}
-                self._write({topic: instant(estimate, body, **how)[topic]})
-        self._displayed = observed
 
     def _make_template(
         self,
@@ -144,8 +155,8 @@ class Ros2Sink(Output):
         names: tuple[str, ...],
         parents: tuple[int, ...],
         joints: tuple[str, ...],
-    ) -> tuple[list[tuple[str, str]], _core.Template]:
-        """Topics with their types, and the messages on them, of persons of whom some have a covariance."""
+    ) -> tuple[list[Publication], _core.Template]:
+        """Topics, and the messages on them, of persons of whom some have a covariance."""
         topics = [("/tf", TF)] * bool(ids) + [(f"{BODIES}/{person}/joint_states", JOINTS) for person in ids]
         topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), (TRACKED, IDS)]
         placed = [(root, frame)] * (frame != root) if ids else []
@@ -161,7 +172,7 @@ class Ros2Sink(Output):
             return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
 
         count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
-        return topics, template(encode, count, stamp=_stamp(STAMP_NS))
+        return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
 
     def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:
@@ -173,6 +184,10 @@ class Ros2Sink(Output):
         for topic, message in messages.items():
             kind = message.__msgtype__
             self._publish_on(topic, kind, 1 if kind == STRING else 10).write(cdr(message))
+
+
+def _markers(number: int) -> str:
+    return f"{BODIES}/{person_id(number)}/markers"
 
 
 def _stamp(nanoseconds: int) -> bytes:

@@ -26,7 +26,7 @@ from voodoo.live.sinks.people import shown
 from voodoo.model.rotations import matrix_of_turn
 
 PORT = 39539
-_AXES, _SIGNS = [1, 2, 0, 4, 5, 3, 6], np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
+_AXES, _SIGNS = np.array([1, 2, 0, 4, 5, 3, 6]), np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 """Place X, Y, Z and rotation X, Y, Z, W of Unity, left-handed, from those with x forward, y left, z up."""
 _TURN = np.pi / 2.0
 """At rest our arms hang; those of a VRM avatar point to the sides, a quarter turn about the forward axis."""
@@ -122,16 +122,17 @@ def bones_of(posed: Skeleton, index: int, address: str) -> tuple[tuple[str, ...]
     Raises:
         VoodooError: the body lacks bones without which an avatar does not move.
     """
-    chosen, names, plan, arms = _avatar(posed.limbs, address)
+    chosen, names, plan, arms = _avatar(posed.body.limb_tree, address)
     _, rows = _core.placed((posed.rotations[index] @ arms)[None], posed.heads[index][None], plan)
-    return names, rows[0][chosen][:, _AXES] * _SIGNS
+    return names, rows.take(chosen) * _SIGNS
 
 
 @lru_cache(maxsize=8)
 def _avatar(
     limbs: tuple[tuple[str, int | None], ...], address: str
-) -> tuple[list[int], tuple[str, ...], npt.NDArray[np.int64], FloatArray]:
-    """Limbs that are bones of an avatar, their names, and of all limbs the plan of `placed` and the turns to its rest pose."""
+) -> tuple[npt.NDArray[np.int64], tuple[str, ...], npt.NDArray[np.int64], FloatArray]:
+    """Of an avatar's bones the seven numbers among those of all limbs, and their names; of all limbs the plan of `placed` and the
+    turns to its rest pose."""
     quarter = {"l": matrix_of_turn((-_TURN, 0.0, 0.0)), "r": matrix_of_turn((_TURN, 0.0, 0.0))}
     arms = [quarter.get(limb[0], np.eye(3)) if limb.partition("_")[2] in _ARM else np.eye(3) for limb, _ in limbs]
     rows = {names_of(limb).vrm: index for index, (limb, _) in enumerate(limbs)}
@@ -143,4 +144,4 @@ def _avatar(
             f"{', '.join(limb for limb, _ in limbs)}"
         )
     plan = [(index, index, index, -1 if up is None else up) for index, (_, up) in enumerate(limbs)]
-    return list(rows.values()), tuple(rows), np.array(plan), np.array(arms)
+    return 7 * np.array([[row] for row in rows.values()]) + _AXES, tuple(rows), np.array(plan), np.array(arms)

@@ -130,23 +130,22 @@ def message_of(step: Step, root_frame: str) -> str:
     """The message of a step as JSON, see docs/how-to/stream.md."""
     people = shown(step, root_frame)
     if people is None:
-        return _format(upright_frame(step, root_frame), (), (), ()) % repr(step.stamp)
-    limbs, count = people.posed.limbs, len(people.numbers)
+        return _core.with_values(_format(upright_frame(step, root_frame), (), (), ()), [], [repr(step.stamp)])
+    limbs, count = people.posed.body.limb_tree, len(people.numbers)
     joint_names = tuple(people.estimates[0].joint_names)
     # Whole numbers of 10 um and of 1e-6 are written several times as fast as others.
     bones = np.concatenate([1e5 * people.posed.heads, 1e6 * quaternions(people.posed.rotations)], axis=2)
     rows = np.concatenate([1e5 * people.joints.reshape(count, -1), bones.reshape(count, -1)], axis=1)
-    text = _core.with_numbers(_format(people.frame, people.numbers, joint_names, limbs), [rows])
-    values = [repr(step.stamp)]
+    words = [repr(step.stamp)]
     for estimate in people.estimates:
         residual = estimate.residual
-        values += [estimate.status, repr(residual) if math.isfinite(residual) else "null"]
-        values += estimate.limb_status.values() or [""] * len(limbs)
-    return text % tuple(values)
+        words += [estimate.status, repr(residual) if math.isfinite(residual) else "null"]
+        words += estimate.limb_status.values() or [""] * len(limbs)
+    return _core.with_values(_format(people.frame, people.numbers, joint_names, limbs), [rows], words)
 
 
 _WRITTEN = {
-    "\0word": '"%s"', "\0value": "%s", "\0place": "[\0e-5, \0e-5, \0e-5]", "\0turn": "[\0e-6, \0e-6, \0e-6, \0e-6]",
+    "\0word": '"\1"', "\0value": "\1", "\0place": "[\0e-5, \0e-5, \0e-5]", "\0turn": "[\0e-6, \0e-6, \0e-6, \0e-6]",
 }  # fmt: skip
 """Values of a message, and how they are formatted; names cannot begin like them."""
 
@@ -155,7 +154,7 @@ _WRITTEN = {
 def _format(
     frame: str, numbers: tuple[int, ...], joint_names: tuple[str, ...], limbs: tuple[tuple[str, int | None], ...]
 ) -> str:
-    """A message in which only values are missing: numbers, which `with_numbers` fills in, and words, which `%` does."""
+    """A message in which only values are missing, which `with_values` fills in."""
     bones = {
         name: {"parent": None if above is None else limbs[above][0], "position": "\0place", "rotation": "\0turn"}
         for name, above in limbs
@@ -164,7 +163,7 @@ def _format(
     person |= {"bones": bones, "limb_status": dict.fromkeys((name for name, _ in limbs), "\0word")}
     people = [{"id": number, **person} for number in numbers]
     whole = {"format": FORMAT, "version": VERSION, "stamp_s": "\0value", "frame": frame, "people": people}
-    text = json.dumps(whole).replace("%", "%%")
+    text = json.dumps(whole)
     for value, written in _WRITTEN.items():
         text = text.replace(json.dumps(value), written)
     return text
