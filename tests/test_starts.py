@@ -162,6 +162,22 @@ def test_keypoints_with_depth_of_the_same_and_of_another_camera():
     assert not KeypointsDepthStart().find(observed(item, wall))
 
 
+def test_of_two_detections_of_a_person_the_more_precise_one_is_the_start():
+    depth, truth = rendered(person(), AROUND[0])
+    middle = np.mean(list(truth.values()), axis=0)
+    names = [f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "hip", "elbow", "knee", "ankle")]
+    larger = {name: truth[name] + 0.2 * (truth[name] - middle) for name in names}
+    lengths = []
+    for weight in (1.0, 100.0):
+        tracker, frame = voodoo.Tracker(BODY), voodoo.Frame(0.0)
+        frame.add_depth(depth.image, camera=CAMERA, meters_per_unit=1.0, world_from_sensor=depth.root_from_sensor)
+        frame.add_detection(larger, weight=weight)
+        tracker.step(frame)
+        lengths.append(sum(limb.shape.length for limb in tracker.body.limbs) / sum(b.shape.length for b in BODY.limbs))
+    assert abs(lengths[0] - 1.0) < 0.08
+    assert lengths[1] > 1.12
+
+
 def test_a_hand_before_the_trunk_does_not_bend_the_start():
     """A wrist whose keypoint shows something far nearer makes a forearm that nobody has."""
     pose = AROUND[0]

@@ -600,8 +600,9 @@ class Frame:
         """Add a person whom something else found in this instant: a network, several cameras, markers.
 
         The joints measure the tracked person whom they are nearest to, as `add_position` does. Where they show nobody who is
-        tracked, that person is tracked from this frame on: a lost or absent one who may have moved there, or a new one. Joints
-        that do not determine the pose start nobody.
+        tracked, that person is tracked from this frame on: a lost or absent one who may have moved there, or a new one, from the
+        joints or from the depth image, whichever the detector or `weight` says to be more precise. Joints that do not determine
+        the pose start nobody.
 
         Args:
             joints: site name -> (x, y, z) [m] in the world; three that are not collinear determine the pose.

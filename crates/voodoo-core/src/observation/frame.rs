@@ -246,7 +246,8 @@ pub struct RayRelation {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetectedPerson<'a> {
-    /// Measured positions of sites; three that are not collinear determine the pose.
+    /// Measured positions of sites; three that are not collinear determine the pose. Somebody new starts from them unless the
+    /// detector finds the joints more precisely in an image of the frame; a weight of 1 stands for 0.1 m.
     pub positions: &'a [PositionRelation],
     /// Log odds `ln(p / (1 - p))` that it is a person; infinite if that is certain.
     pub person: f64,

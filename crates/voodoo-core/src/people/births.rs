@@ -21,7 +21,8 @@ const LEFT_OVER: f64 = 0.3;
 const MOST_TOGETHER: usize = 4;
 
 impl People {
-    /// Searches for new persons: in the frame's detections that show nobody who is tracked, and in pixels that no person explains.
+    /// Searches for new persons: in the frame's detections that show nobody who is tracked and where these are in its images, and in
+    /// pixels that no person explains.
     pub(super) fn find_new(&mut self, frame: &Frame, shown: &[Option<usize>]) {
         self.tentative.prune(frame.stamp);
         for (detection, _) in frame.detections.iter().zip(shown).filter(|(_, shown)| shown.is_none()) {
@@ -29,6 +30,9 @@ impl People {
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
                 self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
+                if self.detector.knows() {
+                    self.detect(frame, DetectionQuery::Near(place));
+                }
             }
         }
         self.detect_new(frame);

@@ -7,6 +7,8 @@ use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, PositionRelation};
 use crate::relocalize::ENOUGH_ODDS;
 
+/// Standard deviation of a measured position with weight 1, meters.
+const UNIT_SIGMA: f64 = 0.1;
 /// Amount subtracted from the log odds of every detection, because the errors of successive detections of a static object are
 /// correlated.
 const DETECTION_COST: f64 = 1.0;
@@ -22,8 +24,10 @@ pub(super) struct TentativeTrack {
     pub(super) detection: Detection,
     /// Number of the image with the detection.
     pub(super) image: usize,
-    /// Measured positions of sites, for a detection that came with the frame; empty for one in an image.
+    /// Measured positions of sites, for a start at a detection that came with the frame; empty for one in an image.
     pub(super) positions: Vec<PositionRelation>,
+    /// Whether a detection of the frame with this stamp came with it.
+    given: bool,
     sum: f64,
     stamp: f64,
 }
@@ -32,13 +36,22 @@ impl TentativeTrack {
     /// Returns the track of a person who was detected for the first time, in the image with this number.
     pub(super) fn in_image(stamp: f64, placed: PlacedDetection, image: usize) -> Self {
         let PlacedDetection { root: place, detection, .. } = placed;
-        Self { place, sum: detection.person, detection, image, positions: Vec::new(), stamp }
+        Self { place, sum: detection.person, detection, image, positions: Vec::new(), given: false, stamp }
     }
 
     /// Returns the track of a person at this position who came with the frame.
     pub(super) fn given(stamp: f64, place: Vec3, person: &DetectedPerson) -> Self {
         let (detection, positions) = (Detection::default(), person.positions.to_vec());
-        Self { place, sum: person.person, detection, image: 0, positions, stamp }
+        Self { place, sum: person.person, detection, image: 0, positions, given: true, stamp }
+    }
+
+    /// Median standard deviation of the joints that are measured or visible, meters; infinite without any.
+    fn sigma(&self) -> f64 {
+        let given = self.positions.iter().map(|relation| UNIT_SIGMA / relation.weight.sqrt());
+        let visible = self.detection.joints.iter().flatten().filter(|joint| joint.visible > 0.5);
+        let mut sigmas: Vec<f64> = given.chain(visible.map(|joint| joint.sigma)).collect();
+        sigmas.sort_by(f64::total_cmp);
+        sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::INFINITY)
     }
 }
 
@@ -59,9 +72,12 @@ impl TentativeTracks {
         found.sum -= static_odds.unwrap_or(DETECTION_COST);
         let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
         let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track)));
-        // Of one frame the first detection counts: one that came with the frame, else the most confident one of an image.
-        if before.as_ref().is_some_and(|before| before.stamp == found.stamp) {
-            self.tracks.extend(before);
+        // Of one frame the first detection counts: one that came with the frame, unless another shows the same person more
+        // precisely, else the most confident one of an image.
+        if let Some(first) = before.as_ref().filter(|first| first.stamp == found.stamp) {
+            let is_better = first.given && found.sigma() < first.sigma();
+            (found.sum, found.given) = (found.sum.max(first.sum), first.given);
+            self.tracks.extend(if is_better { Some(found) } else { before });
             return;
         }
         found.sum = (before.map_or(0.0, |before| before.sum) + found.sum).max(0.0);
@@ -89,7 +105,36 @@ impl TentativeTracks {
     pub(super) fn take_confirmed(&mut self, stamp: f64) -> Vec<TentativeTrack> {
         let sure = |track: &mut TentativeTrack| track.stamp == stamp && track.sum >= ENOUGH_ODDS;
         let mut confirmed: Vec<TentativeTrack> = self.tracks.extract_if(.., sure).collect();
-        confirmed.sort_by_key(|track| (track.positions.is_empty(), Reverse(track.detection.pixels.len())));
+        confirmed.sort_by_key(|track| (!track.given, Reverse(track.detection.pixels.len())));
         confirmed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::DetectedJoint;
+
+    /// Whether the start is by the measured positions, and the log odds, where the same frame has measured positions with a
+    /// standard deviation and an image a joint with another one.
+    fn kept(given: f64, in_image: f64) -> (bool, f64) {
+        let weight = (UNIT_SIGMA / given).powi(2);
+        let positions = [PositionRelation { site: 0, position: Vec3::ZERO, weight, bias: 0.0, source: 0 }];
+        let mut tracks = TentativeTracks::default();
+        let person = DetectedPerson { positions: &positions, person: 9.0 };
+        tracks.update(TentativeTrack::given(0.0, Vec3::ZERO, &person), Some(0.0));
+        let joint = DetectedJoint { position: Vec3::ZERO, sigma: in_image, visible: 1.0 };
+        let detection = Detection::new(vec![Some(joint), None], 1.0);
+        let placed = PlacedDetection { index: 0, root: Vec3::X * 0.1, detection };
+        tracks.update(TentativeTrack::in_image(0.0, placed, 0), Some(0.0));
+        let confirmed = tracks.take_confirmed(0.0);
+        assert_eq!(confirmed.len(), 1);
+        (!confirmed[0].positions.is_empty(), confirmed[0].sum)
+    }
+
+    #[test]
+    fn the_more_precise_of_two_detections_of_one_frame_is_the_start_and_the_surer_one_tells_that_it_is_a_person() {
+        assert_eq!(kept(0.07, 0.02), (false, 9.0));
+        assert_eq!(kept(0.01, 0.02), (true, 9.0));
     }
 }
