@@ -55,9 +55,12 @@ def main() -> None:
         recording = Projected(open_recording(path))
         tracker = start_tracker(recording, init=AUTO, use=USED)
         steps = track(recording, tracker, settings=FrontEndSettings.of(recording, use=USED))
-        frame, first = next((frame, step.estimate) for frame, step in enumerate(steps) if step.estimate.joints)
-        error = 100 * np.nanmean(compare(recording, Track.of([first])))
-        print(f"{path.name}: first pose in frame {frame}, {error:.1f} cm off", flush=True)
+        first = next(((frame, step.estimate) for frame, step in enumerate(steps) if step.estimate.joints), None)
+        if first is None:
+            print(f"{path.name}: nobody found", flush=True)
+            continue
+        error = 100 * np.nanmean(compare(recording, Track.of([first[1]])))
+        print(f"{path.name}: first pose in frame {first[0]}, {error:.1f} cm off", flush=True)
 
 
 if __name__ == "__main__":

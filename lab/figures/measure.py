@@ -198,6 +198,12 @@ def real(output: Output) -> dict[str, float]:
     }  # fmt: skip
 
 
+def first_poses(output: Output) -> dict[str, float]:
+    """The best and the worst recording."""
+    errors = [float(error) for error in re.findall(r"([\d.]+) cm off", output.text)]
+    return {"least_cm": min(errors), "most_cm": max(errors)}
+
+
 READ: dict[str, Read] = {
     **dict.fromkeys(("rendered", "rendered-auto", "kinect", "kinect-auto", "kinect-others"), evaluated),
     **dict.fromkeys(("kinect-others-status", "rendered-status", "sitting"), evaluated),
@@ -208,6 +214,7 @@ READ: dict[str, Read] = {
     **dict.fromkeys(("probability-rendered", "probability-kinect"), reliability),
     **{"people": people, "made-up-people": made_up, "passer-by": passed_by, "cut-pictures": cut},
     **{"empty-rooms": empty_rooms, "covered": covered, "stress": stress, "real-people": real, "real-rooms": real},
+    "start-keypoints-depth": first_poses,
 }
 """How the values of a run of runs.json are read from what its command prints."""
 

@@ -601,8 +601,8 @@ class Frame:
 
         The joints measure the tracked person whom they are nearest to, as `add_position` does. Where they show nobody who is
         tracked, that person is tracked from this frame on: a lost or absent one who may have moved there, or a new one, from the
-        joints or from the depth image, whichever the detector or `weight` says to be more precise. Joints that do not determine
-        the pose start nobody.
+        joints (a weight of 1 stands for 0.1 m) or from the depth image, if the detector is more precise. Joints that do not
+        determine the pose start nobody.
 
         Args:
             joints: site name -> (x, y, z) [m] in the world; three that are not collinear determine the pose.

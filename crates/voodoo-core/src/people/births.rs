@@ -30,7 +30,7 @@ impl People {
             let place = fitted.ok().and_then(|(_, poses)| poses.first().map(|root| root.translation));
             if let Some(place) = place.filter(|place| self.is_requested(frame, *place)) {
                 self.tentative.update(TentativeTrack::given(frame.stamp, place, detection), None);
-                if self.detector.knows() {
+                if self.detector.knows() && self.finds_new(frame.stamp) {
                     self.detect(frame, DetectionQuery::Near(place));
                 }
             }

@@ -71,13 +71,16 @@ impl TentativeTracks {
     pub(super) fn update(&mut self, mut found: TentativeTrack, static_odds: Option<f64>) {
         found.sum -= static_odds.unwrap_or(DETECTION_COST);
         let near = |track: &mut TentativeTrack| track.place.distance(found.place) < SAME_PERSON;
-        let before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track)));
-        // Of one frame the first detection counts: one that came with the frame, unless another shows the same person more
-        // precisely, else the most confident one of an image.
-        if let Some(first) = before.as_ref().filter(|first| first.stamp == found.stamp) {
-            let is_better = first.given && found.sigma() < first.sigma();
-            (found.sum, found.given) = (found.sum.max(first.sum), first.given);
-            self.tracks.extend(if is_better { Some(found) } else { before });
+        let mut before = self.tracks.extract_if(.., near).fold(None, |first, track| first.or(Some(track)));
+        if let Some(mut first) = before.take_if(|before| before.stamp == found.stamp) {
+            // Of one frame the most confident detection in an image counts, which comes first. With one that came with the frame,
+            // the surer one tells that it is a person, and the more precise one where.
+            if first.given {
+                let sum = first.sum.max(found.sum);
+                first = if found.sigma() < first.sigma() { found } else { first };
+                (first.sum, first.given) = (sum, true);
+            }
+            self.tracks.push(first);
             return;
         }
         found.sum = (before.map_or(0.0, |before| before.sum) + found.sum).max(0.0);
@@ -115,16 +118,16 @@ mod tests {
     use super::*;
     use crate::detect::DetectedJoint;
 
-    /// Whether the start is by the measured positions, and the log odds, where the same frame has measured positions with a
-    /// standard deviation and an image a joint with another one.
-    fn kept(given: f64, in_image: f64) -> (bool, f64) {
-        let weight = (UNIT_SIGMA / given).powi(2);
+    /// Whether the start is by the measured positions, and the log odds, where one frame has measured positions and a joint in an
+    /// image, with a standard deviation and log odds each.
+    fn kept(given: [f64; 2], in_image: [f64; 2]) -> (bool, f64) {
+        let weight = (UNIT_SIGMA / given[0]).powi(2);
         let positions = [PositionRelation { site: 0, position: Vec3::ZERO, weight, bias: 0.0, source: 0 }];
         let mut tracks = TentativeTracks::default();
-        let person = DetectedPerson { positions: &positions, person: 9.0 };
+        let person = DetectedPerson { positions: &positions, person: given[1] };
         tracks.update(TentativeTrack::given(0.0, Vec3::ZERO, &person), Some(0.0));
-        let joint = DetectedJoint { position: Vec3::ZERO, sigma: in_image, visible: 1.0 };
-        let detection = Detection::new(vec![Some(joint), None], 1.0);
+        let joint = DetectedJoint { position: Vec3::ZERO, sigma: in_image[0], visible: 1.0 };
+        let detection = Detection::new(vec![Some(joint), None], in_image[1]);
         let placed = PlacedDetection { index: 0, root: Vec3::X * 0.1, detection };
         tracks.update(TentativeTrack::in_image(0.0, placed, 0), Some(0.0));
         let confirmed = tracks.take_confirmed(0.0);
@@ -134,7 +137,9 @@ mod tests {
 
     #[test]
     fn the_more_precise_of_two_detections_of_one_frame_is_the_start_and_the_surer_one_tells_that_it_is_a_person() {
-        assert_eq!(kept(0.07, 0.02), (false, 9.0));
-        assert_eq!(kept(0.01, 0.02), (true, 9.0));
+        for odds in [[9.0, 1.0], [1.0, 9.0]] {
+            assert_eq!(kept([0.07, odds[0]], [0.02, odds[1]]), (false, 9.0));
+            assert_eq!(kept([0.01, odds[0]], [0.02, odds[1]]), (true, 9.0));
+        }
     }
 }
