@@ -335,5 +335,8 @@ def test_evaluation_takes_five_times_as_long_as_tracking_at_most(voodoo_data):
         work()
         return time.perf_counter() - began
 
-    tracking = min(seconds(lambda: list(track(recording, start_tracker(recording)))) for _ in range(2))
-    assert seconds(lambda: evaluate(folder)) < 5.0 * tracking
+    works = lambda: list(track(recording, start_tracker(recording))), lambda: evaluate(folder)
+    tracking, evaluating = np.min(
+        [[seconds(work) for work in works] for _ in range(2)], axis=0
+    )  # the machine has other work
+    assert evaluating < 5.0 * tracking

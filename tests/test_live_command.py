@@ -219,8 +219,8 @@ class Slow(Output):
     name = "slow"
     waiting = 1
 
-    def __init__(self, seconds, *, prompt=False, error=None):
-        self.seconds, self.prompt, self.error, self.stamps, self.closed = seconds, prompt, error, [], False
+    def __init__(self, seconds, *, waits=True, error=None):
+        self.seconds, self.waits, self.error, self.stamps, self.closed = seconds, waits, error, [], False
 
     def publish(self, step):
         time.sleep(self.seconds)
@@ -277,7 +277,7 @@ def test_a_frame_that_the_tracker_refuses_is_the_only_loss():
 
 
 def test_an_output_that_fails_ends_the_session():
-    failing = Slow(0.0, prompt=True, error=VoodooError("disk full"))
+    failing = Slow(0.0, waits=False, error=VoodooError("disk full"))
     with played(3.0) as source:
         session = Session(source, follower, outputs=[failing])
         with pytest.raises(VoodooError, match="disk full"):
@@ -291,7 +291,7 @@ def test_an_output_that_fails_ends_the_session():
 
 def test_in_overload_latency_stays_below_two_processing_times():
     """Four times as many images as can be published."""
-    slow = Slow(0.044, prompt=True)
+    slow = Slow(0.044, waits=False)
     with played(3.0) as source:
         session = Session(source, follower, outputs=[slow])
         while session.wait(0.05):

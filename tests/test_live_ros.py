@@ -1,6 +1,7 @@
 """ROS 2 messages of a live source, without a network: what they become, and what is published."""
 
 import time
+from dataclasses import replace
 from itertools import pairwise
 
 import cv2
@@ -395,7 +396,7 @@ def test_a_message_lets_everybody_be_searched_for_again():
     output.publish(step)
     assert asked == []
     node.heard[RESET] = [b"", b""]
-    output.publish(step)
+    output.publish(replace(step, frame=replace(step.frame, stamp=2.6)))  # it looks twice a second
     assert asked == [True]
     # and the session forgets everybody
     messages, statuses = [], []

@@ -213,8 +213,8 @@ class Fake(Output):
 
     receiver = True
 
-    def __init__(self, name, *, prompt=False):
-        self.name, self.prompt = name, prompt
+    def __init__(self, name, *, waits=True):
+        self.name, self.waits = name, waits
         self.free, self.dead, self.stamps, self.closed = threading.Event(), False, [], False
         self.free.set()
 
@@ -232,11 +232,11 @@ def test_receivers_that_hang_die_and_return_hold_nobody_and_are_named_once(monke
     monkeypatch.setattr("voodoo.live.session._LATE_S", 0.1)
     monkeypatch.setattr("voodoo.live.session._BACK_S", 0.05)
     monkeypatch.setattr("voodoo.live.session._CLOSE_S", 0.2)
-    good, hangs, dies, prompt = Fake("good"), Fake("hangs"), Fake("dies"), Fake("prompt", prompt=True)
-    rig = Paced([good, hangs, dies, prompt], voodoo.Body.human())
+    good, hangs, dies, swift = Fake("good"), Fake("hangs"), Fake("dies"), Fake("swift", waits=False)
+    rig = Paced([good, hangs, dies, swift], voodoo.Body.human())
     rig.send(3)
     hangs.free.clear()
-    prompt.free.clear()
+    swift.free.clear()
     dies.dead = True
     rig.send(20)
     until(lambda: good.stamps[-1] == 23.0)
@@ -244,20 +244,20 @@ def test_receivers_that_hang_die_and_return_hold_nobody_and_are_named_once(monke
     assert sorted(rig.messages) == [
         "dies: nobody receives: Connection reset by peer",
         "hangs: takes nothing; it gets the newest pose when it does",
-        "prompt: takes nothing; it gets the newest pose when it does",
+        "swift: takes nothing; it gets the newest pose when it does",
     ]
     dies.dead = False
     hangs.free.set()
-    prompt.free.set()
-    until(lambda: hangs.stamps[-1] == prompt.stamps[-1] == 23.0)  # the newest; it had 4.0 in its hands
+    swift.free.set()
+    until(lambda: hangs.stamps[-1] == swift.stamps[-1] == 23.0)  # the newest; it had 4.0 in its hands
     assert len([stamp for stamp in hangs.stamps if 4.0 < stamp < 23.0]) == 0
     rig.send(10)
-    assert sorted(rig.messages[3:]) == [f"{name}: receives again" for name in ("dies", "hangs", "prompt")]
+    assert sorted(rig.messages[3:]) == [f"{name}: receives again" for name in ("dies", "hangs", "swift")]
     hangs.free.clear()
     rig.send(1, every=0.0)
     began = time.monotonic()
     rig.finish()  # neither for ever nor with an error
-    assert time.monotonic() - began < 1.0 and good.closed and dies.closed and prompt.closed
+    assert time.monotonic() - began < 1.0 and good.closed and dies.closed and swift.closed
     assert rig.messages[6:] == ["hangs: did not take the last pose"]
     hangs.free.set()
 
@@ -265,7 +265,7 @@ def test_receivers_that_hang_die_and_return_hold_nobody_and_are_named_once(monke
 class Timed(Output):
     """Notes how late poses are."""
 
-    name, prompt = "timed", True
+    name, waits = "timed", False
 
     def __init__(self):
         self.late = {}

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -255,3 +256,33 @@ def test_offers_are_visible_with_their_quality():
     while "/scan" in ours.offers():
         assert time.monotonic() < until
         time.sleep(0.02)
+
+
+def test_a_subscriber_that_hangs_holds_no_message_up():
+    """Outputs that never wait share a thread, ROS 2 among them."""
+    code = """
+import voodoo.live.ros2.dds as dds
+node = dds.Node()
+heard = node.subscribe("/hung", dds.Offer("std_msgs/msg/String", reliable=True, latched=False))
+while True:
+    node.wait(0.2)
+    heard.take()
+"""
+    theirs, node = subprocess.Popen([sys.executable, "-c", code]), Node()
+    publication, message = (
+        node.advertise("/hung", "std_msgs/msg/String"),
+        cdr(new("std_msgs/msg/String", data="x" * 20_000)),
+    )
+    try:
+        until = time.monotonic() + 10.0
+        while not publication.subscribers:
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        theirs.send_signal(signal.SIGSTOP)
+        began = time.monotonic()
+        for _ in range(400):
+            publication.write(message)
+        assert time.monotonic() - began < 0.5 and publication.subscribers == 1
+    finally:
+        theirs.kill()
+        theirs.wait()

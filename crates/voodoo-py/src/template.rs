@@ -4,6 +4,7 @@ use std::io::Write;
 
 use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedStr;
 use pyo3::types::PyBytes;
 
 use crate::errors::MeasurementError;
@@ -104,7 +105,7 @@ impl Template {
 pub(crate) fn with_values(
     text: &str,
     numbers: Vec<PyReadonlyArrayDyn<'_, f64>>,
-    words: Vec<String>,
+    words: Vec<PyBackedStr>,
 ) -> PyResult<String> {
     let mut numbers = all(&numbers, text.matches('\0').count())?;
     let expected = text.matches('\u{1}').count();
@@ -112,14 +113,16 @@ pub(crate) fn with_values(
         return Err(MeasurementError::new_err(format!("words: expected {expected}, found {}", words.len())));
     }
     let (mut written, mut words) = (Vec::with_capacity(2 * text.len()), words.iter());
-    for &byte in text.as_bytes() {
-        match byte {
+    for part in text.as_bytes().split_inclusive(|&byte| byte <= 1) {
+        let (&last, before) = part.split_last().unwrap_or((&b' ', part));
+        written.extend_from_slice(if last <= 1 { before } else { part });
+        match last {
             0 => {
                 let number = numbers.next().map_or(0.0, |number| number.round_ties_even()) as i64;
                 write!(written, "{number}")?;
             }
             1 => written.extend_from_slice(words.next().map_or(b"", |word| word.as_bytes())),
-            other => written.push(other),
+            _ => {}
         }
     }
     Ok(String::from_utf8(written)?)

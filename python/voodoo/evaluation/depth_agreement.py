@@ -114,14 +114,15 @@ def near_joints(points: FloatArray, joints: Mapping[str, FloatArray]) -> BoolArr
     near = np.zeros(len(points), dtype=bool)
     if not known:
         return near
-    # Most pixels are far from all persons.
-    inside = np.flatnonzero(_in_box(points, *_around(known)))
-    about = points[inside]
-    for a, b, radius in known:
-        axis, offset = b - a, about - a
-        t = np.clip(offset @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
-        offset -= t[:, None] * axis
-        near[inside] |= np.einsum("ij,ij->i", offset, offset) <= radius * radius
+    inside = _in_box(points, *_around(known))  # most pixels are far from all persons
+    starts, ends, radii = map(np.array, zip(*known, strict=True))
+    axes, about = ends - starts, points[inside].T
+    lengths = np.maximum((axes**2).sum(axis=1), 1e-12)[:, None]
+    # Of all capsules at once, from the products of points with starts and axes.
+    along = axes @ about - (axes * starts).sum(axis=1)[:, None]
+    t = np.clip(along / lengths, 0.0, 1.0)
+    squares = (about**2).sum(axis=0) - 2.0 * starts @ about - t * (2.0 * along - t * lengths)
+    near[inside] = (squares <= (radii**2 - (starts**2).sum(axis=1))[:, None]).any(axis=0)
     return near
 
 

@@ -32,21 +32,20 @@ _CLOSE_S = 3.0
 
 
 class Output(ABC):
-    """A receiver of poses. It is called from a thread of its own, or of all that never wait.
+    """A receiver of poses. It is called from a thread of its own, or one after the other from that of all who never wait.
 
     Attributes:
         name: name in messages.
-        prompt: latency is measured until it has taken the pose; other outputs may lag behind.
         waiting: queue capacity in steps; when it is exceeded, the oldest is dropped and counted.
         receiver: it sends to programs that may be slow, hang or be gone: the session names that once, neither waits for it nor
             ends with it, and goes on when it takes poses again.
-        waits: its `publish` may wait for somebody.
+        waits: its `publish` may wait for somebody. Latency is measured until all who never wait have taken the pose; others
+            may lag behind.
         on_reset: lets everybody be searched for again; set by the session.
         on_choice: lets only the person at a place be followed, see `Session.choose`; set by the session.
     """
 
     name: str
-    prompt: bool = False
     waiting: int = 1
     receiver: bool = False
     waits: bool = True
@@ -169,13 +168,9 @@ class Session:
         self._first: float | None = None
         self._end = self._began
         self._error: BaseException | None = None
-        prompt = [output for output in outputs if output.prompt]
         log = live.faults.log
-        self._prompt = _Lane(prompt, log, self._count)
-        others = [output for output in outputs if not output.prompt]
-        swift = [output for output in others if not output.waits]
-        alone = [[output] for output in others if output.waits]
-        self._lanes = [self._prompt, *(_Lane(group, log) for group in (swift, *alone) if group)]
+        self._swift = _Lane([output for output in outputs if not output.waits], log, self._count)
+        self._lanes = [self._swift, *(_Lane([output], log) for output in outputs if output.waits)]
         self._thread = threading.Thread(target=self._track, daemon=True)
         self._thread.start()
 
@@ -277,7 +272,7 @@ class Session:
     @property
     def dropped(self) -> int:
         """Number of frames that a newer one replaced before they were published, in any stage."""
-        return self.live.dropped + self._prompt.box.dropped
+        return self.live.dropped + self._swift.box.dropped
 
     def persons(self) -> dict[int, str]:
         """Status of each person present; "lost" for all if the source is lost."""
@@ -325,7 +320,7 @@ class Session:
             "refused": self.live.refused + self.refused,
             "faults": dict(sorted(self.live.faults.counts.items())),
             "first_faults": dict(sorted(self.live.faults.first.items())),
-            "late_outputs": {output.name: lane.box.dropped for lane in self._lanes[1:] for output in lane.outputs},
+            "late_outputs": {output.name: lane.box.dropped for lane in self._lanes for output in lane.outputs},
             "seconds": self.live.clock.now() - self._began,
             "status": self.live.status,
             "sources": self.live.about(),

@@ -52,7 +52,7 @@ class FoxgloveSink(Output):
         if not self._channels.are_wanted:
             return
         people, rows = shown(step, self._root()), []
-        if people is not None and len(people.present):
+        if people is not None and people.present:
             names, parents, _, on_parents = people.frames
             limbs = people.posed.body.limb_names
             shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
@@ -61,7 +61,7 @@ class FoxgloveSink(Output):
                     person_id(people.numbers[index]),
                     *(names, parents, limbs, people.joints.shape[1], on_parents[index], shapes[index]),
                 )
-                for index in people.present.tolist()
+                for index in people.present
             ]
         self._channels.log(step.stamp, rows, upright_frame(step, self._root()))
 

@@ -8,7 +8,6 @@ from functools import cached_property, lru_cache
 from threading import Lock
 
 import numpy as np
-import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate
@@ -35,9 +34,9 @@ class Shown:
     posed: Skeleton
 
     @cached_property
-    def present(self) -> npt.NDArray[np.intp]:
+    def present(self) -> list[int]:
         """Indices of those who are not lost."""
-        return np.array([index for index, one in enumerate(self.estimates) if one.status != "lost"], dtype=np.intp)
+        return [index for index, one in enumerate(self.estimates) if one.status != "lost"]
 
     @cached_property
     def frames(self) -> HumanFrames:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Mapping
 from functools import lru_cache
@@ -45,7 +46,7 @@ ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
 _LOOK_S = 0.5
-"""How often sizes, and whether somebody subscribes to markers, are looked at."""
+"""How often sizes, subscribers of markers, and what is asked for are looked at."""
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -69,7 +70,7 @@ class Ros2Sink(Output):
     """
 
     name = "ros2"
-    prompt = receiver = True
+    receiver, waits = True, False
 
     def __init__(
         self,
@@ -90,7 +91,7 @@ class Ros2Sink(Output):
         self._displayed: dict[int, Body] = {}
         self._described: dict[int, float] = {}
         self._marked: dict[int, int] = {}
-        self._looked = 0.0
+        self._looked = -np.inf
         self._template_of = lru_cache(8)(self._make_template)
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
@@ -102,25 +103,19 @@ class Ros2Sink(Output):
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        if self._resets.take() and self.on_reset is not None:
-            self.on_reset()
-        for raw in self._follows.take():
-            chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
-            if self.on_choice is not None:
-                self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
         root = self._root()
         people, frame = shown(step, root), upright_frame(step, root)
         observed: dict[int, Body] = {}
         about: tuple[Any, ...] = (), (), (), ()
         numbers: list[FloatArray] = []
-        if people is not None and len(there := people.present):
+        if people is not None and (there := people.present):
             observed = {people.numbers[index]: people.bodies[index] for index in there}
-            (joints, angles), (names, parents, _, rows) = people.angles, people.frames
-            sure = there[np.isfinite(people.covariances[there, 0, 0])]
+            (joints, angles), (names, parents, _, rows), sigmas = people.angles, people.frames, people.covariances
+            sure = [index for index in there if math.isfinite(sigmas[index, 0, 0])]
             about = tuple(person_id(people.numbers[index]) for index in sure), names, parents, joints
             numbers = [np.array(root_on_parent(people.turn.pose))] if frame != root else []
-            numbers += [rows[there], angles[there]]
-            numbers.append(np.concatenate([rows[sure, 0], people.covariances[sure].reshape(-1, 36)], axis=1))
+            numbers += [rows[index] for index in there] + [angles[index] for index in there]
+            numbers += [part for index in sure for part in (rows[index, 0], sigmas[index])]
         publications, made = self._template_of(tuple(map(person_id, observed)), root, frame, *about)
         # Together: what follows takes longer, and the network wakes once.
         messages = made.filled(numbers, _stamp(round(step.stamp * 1e9)))
@@ -129,6 +124,7 @@ class Ros2Sink(Output):
         displayed = self._displayed | observed  # markers of persons who left are deleted once
         if displayed.keys() != self._marked.keys() or abs(step.stamp - self._looked) > _LOOK_S:
             self._looked = step.stamp
+            self._obey()
             self._describe(observed)
             self._marked = {number: self._publish_on(_markers(number), _MARKERS).subscribers for number in displayed}
         for number in displayed:
@@ -138,6 +134,14 @@ class Ros2Sink(Output):
                 topic = _markers(number)
                 self._write({topic: instant(estimate, displayed[number], **how)[topic]})
         self._displayed = observed
+
+    def _obey(self) -> None:
+        if self._resets.take() and self.on_reset is not None:
+            self.on_reset()
+        for raw in self._follows.take():
+            chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
+            if self.on_choice is not None:
+                self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
 
     def _describe(self, observed: Mapping[int, Body]) -> None:
         for number, body in observed.items():
