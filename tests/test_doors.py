@@ -263,6 +263,44 @@ def test_every_format_has_the_same_joint_angles(tmp_path, person):
             assert np.degrees(np.abs(apart)).max() < 0.005, (name, joint)
 
 
+def test_yourdfpy_moves_the_description_by_the_joint_states(tmp_path, person):
+    """Where elbows and knees only bend, as the joints of the description do, its links are where /tf has them."""
+    yourdfpy = pytest.importorskip("yourdfpy", reason="pip install yourdfpy, of the extra test")
+    _, body = person
+    local, root = moving(body, spread=0.4)
+    for limb, sign in (("forearm", -1.0), ("calf", 1.0)):
+        for side in "lr":
+            bend = 0.8 + 0.5 * np.sin(np.arange(FRAMES) + (side == "l"))
+            local[f"{side}_{limb}"] = Rotation.from_euler("y", sign * bend[:, None]).as_matrix()
+    bent = {"forearm", "upperarm", "thigh", "calf", "head"}
+    for limb in body.limb_names[1:]:
+        if limb.split("_")[-1] not in bent:
+            local[limb] = np.tile(np.eye(3), (FRAMES, 1, 1))
+    save(track_of(body, local, root), tmp_path / "bag", body=body, root_frame="odom")
+    with AnyReader([tmp_path / "bag"]) as reader:
+        told = [(one.topic, reader.deserialize(raw, one.msgtype)) for one, _, raw in reader.messages()]
+    (text,) = (message.data for topic, message in told if topic == "/human_description_p1")
+    (tmp_path / "human.urdf").write_text(text)
+    robot = yourdfpy.URDF.load(tmp_path / "human.urdf")
+    states = [message for topic, message in told if topic.endswith("/joint_states")]
+    transforms = [message.transforms for topic, message in told if topic == "/tf"]
+    assert len(states) == len(transforms) == FRAMES and robot.base_link == "body_p1"
+    assert set(robot.actuated_joint_names) == set(states[0].name)
+    for state, moved in zip(states, transforms, strict=True):
+        robot.update_cfg(dict(zip(state.name, state.position, strict=True)))
+        places = {"body_p1": np.eye(4)}
+        for one in moved:
+            if one.child_frame_id not in places:
+                place, turn = one.transform.translation, one.transform.rotation
+                pose = np.eye(4)
+                pose[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+                pose[:3, 3] = place.x, place.y, place.z
+                places[one.child_frame_id] = places[one.header.frame_id] @ pose
+        assert len(places) > 10
+        for name, pose in places.items():
+            np.testing.assert_allclose(robot.get_transform(name, "body_p1"), pose, atol=1e-3, err_msg=name)
+
+
 def test_glb_opens_in_trimesh_and_its_skin_follows_the_limbs(tmp_path, person):
     trimesh = pytest.importorskip("trimesh", reason="pip install trimesh, of the extra test")
     track, body = person

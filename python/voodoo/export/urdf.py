@@ -13,6 +13,9 @@ from voodoo.model.body import Body
 from voodoo.model.rotations import euler_angles
 from voodoo.tracker import Tracker
 
+_SAME_M = 1e-4
+"""Numbers of the description have this precision."""
+
 
 def urdf(body: Body, person: str) -> str:
     """The description of a body in its current sizes, at rest: links are the frames of /tf, limbs are cylinders.
@@ -39,6 +42,7 @@ def urdf(body: Body, person: str) -> str:
         joints.setdefault(FRAMES.get(limb, limb), []).append((joint, axis))
     robot = ElementTree.Element("robot", name=f"human_{person}")
     limbs = {f"{FRAMES.get(limb.name, limb.name)}_{person}": limb for limb in body.limbs}
+    heads = dict(zip(limbs, posed.heads[0], strict=True))
     for number, (name, parent) in enumerate(zip(ids, frames.parents, strict=True)):
         link = ElementTree.SubElement(robot, "link", name=name)
         if name in limbs:
@@ -51,17 +55,22 @@ def urdf(body: Body, person: str) -> str:
             ElementTree.SubElement(ElementTree.SubElement(visual, "geometry"), "cylinder", size)
         if parent < 0:
             continue
-        offset, above = places[number] - places[parent], ids[parent]
         turns = joints.get(name.removesuffix(f"_{person}"), ())
+        # The frames of head and torso are in their middles, away from the joints that turn them.
+        pivot = heads[name] if turns else places[parent]
+        offset, above = pivot - places[parent], ids[parent]
+        fixed = not turns or np.abs(places[number] - pivot).max() > _SAME_M
         for count, (joint, axis) in enumerate(turns, 1):
-            below = name if count == len(turns) else f"{joint}_{person}"
+            below = f"{joint}_{person}"
+            if count == len(turns):
+                below = f"{joint}_turned_{person}" if fixed else name
             if below != name:
                 ElementTree.SubElement(robot, "link", name=below)
             made = _joint(robot, f"{joint}_{person}", "continuous", above, below, offset)
             ElementTree.SubElement(made, "axis", xyz=_words(axis))
             offset, above = np.zeros(3), below
-        if not turns:
-            _joint(robot, f"{name}_fixed", "fixed", above, name, offset)
+        if fixed:
+            _joint(robot, f"{name}_fixed", "fixed", above, name, places[number] - pivot)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 
