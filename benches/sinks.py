@@ -3,8 +3,8 @@ that hang.
 
     python benches/sinks.py [--seconds 4] [--rounds 24]
 
-On one core; receivers are processes of the last one, and take everything but the markers of ROS 2. Sessions with and without
-sinks take turns. Of the processor time of all threads from one frame to the next, the least of all sessions counts, when the
+On one core; receivers are processes of the last one, and take everything but what ROS 2 makes on demand, markers and 2-D
+skeletons. Sessions with and without sinks take turns. Of the processor time of all threads from one frame to the next, the least of all sessions counts, when the
 rest of the machine was quiet. A sink whose library is missing is named.
 """
 
@@ -43,7 +43,7 @@ from voodoo.live.ros2.dds import Node
 node, heard = Node(), {}
 while True:
     for topic, offer in node.offers().items():
-        if topic not in heard and not topic.endswith("markers"):
+        if topic not in heard and not topic.endswith(("markers", "skeleton2d")):
             heard[topic] = node.subscribe(topic, offer)
     node.wait(0.2)
     for one in heard.values():

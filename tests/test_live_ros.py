@@ -1,5 +1,6 @@
 """ROS 2 messages of a live source, without a network: what they become, and what is published."""
 
+import re
 import time
 from dataclasses import replace
 from itertools import pairwise
@@ -10,7 +11,7 @@ import pytest
 
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
-from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, instant, new
+from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, instant, keypoints_message, new
 from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
@@ -200,6 +201,11 @@ def test_names_of_types():
     assert ros_name("DCPSParticipant") == ""
 
 
+LISTS = {TRACKED, "/humans/persons/tracked"}
+ORDER = ["/human_description_p1", "/humans/persons/p1/body_id", "/humans/persons/p1/anonymous"]
+ONCE = set(ORDER)
+
+
 class FakeNode:
     """Keeps what is published."""
 
@@ -261,8 +267,9 @@ def test_what_is_published_has_the_stamps_of_the_data():
         f"{body}/joint_states",
         f"{body}/markers",
         f"{body}/pose",
-        TRACKED,
-        "/human_description_p1",
+        f"{body}/skeleton2d",
+        *LISTS,
+        *ONCE,
     }
     stamps = {
         (message.header.stamp.sec, message.header.stamp.nanosec)
@@ -278,14 +285,38 @@ def test_what_is_published_has_the_stamps_of_the_data():
     assert names["l_elbow_p1"] == "l_shoulder_p1"
     assert sent[TRACKED][0].ids == ["p1"]
     gone = publish(step.estimate.stamp + 0.1, nobody(step.estimate.stamp + 0.1))
-    assert set(gone) == {f"{body}/markers", TRACKED}
+    assert set(gone) == {f"{body}/markers", *LISTS}
     assert [marker.action for marker in gone[f"{body}/markers"][0].markers] == [3], "they are deleted"
     assert gone[TRACKED][0].ids == []
-    assert set(publish(step.estimate.stamp + 0.2, nobody(step.estimate.stamp + 0.2))) == {TRACKED}
+    assert set(publish(step.estimate.stamp + 0.2, nobody(step.estimate.stamp + 0.2))) == LISTS
     assert gone[TRACKED][0].__msgtype__ == IDS
-    node.unheard.add(f"{body}/markers")
+    on_demand = {f"{body}/markers", f"{body}/skeleton2d"}
+    node.unheard |= on_demand
     unheard = publish(step.estimate.stamp + 0.3, step.estimate)
-    assert set(sent) - set(unheard) == {f"{body}/markers", "/human_description_p1"}, "made for nobody"
+    assert set(sent) - set(unheard) == on_demand | ONCE, "made for nobody"
+    assert all(sent[topic][0].ids == ["p1"] for topic in LISTS)
+    description, body_id, anonymous = (sent[topic][0].data for topic in sorted(ONCE, key=ORDER.index))
+    assert description.startswith("<robot") and body_id == "p1" and anonymous is True
+
+
+def test_keypoints_are_where_the_camera_sees_the_joints():
+    recording = open_recording(sample_path(), use=("depth",))
+    tracker = start_tracker(recording)
+    step = next(track(recording, tracker))
+    (image,) = (item for item in step.recorded.measurements if isinstance(item, DepthImage))
+    raw = cdr(keypoints_message(step.estimate, image))
+    message = STORE.deserialize_cdr(raw, "hri_msgs/msg/Skeleton2D")
+    header = len(cdr(new("std_msgs/msg/Header", frame_id=image.sensor)))
+    assert len(raw) == -(-header // 4) * 4 + 18 * 12, "an array, not a sequence"
+    points = np.array([(one.x, one.y, one.c) for one in message.skeleton])
+    assert (points[[0, 14, 15, 16, 17]] == 0.0).all() and (points[1:14, 2] > 0.5).all() and (points[:, 2] <= 1.0).all()
+    sensor_from_root = np.linalg.inv(image.root_from_sensor)
+    for number, site in ((4, "r_wrist"), (5, "l_shoulder"), (9, "r_knee"), (13, "l_ankle")):
+        place = sensor_from_root[:3, :3] @ step.estimate.joints[site] + sensor_from_root[:3, 3]
+        seen = (image.camera.project(place[None])[0] + 0.5) / (image.camera.width, image.camera.height)
+        np.testing.assert_allclose(points[number, :2], seen, atol=1e-6)
+    outside = replace(image, root_from_sensor=image.root_from_sensor @ np.diag([-1.0, 1.0, -1.0, 1.0]))
+    assert all(one.x == one.y == one.c == 0.0 for one in keypoints_message(step.estimate, outside).skeleton)
 
 
 @pytest.mark.parametrize("root", ["odom", "camera_depth_optical_frame"])
@@ -336,11 +367,11 @@ def test_a_frame_is_written_in_as_few_messages_as_it_has_topics_and_encoded_once
     for step in steps[2:]:
         people, bodies = (dict.fromkeys(range(1, 5), one) for one in (step.estimate, tracker.body))
         output.publish(Step(LiveFrame(step.estimate.stamp, (), 0, 0.0, 0.0, False), people, bodies, 0.0))
-        sent = [topic for topic, _ in node.sent if "description" not in topic]
+        sent = [topic for topic, _ in node.sent if not re.search("description|body_id|anonymous", topic)]
         node.take()
         counts.append((len(sent), len(set(sent)), len(encoded)))
-    assert {count[:2] for count in counts} == {(10, 10)}  # /tf, the list of ids, and two of each person
-    assert counts[0][2] == counts[-1][2] == 14  # the descriptions, too
+    assert {count[:2] for count in counts} == {(11, 11)}  # /tf, two lists of ids, and two of each person
+    assert counts[0][2] == counts[-1][2] == 11 + 3 * 4  # and what is sent once of each person
 
 
 def test_a_whole_recording_goes_through_the_bus():

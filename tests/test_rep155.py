@@ -76,8 +76,15 @@ def test_every_name_follows_from_an_id_in_tracked(write, tmp_path):
         assert set(found[f"/humans/bodies/{one}/joint_states"][0][1].name) <= joints
         assert {name for names in frames.values() for name in names if name.endswith(f"_{one}")} <= links
         assert len(joints) == len(links) - 1, "a tree"
-    topics = {topic for topic in found if topic.startswith("/humans/bodies/") and topic.count("/") > 3}
-    assert {topic.split("/")[3] for topic in topics} == ids
+        (((_, body),), ((_, anonymous),)) = (
+            found[f"/humans/persons/{one}/{name}"] for name in ("body_id", "anonymous")
+        )
+        assert body.data == one and anonymous.data
+    for kind in ("bodies", "persons"):
+        topics = {topic for topic in found if topic.startswith(f"/humans/{kind}/") and topic.count("/") > 3}
+        assert {topic.split("/")[3] for topic in topics} == ids
+    lists = ([(at, message.ids) for at, message in found[f"/humans/{kind}/tracked"]] for kind in ("bodies", "persons"))
+    assert next(lists) == next(lists)
 
 
 def test_the_joints_of_a_description_place_the_frames_as_the_transforms_do():

@@ -27,17 +27,27 @@ from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
+from voodoo.measurements import ColorImage, DepthImage
 from voodoo.model.body import Body
+from voodoo.model.projection import CameraView
 from voodoo.model.rotations import quaternions
 from voodoo.whole import appearing_whole
 
 BODIES = "/humans/bodies"
+PERSONS = "/humans/persons"
 TRACKED = f"{BODIES}/tracked"
-"""Topic of the ids of all persons who have transforms."""
-IDS, STRING = "hri_msgs/msg/IdsList", "std_msgs/msg/String"
+"""Topic of the ids of all persons who have transforms; that of PERSONS has the same."""
+IDS, STRING, BOOL = "hri_msgs/msg/IdsList", "std_msgs/msg/String", "std_msgs/msg/Bool"
+SKELETON = "hri_msgs/msg/Skeleton2D"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 """Release whose definitions are used; the messages used here have the same fields in other releases."""
-STORE.register(get_types_from_msg("std_msgs/Header header\nstring[] ids", IDS))
+_POINT = "hri_msgs/msg/NormalizedPointOfInterest2D"
+for _fields, _kind in (
+    ("std_msgs/Header header\nstring[] ids", IDS),
+    ("float32 x\nfloat32 y\nfloat32 c", _POINT),
+    ("std_msgs/Header header\nhri_msgs/NormalizedPointOfInterest2D[18] skeleton", SKELETON),
+):
+    STORE.register(get_types_from_msg(_fields, _kind))
 TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _MARKER = "visualization_msgs/msg/Marker"
@@ -50,13 +60,46 @@ def person_id(number: int) -> str:
 
 
 def description(body: Body, person: str) -> dict[str, Any]:
-    """Topic -> message (std_msgs/String) of the person's URDF in the body's current sizes."""
-    return {f"/human_description_{person}": new(STRING, data=urdf(body, person))}
+    """Topic -> message of the person's URDF in the body's current sizes and of the id of the person's body (std_msgs/String), and
+    that the person is not known by name (std_msgs/Bool)."""
+    return {
+        f"/human_description_{person}": new(STRING, data=urdf(body, person)),
+        f"{PERSONS}/{person}/body_id": new(STRING, data=person),
+        f"{PERSONS}/{person}/anonymous": new(BOOL, data=True),
+    }
 
 
 def tracked(stamp: float, persons: Sequence[str], *, root_frame: str) -> dict[str, Any]:
-    """Topic -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s]."""
-    return {TRACKED: new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons))}
+    """Topic -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s], and of their bodies, which
+    are the same."""
+    ids = new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons))
+    return {TRACKED: ids, f"{PERSONS}/tracked": ids}
+
+
+_KEYPOINTS = ("", "vc7") + tuple(
+    f"{side}_{joint}"
+    for joints in ("shoulder elbow wrist", "hip knee ankle")
+    for side in "rl"
+    for joint in joints.split()
+)
+"""Sites of the first keypoints of Skeleton2D; of nose, eyes and ears nothing is known."""
+_LIMB_TO = {"elbow": "upperarm", "wrist": "forearm", "knee": "thigh", "ankle": "calf"}
+
+
+def keypoints_message(estimate: Estimate, image: DepthImage | ColorImage) -> Any:  # noqa: ANN401
+    """Skeleton2D of a person with a pose: where the camera of an image sees the joints, normalized by its size, and the
+    probability that the limb to a joint ends within 10 cm of it; all 0 for a joint that is unknown or outside of the image."""
+    places, sure, camera = estimate.joints, estimate.limb_probability, image.camera
+    known = [number for number, site in enumerate(_KEYPOINTS) if site in places]
+    view = CameraView(camera, image.root_from_sensor)
+    pixels, _ = view.project(np.array([places[_KEYPOINTS[number]] for number in known]).reshape(-1, 3))
+    points = [new(_POINT) for _ in range(18)]
+    for number, at in zip(known, (pixels + 0.5) / (camera.width, camera.height), strict=True):
+        side, _, joint = _KEYPOINTS[number].partition("_")
+        probability = sure.get(f"{side}_{_LIMB_TO.get(joint)}", sure[estimate.limb_names[0]])
+        if ((at >= 0.0) & (at <= 1.0)).all():
+            points[number] = new(_POINT, x=float(at[0]), y=float(at[1]), c=float(np.nan_to_num(probability)))
+    return new(SKELETON, header=header_at(round(image.stamp * 1e9), image.sensor), skeleton=points)
 
 
 def write_bag(
@@ -71,8 +114,9 @@ def write_bag(
 ) -> None:
     """Write a new bag folder.
 
-    Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/tracked` (hri_msgs/IdsList), `/human_description_<person>`
-    (std_msgs/String, URDF, once at the beginning), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
+    Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/tracked` and `/humans/persons/tracked` (hri_msgs/IdsList),
+    `/humans/persons/<person>/body_id` and `anonymous`, and `/human_description_<person>` (std_msgs/String, URDF; these three once
+    at the beginning), `/humans/bodies/<person>/joint_states` (sensor_msgs/JointState) and
     `/humans/bodies/<person>/markers` (visualization_msgs/MarkerArray: limbs as cylinders of their mean girth, joints, and
     where these are known ellipsoids of one standard deviation about them). If the covariance is known,
     `/humans/bodies/<person>/pose` (geometry_msgs/PoseWithCovarianceStamped) is the pose of `body_<person>` with its covariance.
@@ -127,14 +171,15 @@ def write_people_bag(
     humans = [_Human(track, body, name, root_frame, turn) for name, (track, body) in people.items()]
     if path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    kinds = {"/tf": TF, TRACKED: IDS}
+    kinds = {"/tf": TF} | dict.fromkeys(tracked(0.0, (), root_frame=root_frame), IDS)
     first: dict[str, Any] = {}
     frames: list[tuple[float, int, int]] = []
     there: dict[float, list[str]] = {}
     for number, human in enumerate(humans):
-        kinds |= human.kinds(markers) | {f"/human_description_{human.person}": STRING}
+        kinds |= human.kinds(markers)
         first |= description(human.body, human.person)
         frames += [(float(stamp), number, index) for index, stamp in enumerate(human.track.stamps)]
+    kinds |= {topic: message.__msgtype__ for topic, message in first.items()}
     frames.sort()
     for stamp, number, index in frames:
         there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])

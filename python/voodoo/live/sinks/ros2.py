@@ -16,17 +16,19 @@ from voodoo.errors import VoodooError
 from voodoo.export.human_frames import placed_names
 from voodoo.export.ros2 import (
     BODIES,
+    BOOL,
     IDS,
     JOINTS,
     POSE,
+    SKELETON,
     STORE,
     STRING,
     TF,
-    TRACKED,
     cdr,
     description,
     instant,
     joint_message,
+    keypoints_message,
     person_id,
     pose_message,
     root_on_parent,
@@ -38,13 +40,14 @@ from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
 from voodoo.live.sinks.people import shown, upright_frame
-from voodoo.measurements import FloatArray
+from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody
 
 ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
-_PLACE, _MARKERS = "geometry_msgs/msg/PointStamped", "visualization_msgs/msg/MarkerArray"
+_PLACE = "geometry_msgs/msg/PointStamped"
+_ON_DEMAND = {"markers": "visualization_msgs/msg/MarkerArray", "skeleton2d": SKELETON}
 _LOOK_S = 0.5
 """How often sizes, subscribers of markers, and what is asked for are looked at."""
 _OTHER_SIZE = 0.01
@@ -52,12 +55,13 @@ _OTHER_SIZE = 0.01
 
 
 class Ros2Sink(Output):
-    """`/tf`, `/humans/bodies/<id>/joint_states`, `.../pose`, `.../markers`, `/human_description_<id>` (URDF), and
-    `/humans/bodies/tracked` (hri_msgs/IdsList).
+    """`/tf`, `/humans/bodies/<id>/joint_states`, `.../pose`, `.../markers`, `.../skeleton2d` in the first camera,
+    `/human_description_<id>` (URDF), `/humans/bodies/tracked`, `/humans/persons/tracked` (hri_msgs/IdsList), and of each person
+    `body_id` and `anonymous`.
 
-    Markers are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or searched for are
-    not listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched for again; one on
-    FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
+    Markers and 2-D skeletons are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or
+    searched for are not listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched
+    for again; one on FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
 
     Args:
         address: ros2://; the network is that of the environment.
@@ -90,14 +94,15 @@ class Ros2Sink(Output):
         self._topics: dict[str, Publication] = {}
         self._displayed: dict[int, Body] = {}
         self._described: dict[int, float] = {}
-        self._marked: dict[int, int] = {}
+        self._wanted: dict[int, dict[str, int]] = {}
         self._looked = -np.inf
         self._template_of = lru_cache(8)(self._make_template)
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", TF, 100)
-        self._publish_on(TRACKED, IDS, 1)
-        for name, kind in (("joint_states", JOINTS), ("pose", POSE), ("markers", _MARKERS)):
+        for topic in tracked(0.0, (), root_frame=""):
+            self._publish_on(topic, IDS, 1)
+        for name, kind in (("joint_states", JOINTS), ("pose", POSE), *_ON_DEMAND.items()):
             # Subscribers can discover these topics before the first pose.
             self._publish_on(f"{BODIES}/{person_id(1)}/{name}", kind)
 
@@ -122,18 +127,24 @@ class Ros2Sink(Output):
         for publication, message in zip(publications, messages, strict=True):
             publication.write(message)
         displayed = self._displayed | observed  # markers of persons who left are deleted once
-        if displayed.keys() != self._marked.keys() or abs(step.stamp - self._looked) > _LOOK_S:
+        if displayed.keys() != self._wanted.keys() or abs(step.stamp - self._looked) > _LOOK_S:
             self._looked = step.stamp
             self._obey()
             self._describe(observed)
-            self._marked = {number: self._publish_on(_markers(number), _MARKERS).subscribers for number in displayed}
+            self._wanted = {number: self._subscribers(number) for number in displayed}
+        image = next((item for item in step.frame.measurements if isinstance(item, (DepthImage, ColorImage))), None)
         for number in displayed:
-            if self._marked[number]:
+            if self._wanted[number]["markers"]:
                 estimate = step.estimates[number] if number in observed else nobody(step.stamp)
                 how: Any = {"root_frame": root, "person": person_id(number), "turn": step.turn}
-                topic = _markers(number)
+                topic = _topic(number, "markers")
                 self._write({topic: instant(estimate, displayed[number], **how)[topic]})
+            if self._wanted[number]["skeleton2d"] and number in observed and image is not None:
+                self._write({_topic(number, "skeleton2d"): keypoints_message(step.estimates[number], image)})
         self._displayed = observed
+
+    def _subscribers(self, number: int) -> dict[str, int]:
+        return {name: self._publish_on(_topic(number, name), kind).subscribers for name, kind in _ON_DEMAND.items()}
 
     def _obey(self) -> None:
         if self._resets.take() and self.on_reset is not None:
@@ -162,7 +173,8 @@ class Ros2Sink(Output):
     ) -> tuple[list[Publication], _core.Template]:
         """Topics, and the messages on them, of persons of whom some have a covariance."""
         topics = [("/tf", TF)] * bool(ids) + [(f"{BODIES}/{person}/joint_states", JOINTS) for person in ids]
-        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), (TRACKED, IDS)]
+        lists = tracked(STAMP_NS / 1e9, ids, root_frame=root)
+        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), *((topic, IDS) for topic in lists)]
         placed = [(root, frame)] * (frame != root) if ids else []
         placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
 
@@ -173,7 +185,7 @@ class Ros2Sink(Output):
             for person in ids:
                 messages.append(joint_message(STAMP_NS, person, joints, list(islice(left, len(joints)))))
             messages += [pose_message(STAMP_NS, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
-            return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
+            return [cdr(one) for one in (*messages, *lists.values())]
 
         count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
         return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
@@ -181,17 +193,17 @@ class Ros2Sink(Output):
     def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:
             STORE.get_msgdef(kind)
-            self._topics[topic] = self._node.advertise(topic, kind, depth=depth, latched=kind == STRING)
+            self._topics[topic] = self._node.advertise(topic, kind, depth=depth, latched=kind in (STRING, BOOL))
         return self._topics[topic]
 
     def _write(self, messages: Mapping[str, Any]) -> None:
         for topic, message in messages.items():
             kind = message.__msgtype__
-            self._publish_on(topic, kind, 1 if kind == STRING else 10).write(cdr(message))
+            self._publish_on(topic, kind, 1 if kind in (STRING, BOOL) else 10).write(cdr(message))
 
 
-def _markers(number: int) -> str:
-    return f"{BODIES}/{person_id(number)}/markers"
+def _topic(number: int, name: str) -> str:
+    return f"{BODIES}/{person_id(number)}/{name}"
 
 
 def _stamp(nanoseconds: int) -> bytes:
