@@ -4,8 +4,8 @@ that hang.
     python benches/sinks.py [--seconds 4] [--rounds 24]
 
 On one core; receivers are processes of the last one, and take everything but what ROS 2 makes on demand, markers and 2-D
-skeletons. Sessions with and without sinks take turns. Of the processor time of all threads from one frame to the next, the least of all sessions counts, when the
-rest of the machine was quiet. A sink whose library is missing is named.
+skeletons. Sessions with and without sinks take turns. Of the processor time of all threads from one frame to the next, the
+least of all sessions counts, when the rest of the machine was quiet. A sink whose library is missing is named.
 """
 
 from __future__ import annotations
