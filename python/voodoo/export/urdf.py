@@ -42,7 +42,7 @@ def urdf(body: Body, person: str) -> str:
         joints.setdefault(FRAMES.get(limb, limb), []).append((joint, axis))
     robot = ElementTree.Element("robot", name=f"human_{person}")
     limbs = {f"{FRAMES.get(limb.name, limb.name)}_{person}": limb for limb in body.limbs}
-    heads = dict(zip(limbs, posed.heads[0], strict=True))
+    heads = {f"{FRAMES.get(limb, limb)}_{person}": head for limb, head in zip(limb_names, posed.heads[0], strict=True)}
     for number, (name, parent) in enumerate(zip(ids, frames.parents, strict=True)):
         link = ElementTree.SubElement(robot, "link", name=name)
         if name in limbs:
