@@ -4,6 +4,7 @@ import re
 import time
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -201,7 +202,8 @@ def test_names_of_types():
     assert ros_name("DCPSParticipant") == ""
 
 
-LISTS = {TRACKED, "/humans/persons/tracked"}
+LAMP = Path(__file__).resolve().parent.parent / "examples/bodies/lamp.toml"
+LISTS = {"/humans/bodies/tracked", "/humans/persons/tracked"}
 ORDER = ["/human_description_p1", "/humans/persons/p1/body_id", "/humans/persons/p1/anonymous"]
 ONCE = set(ORDER)
 
@@ -276,20 +278,20 @@ def test_what_is_published_has_the_stamps_of_the_data():
         for message in (
             *sent["/tf"][0].transforms,
             *(sent[f"{body}/{name}"][0] for name in ("joint_states", "pose")),
-            *sent[TRACKED],
+            *(sent[topic][0] for topic in TRACKED),
         )
     }
     assert stamps == {divmod(round(step.estimate.stamp * 1e9), 1_000_000_000)}
     names = {transform.child_frame_id: transform.header.frame_id for transform in sent["/tf"][0].transforms}
     assert names["body_p1"] == "base_link"
     assert names["l_elbow_p1"] == "l_shoulder_p1"
-    assert sent[TRACKED][0].ids == ["p1"]
+    assert sent[TRACKED[0]][0].ids == ["p1"]
     gone = publish(step.estimate.stamp + 0.1, nobody(step.estimate.stamp + 0.1))
     assert set(gone) == {f"{body}/markers", *LISTS}
     assert [marker.action for marker in gone[f"{body}/markers"][0].markers] == [3], "they are deleted"
-    assert gone[TRACKED][0].ids == []
+    assert gone[TRACKED[0]][0].ids == []
     assert set(publish(step.estimate.stamp + 0.2, nobody(step.estimate.stamp + 0.2))) == LISTS
-    assert gone[TRACKED][0].__msgtype__ == IDS
+    assert gone[TRACKED[0]][0].__msgtype__ == IDS
     on_demand = {f"{body}/markers", f"{body}/skeleton2d"}
     node.unheard |= on_demand
     unheard = publish(step.estimate.stamp + 0.3, step.estimate)
@@ -315,6 +317,8 @@ def test_keypoints_are_where_the_camera_sees_the_joints():
         place = sensor_from_root[:3, :3] @ step.estimate.joints[site] + sensor_from_root[:3, 3]
         seen = (image.camera.project(place[None])[0] + 0.5) / (image.camera.width, image.camera.height)
         np.testing.assert_allclose(points[number, :2], seen, atol=1e-6)
+    lamp = voodoo.Tracker(voodoo.Body.load(LAMP), detector=None).estimate
+    assert all(one.c == 0.0 for one in keypoints_message(lamp, image).skeleton)
     outside = replace(image, root_from_sensor=image.root_from_sensor @ np.diag([-1.0, 1.0, -1.0, 1.0]))
     assert all(one.x == one.y == one.c == 0.0 for one in keypoints_message(step.estimate, outside).skeleton)
 
@@ -333,7 +337,7 @@ def test_several_people_are_published_as_a_bag_has_them(root):
         output.publish(Step(LiveFrame(stamp, (), 0, 0.0, 0.0, False), people, bodies, 0.0))
         sent = node.take()
         (transforms,) = sent["/tf"]
-        assert sent[TRACKED][0].ids == ["p1", "p4"] and sent[TRACKED][0].header.stamp.nanosec == (stamp % 1) * 1e9
+        assert sent[TRACKED[0]][0].ids == ["p1", "p4"] and sent[TRACKED[0]][0].header.stamp.nanosec == (stamp % 1) * 1e9
         expected = []
         for number, estimate in people.items():
             made = instant(estimate, bodies[number], root_frame=root, person=f"p{number}")

@@ -33,10 +33,9 @@ from voodoo.model.projection import CameraView
 from voodoo.model.rotations import quaternions
 from voodoo.whole import appearing_whole
 
-BODIES = "/humans/bodies"
-PERSONS = "/humans/persons"
-TRACKED = f"{BODIES}/tracked"
-"""Topic of the ids of all persons who have transforms; that of PERSONS has the same."""
+BODIES, PERSONS = "/humans/bodies", "/humans/persons"
+TRACKED = f"{BODIES}/tracked", f"{PERSONS}/tracked"
+"""Topics of the ids of all persons who have transforms, and of their bodies, which are the same."""
 IDS, STRING, BOOL = "hri_msgs/msg/IdsList", "std_msgs/msg/String", "std_msgs/msg/Bool"
 SKELETON = "hri_msgs/msg/Skeleton2D"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -70,10 +69,8 @@ def description(body: Body, person: str) -> dict[str, Any]:
 
 
 def tracked(stamp: float, persons: Sequence[str], *, root_frame: str) -> dict[str, Any]:
-    """Topic -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s], and of their bodies, which
-    are the same."""
-    ids = new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons))
-    return {TRACKED: ids, f"{PERSONS}/tracked": ids}
+    """Topic of TRACKED -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s]."""
+    return dict.fromkeys(TRACKED, new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons)))
 
 
 _KEYPOINTS = ("", "vc7") + tuple(
@@ -171,7 +168,7 @@ def write_people_bag(
     humans = [_Human(track, body, name, root_frame, turn) for name, (track, body) in people.items()]
     if path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
-    kinds = {"/tf": TF} | dict.fromkeys(tracked(0.0, (), root_frame=root_frame), IDS)
+    kinds = {"/tf": TF} | dict.fromkeys(TRACKED, IDS)
     first: dict[str, Any] = {}
     frames: list[tuple[float, int, int]] = []
     there: dict[float, list[str]] = {}

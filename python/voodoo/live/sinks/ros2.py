@@ -24,6 +24,7 @@ from voodoo.export.ros2 import (
     STORE,
     STRING,
     TF,
+    TRACKED,
     cdr,
     description,
     instant,
@@ -100,7 +101,7 @@ class Ros2Sink(Output):
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
         self._publish_on("/tf", TF, 100)
-        for topic in tracked(0.0, (), root_frame=""):
+        for topic in TRACKED:
             self._publish_on(topic, IDS, 1)
         for name, kind in (("joint_states", JOINTS), ("pose", POSE), *_ON_DEMAND.items()):
             # Subscribers can discover these topics before the first pose.
@@ -173,8 +174,7 @@ class Ros2Sink(Output):
     ) -> tuple[list[Publication], _core.Template]:
         """Topics, and the messages on them, of persons of whom some have a covariance."""
         topics = [("/tf", TF)] * bool(ids) + [(f"{BODIES}/{person}/joint_states", JOINTS) for person in ids]
-        lists = tracked(STAMP_NS / 1e9, ids, root_frame=root)
-        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), *((topic, IDS) for topic in lists)]
+        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), *((topic, IDS) for topic in TRACKED)]
         placed = [(root, frame)] * (frame != root) if ids else []
         placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
 
@@ -185,7 +185,7 @@ class Ros2Sink(Output):
             for person in ids:
                 messages.append(joint_message(STAMP_NS, person, joints, list(islice(left, len(joints)))))
             messages += [pose_message(STAMP_NS, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
-            return [cdr(one) for one in (*messages, *lists.values())]
+            return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
 
         count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
         return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
@@ -193,13 +193,13 @@ class Ros2Sink(Output):
     def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:
             STORE.get_msgdef(kind)
-            self._topics[topic] = self._node.advertise(topic, kind, depth=depth, latched=kind in (STRING, BOOL))
+            latched = kind in (STRING, BOOL)
+            self._topics[topic] = self._node.advertise(topic, kind, depth=1 if latched else depth, latched=latched)
         return self._topics[topic]
 
     def _write(self, messages: Mapping[str, Any]) -> None:
         for topic, message in messages.items():
-            kind = message.__msgtype__
-            self._publish_on(topic, kind, 1 if kind in (STRING, BOOL) else 10).write(cdr(message))
+            self._publish_on(topic, message.__msgtype__).write(cdr(message))
 
 
 def _topic(number: int, name: str) -> str:
