@@ -1,16 +1,21 @@
 """Formats of other programs, opened by their own readers; the same pose through all of them."""
 
+import base64
+import io
 import json
 import struct
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 import voodoo
+from browser import needs_chromium, told_by
 from test_exports import read_bvh, with_gaps
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.files import save
@@ -310,13 +315,66 @@ def test_glb_opens_in_trimesh_and_its_skin_follows_the_limbs(tmp_path, person):
     assert mesh.volume == pytest.approx(sum(limb_volume(limb) for limb in body.limbs), rel=0.02)
     assert 1.6 < np.ptp(mesh.vertices, axis=0)[1] < 2.0  # at rest, Y up
     for frame in (0, FRAMES - 1):
-        _, vertices = read_glb(tmp_path / "pose.glb", frame)
-        count = len(vertices) // len(body.limbs)
-        for number, limb in enumerate(body.limbs):
-            pose = track.world_from_limb[frame, number]
-            own = (vertices[number * count : (number + 1) * count] - pose[:3, 3]) @ pose[:3, :3]
-            distance = limb.shape.closest_points(np.ascontiguousarray(own)).signed_distance
-            assert np.abs(distance).max() < 1e-3, limb.name
+        assert_on_limbs(read_glb(tmp_path / "pose.glb", frame)[1], track, body, frame)
+
+
+PLAYER = """<script>%(library)s</script><script>
+const stage = new THREE.Scene(), camera = new THREE.PerspectiveCamera(40, 1, 0.1, 50), light = new THREE.DirectionalLight();
+const drawn = new THREE.WebGLRenderer({preserveDrawingBuffer: true}), corner = new THREE.Vector3();
+drawn.setSize(400, 400);
+stage.add(light);
+new THREE.GLTFLoader().load("data:text/plain;base64,%(file)s", (file) => {
+  stage.add(file.scene);
+  const player = new THREE.AnimationMixer(file.scene), skin = file.scene.getObjectByProperty("type", "SkinnedMesh");
+  const action = player.clipAction(file.animations[0]).setLoop(THREE.LoopOnce).play();
+  action.clampWhenFinished = true;
+  const vertices = %(stamps)s.map((time) => {
+    player.setTime(time);
+    stage.updateMatrixWorld(true);
+    const points = skin.geometry.attributes.position;
+    return Array.from({length: points.count}, (_, index) =>
+      skin.localToWorld(skin.boneTransform(index, corner.fromBufferAttribute(points, index))).toArray());
+  });
+  const center = vertices[vertices.length - 1].reduce((sum, one) => sum.map((value, axis) => value + one[axis]), [0, 0, 0]);
+  const middle = new THREE.Vector3(...center).divideScalar(vertices[0].length);
+  camera.position.copy(middle).add(new THREE.Vector3(1, 0.5, 3));
+  camera.lookAt(middle);
+  light.position.copy(camera.position).sub(middle);
+  skin.frustumCulled = false;
+  drawn.render(stage, camera);
+  fetch("/", {method: "POST", body: JSON.stringify({vertices, picture: drawn.domElement.toDataURL()})});
+});
+</script>"""
+
+
+@needs_chromium
+def test_three_js_plays_a_glb_in_chromium(tmp_path, person):
+    resources = pytest.importorskip("trimesh.resources", reason="pip install trimesh, of the extra test")
+    track, body = person
+    save(track, tmp_path / "pose.glb", body=body, root_frame="odom")
+    with zipfile.ZipFile(io.BytesIO(resources.get_bytes("templates/viewer.zip"))) as packed:
+        viewer = packed.read("viewer.html.template").decode()  # holds three.js and its reader of glTF
+    library = viewer[viewer.index("<script>") + len("<script>") : viewer.rindex("var camera,controls")]
+    file, frames = base64.b64encode((tmp_path / "pose.glb").read_bytes()).decode(), (0, FRAMES // 2, FRAMES - 1)
+    stamps = [float(track.stamps[frame] - track.stamps[0]) for frame in frames]
+    played, console = told_by(PLAYER % {"library": library, "file": file, "stamps": stamps}, tmp_path)
+    assert console == []
+    for frame, vertices in zip(frames, np.array(played["vertices"]), strict=True):
+        assert_on_limbs(vertices[:, [2, 0, 1]], track, body, frame)
+    picture = base64.b64decode(played["picture"].partition(",")[2])
+    (tmp_path / "played.png").write_bytes(picture)
+    shown = cv2.imdecode(np.frombuffer(picture, dtype=np.uint8), cv2.IMREAD_GRAYSCALE) > 0
+    assert 0.03 < shown.mean() < 0.6
+
+
+def assert_on_limbs(vertices, track, body, frame):
+    """Vertices of a mesh, z up, lie on the limbs, the same number on each."""
+    count = len(vertices) // len(body.limbs)
+    for number, limb in enumerate(body.limbs):
+        pose = track.world_from_limb[frame, number]
+        own = (vertices[number * count : (number + 1) * count] - pose[:3, 3]) @ pose[:3, :3]
+        distance = limb.shape.closest_points(np.ascontiguousarray(own)).signed_distance
+        assert np.abs(distance).max() < 1e-3, limb.name
 
 
 def limb_volume(limb):
