@@ -28,7 +28,7 @@ from voodoo.live.session import Output, Session
 from voodoo.live.sinks import sink_of
 from voodoo.live.sources.played import PlayedSource
 from voodoo.live.stream import Live
-from voodoo.measurements import RecordedFrame
+from voodoo.measurements import ColorImage, RecordedFrame
 from voodoo.sensors.settings import FrontEndSettings
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
@@ -69,6 +69,9 @@ class Kept(MadeUpRecording):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self._kept, self.used = list(super().__iter__()), list[float]()
+        for frame in self._kept:
+            for item in frame.measurements:
+                _ = item.image if isinstance(item, ColorImage) else None  # it keeps what it has decoded
 
     def __iter__(self) -> Iterator[RecordedFrame]:
         self.used = []

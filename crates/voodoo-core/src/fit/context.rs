@@ -28,19 +28,20 @@ impl Context<'_> {
         Self { observation: self.observation.with(self.observation.candidates.subsampled()), ..self }
     }
 
-    /// Whether color edges are used for a limb: for all limbs without depth, and for arms with depth, which is blurred there but
-    /// reliable for legs.
+    /// Whether color edges are used for a limb: for all limbs without points, and for arms with points, which are blurred there
+    /// but reliable for legs.
     pub(crate) fn uses_edges(&self, limb: usize) -> bool {
-        self.pictures_alone() || {
+        self.compares_colors() || {
             let arms = self.model.extremities.iter().filter(|chain| !chain.leg);
             arms.flat_map(TwoBone::limbs).any(|own| own == limb)
         }
     }
 
-    /// Whether color images are the only observation of the body.
-    pub(crate) fn pictures_alone(&self) -> bool {
-        let frame = self.observation.frame();
-        self.config.regions && !frame.colors.is_empty() && frame.images.is_empty() && frame.clouds.is_empty()
+    /// Whether the colors of pixels compare poses: where no point was measured near the body. Points and pixels of the same
+    /// surface are not independent, and points say more.
+    pub(crate) fn compares_colors(&self) -> bool {
+        let has_colors = self.config.regions && !self.observation.frame().colors.is_empty();
+        has_colors && self.observation.candidates.is_empty()
     }
 }
 

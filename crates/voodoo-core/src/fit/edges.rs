@@ -49,9 +49,9 @@ impl Fit {
         }
     }
 
-    /// Measures what every limb of the arms and legs explains where only color images are available.
+    /// Measures what every limb of the arms and legs explains where colors compare poses.
     pub(super) fn measure_pixel_gains(&mut self, context: Context, poses: &[Pose]) {
-        if context.pictures_alone() {
+        if context.compares_colors() {
             let Self { regions, correspondences, .. } = self;
             let chains = &context.model.extremities;
             regions.pixel_gains(

@@ -126,7 +126,7 @@ impl Fit {
             steps += 1;
             // Whole-body solvers always take all steps: a step more or less would be a jump of the result.
             let settled = !schedule.whole_body && (before - distance).abs() < context.config.min_change;
-            if settled || steps >= regions::STEPS && context.pictures_alone() {
+            if settled || steps >= regions::STEPS && context.compares_colors() {
                 break;
             }
             before = distance;

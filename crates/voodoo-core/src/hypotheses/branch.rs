@@ -114,9 +114,9 @@ impl Branch {
     }
 }
 
-/// Whether color images of few cameras are the only observation.
+/// Whether colors of few cameras compare poses.
 fn is_enabled(context: Context) -> bool {
-    context.pictures_alone() && context.observation.frame().colors.len() <= FEW_CAMERAS
+    context.compares_colors() && context.observation.frame().colors.len() <= FEW_CAMERAS
 }
 
 fn set_shifted(to: &mut Vec<Pose>, from: &[Pose], origin: Vec3) {

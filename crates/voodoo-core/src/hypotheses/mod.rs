@@ -95,9 +95,9 @@ impl Hypotheses {
         self.make_room(context, fit);
         self.unexplained.collect(context, fit.matched(poses));
         self.refined.clutter = self.unexplained.clutter;
-        let (mut steps, pictures) = (0, context.pictures_alone());
+        let (mut steps, by_colors) = (0, context.compares_colors());
         for index in 0..context.model.extremities.len() {
-            let regions = pictures.then_some(fit.regions());
+            let regions = by_colors.then_some(fit.regions());
             let at = Extremity { context, matched: fit.matched(poses), regions, index };
             if !self.is_due(at) {
                 continue;
@@ -113,10 +113,10 @@ impl Hypotheses {
                 self.unexplained.collect(context, fit.matched(poses));
             }
         }
-        if pictures {
+        if by_colors {
             steps += self.branch.compare(context, &mut self.refined, fit, poses, predicted);
         }
-        if pictures && steps > 0 {
+        if by_colors && steps > 0 {
             // The last evaluated poses may be those of a rejected hypothesis.
             fit.match_last(context, poses);
         }
@@ -141,7 +141,7 @@ impl Hypotheses {
         let most = context.observation.candidates.len();
         self.rough.score.make_room(most);
         self.clusters.make_room(most);
-        if context.pictures_alone() {
+        if context.compares_colors() {
             let (frame, limbs) = (context.observation.frame(), context.model.body.limbs().len());
             for backdrop in [&mut self.rough.score.backdrop, &mut self.refined.backdrop] {
                 backdrop.make_room(frame, limbs);

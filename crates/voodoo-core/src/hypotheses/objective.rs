@@ -36,7 +36,7 @@ pub(crate) struct Objective<'a> {
 
 impl<'a> Objective<'a> {
     /// The objective of matched poses. An unexplained patch costs `clutter` times the usual. `colors` are the color images where
-    /// they are the only observation.
+    /// they compare poses.
     pub(crate) fn new(context: Context<'a>, matched: Matched<'a>, clutter: f64, colors: Option<Colors<'a>>) -> Self {
         let Context { model, observation, config, .. } = context;
         let Matched { correspondences, .. } = matched;

@@ -116,12 +116,12 @@ impl Refined {
     /// Cost of matched poses, nats.
     pub(super) fn cost(&mut self, context: Context, fit: &Fit, poses: &[Pose]) -> f64 {
         let Context { model, observation, previous, .. } = context;
-        let pictures = context.pictures_alone();
-        if pictures {
+        let by_colors = context.compares_colors();
+        if by_colors {
             let posed = Posed { body: &model.body, poses, previous, origin: observation.origin() };
             fit.regions().draw(observation.frame(), posed, |_| true, &mut self.backdrop);
         }
-        let colors = pictures.then(|| colors(context, fit.regions(), &self.backdrop));
+        let colors = by_colors.then(|| colors(context, fit.regions(), &self.backdrop));
         Objective::new(context, fit.matched(poses), self.clutter, colors).body()
     }
 }

@@ -16,7 +16,7 @@ pub(super) struct Extremity<'a> {
     pub(super) context: Context<'a>,
     /// The current poses and their correspondences.
     pub(super) matched: Matched<'a>,
-    /// Color regions; `None` unless color images are the only observation of the body.
+    /// Color regions; `None` where points were measured.
     pub(super) regions: Option<&'a ColorRegions>,
     /// Index among the extremities of the model.
     pub(super) index: usize,
