@@ -71,7 +71,7 @@ impl Observer {
     pub(crate) fn begin(&mut self, frame: &Frame, ownership: OwnershipMask) {
         find_segmented(frame, &mut self.segmented);
         self.has_images |= !frame.images.is_empty();
-        self.is_masked = !ownership.alone;
+        self.is_masked = ownership.others > 0;
         if self.is_masked {
             self.masked.mask(frame, ownership);
         }

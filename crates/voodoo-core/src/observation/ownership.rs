@@ -14,8 +14,8 @@ pub(crate) struct OwnershipMask<'a> {
     pub cloud_owners: &'a [Vec<u16>],
     /// Index of this person.
     pub own: u16,
-    /// Whether no pixel and no point has another owner.
-    pub alone: bool,
+    /// Number of other persons who may own pixels and points.
+    pub others: usize,
     /// The static scene, learned where no person was.
     pub scene: &'a Backgrounds,
 }

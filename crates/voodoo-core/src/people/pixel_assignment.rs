@@ -50,8 +50,8 @@ impl PixelAssignment {
     /// Returns the ownership mask of a person for this frame.
     pub(super) fn ownership<'a>(&'a self, number: usize, scene: &'a Backgrounds) -> OwnershipMask<'a> {
         let own = number as u16;
-        let alone = self.assigned.iter().all(|assigned| *assigned == own);
-        OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own, alone, scene }
+        let others = self.assigned.iter().filter(|assigned| **assigned != own).count();
+        OwnershipMask { owners: &self.owners, cloud_owners: &self.cloud_owners, own, others, scene }
     }
 
     /// Returns the number of pixels and free points that a person explains.

@@ -6,7 +6,8 @@ use crate::math::{Pose, Vec3};
 
 /// Time for which a track is new, seconds.
 pub(super) const NEW_TRACK_AGE: f64 = 1.0;
-/// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two.
+/// Interval between detections of a new, lost or uncertain track, seconds: a detection takes as long as a frame or two. Several
+/// persons share those of uncertain tracks.
 const EVERY: f64 = 0.12;
 /// A detection is elsewhere when its trunk or legs have at least this mean distance from the tracked ones, meters. Other
 /// skeletons have hips and ankles 10 cm from those that a detector reports. It is also the largest distance of detected ankles
@@ -121,14 +122,15 @@ impl DetectionCheck {
         self.confirmed = true;
     }
 
-    /// Counts a frame and returns whether the detector is due.
-    pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons) -> bool {
+    /// Counts a frame and returns whether the detector is due for a person beside so many others.
+    pub(super) fn is_due(&mut self, stamp: f64, reasons: Reasons, others: usize) -> bool {
         let Reasons { uncertain, anywhere, unlike } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
-        let waited = |last: Option<f64>| last.is_none_or(|last| stamp - last >= EVERY);
-        let comparison_due = new_track && waited(self.last_comparison);
-        self.counts = comparison_due || (uncertain || anywhere) && waited(self.last_detection);
+        let waited = |last: Option<f64>, wait: f64| last.is_none_or(|last| stamp - last >= wait);
+        let shared = EVERY * (1.0 + others as f64);
+        let comparison_due = new_track && waited(self.last_comparison, EVERY);
+        self.counts = comparison_due || (uncertain || anywhere) && waited(self.last_detection, shared);
         self.compares = comparison_due || !new_track;
         if comparison_due {
             self.last_comparison = Some(stamp);
@@ -180,24 +182,26 @@ mod tests {
 
     #[test]
     fn new_lost_and_uncertain_tracks_are_checked_often_and_confident_ones_never() {
-        let count = |from: f64, reasons: Reasons| {
+        let count = |from: f64, reasons: Reasons, others: usize| {
             let mut check = DetectionCheck::default();
-            check.is_due(0.0, Reasons::default());
-            (1..=28).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons)).count()
+            check.is_due(0.0, Reasons::default(), others);
+            (1..=28).filter(|frame| check.is_due(from + f64::from(*frame) / 30.0, reasons, others)).count()
         };
         let none = Reasons::default();
         let [uncertain, anywhere] = [Reasons { uncertain: true, ..none }, Reasons { anywhere: true, ..none }];
-        assert_eq!([count(0.0, none), count(2.0, uncertain), count(2.0, anywhere), count(2.0, none)], [7, 7, 7, 0]);
+        let counts = [count(0.0, none, 0), count(2.0, uncertain, 0), count(2.0, anywhere, 0), count(2.0, none, 0)];
+        assert_eq!(counts, [7, 7, 7, 0]);
+        assert_eq!([count(0.0, none, 3), count(2.0, uncertain, 1), count(2.0, uncertain, 3)], [7, 4, 2]);
     }
 
     #[test]
     fn an_unlike_person_is_detected_in_every_frame_and_few_of_these_count_against_the_person() {
         let reasons = Reasons { uncertain: true, unlike: true, ..Reasons::default() };
         let mut check = DetectionCheck::default();
-        check.is_due(0.0, Reasons::default());
+        check.is_due(0.0, Reasons::default(), 0);
         let mut counted = 0;
         for frame in 1..=27 {
-            assert!(check.is_due(2.0 + f64::from(frame) / 30.0, reasons));
+            assert!(check.is_due(2.0 + f64::from(frame) / 30.0, reasons, 0));
             counted += usize::from(check.counts);
         }
         assert_eq!(counted, 7);

@@ -158,7 +158,7 @@ impl Relocalizer {
     ) {
         // A body that was just found may face the other way, so it is monitored closely.
         let often = Reasons { anywhere: reasons.anywhere || self.loss.recently_recovered(), ..reasons };
-        if self.check.is_due(frame.stamp, often) && self.people.detects() {
+        if self.check.is_due(frame.stamp, often, ownership.others) && self.people.detects() {
             let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
             self.people.detect(body, frame, ownership, query);
         } else {

@@ -244,12 +244,12 @@ impl BodyTracker {
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
-        // Beside other persons, what the body does not explain may be theirs.
-        let suspect = ownership.alone && (hypotheses.has_excess() || assessor.has_suspect_limb());
+        let suspect = hypotheses.has_excess() || assessor.has_suspect_limb();
         let reasons = Reasons {
             uncertain: suspect || assessor.is_uncertain(&model.extremities) || sizes.is_uncertain(),
             anywhere: interrupted,
-            unlike: ownership.alone && hypotheses.unlike(),
+            // Beside other persons, what the body does not explain may be theirs.
+            unlike: ownership.others == 0 && hypotheses.unlike(),
         };
         // A lost body is searched for with everybody's detections, see `crate::People`.
         if assessor.status() == Status::Lost {

@@ -50,7 +50,7 @@ RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE = "geometry_msgs/msg/PointStamped"
 _ON_DEMAND = {"markers": "visualization_msgs/msg/MarkerArray", "skeleton2d": SKELETON}
 _LOOK_S = 0.5
-"""How often the ids are published without a change, and sizes, subscribers of markers and what is asked for looked at."""
+"""How often sizes, subscribers of markers, and what is asked for are looked at."""
 _OTHER_SIZE = 0.01
 """A body whose limbs' lengths changed by this fraction together is described again."""
 
@@ -60,7 +60,7 @@ class Ros2Sink(Output):
     `/human_description_<id>` (URDF), `/humans/bodies/tracked`, `/humans/persons/tracked` (hri_msgs/IdsList), and of each person
     `body_id` and `anonymous`.
 
-    Ids are published when they change, and twice a second. Markers and 2-D skeletons are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or
+    Markers and 2-D skeletons are made while somebody subscribes to them. Stamps are those of the data. Persons that are lost or
     searched for are not listed as tracked and have no transforms. A message on RESET (std_msgs/Empty) lets everybody be searched
     for again; one on FOLLOW (geometry_msgs/PointStamped) lets only the person at that place be followed.
 
@@ -128,10 +128,9 @@ class Ros2Sink(Output):
         for publication, message in zip(publications, messages, strict=True):
             publication.write(message)
         displayed = self._displayed | observed  # markers of persons who left are deleted once
-        if observed.keys() != self._displayed.keys() or abs(step.stamp - self._looked) > _LOOK_S:
+        if displayed.keys() != self._wanted.keys() or abs(step.stamp - self._looked) > _LOOK_S:
             self._looked = step.stamp
             self._obey()
-            self._write(tracked(step.stamp, tuple(map(person_id, observed)), root_frame=root))
             self._describe(observed)
             self._wanted = {number: self._subscribers(number) for number in displayed}
         image = next((item for item in step.frame.measurements if isinstance(item, (DepthImage, ColorImage))), None)
@@ -175,7 +174,7 @@ class Ros2Sink(Output):
     ) -> tuple[list[Publication], _core.Template]:
         """Topics, and the messages on them, of persons of whom some have a covariance."""
         topics = [("/tf", TF)] * bool(ids) + [(f"{BODIES}/{person}/joint_states", JOINTS) for person in ids]
-        topics += [(f"{BODIES}/{person}/pose", POSE) for person in sure]
+        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), *((topic, IDS) for topic in TRACKED)]
         placed = [(root, frame)] * (frame != root) if ids else []
         placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
 
@@ -186,7 +185,7 @@ class Ros2Sink(Output):
             for person in ids:
                 messages.append(joint_message(STAMP_NS, person, joints, list(islice(left, len(joints)))))
             messages += [pose_message(STAMP_NS, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
-            return [cdr(one) for one in messages]
+            return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
 
         count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
         return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
