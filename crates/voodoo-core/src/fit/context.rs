@@ -77,3 +77,30 @@ pub(crate) struct Matched<'a> {
     /// The poses, working frame.
     pub poses: &'a [Pose],
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Pose;
+    use crate::observation::depth_view::DepthViews;
+    use crate::observation::frame::Frame;
+    use crate::observation::picture::{ColorImage, ColorPixels};
+    use crate::testing::{before_wall, pinhole, standing, with_context, without_background};
+
+    #[test]
+    fn colors_compare_poses_where_depth_has_no_return() {
+        let (model, poses) = standing();
+        let (config, camera) = (without_background(), pinhole(4, 3, [4.0, 4.0, 1.5, 1.0]));
+        let (pixels, world_from_sensor) = (ColorPixels::Gray(&[90; 12]), Pose::IDENTITY);
+        let colors = [ColorImage { pixels, camera, world_from_sensor, stamp: 0.0, number: 0, source: 0 }];
+        let seen = before_wall(&model.body, &poses);
+        for (depth, expected) in [(vec![0; seen.len()], true), (seen, false)] {
+            with_context(&depth, &config, &model, &poses, |context| {
+                let frame = Frame { colors: &colors, ..*context.observation.frame() };
+                let views = DepthViews { frame: &frame, ..context.observation.views };
+                let with_colors = Context { observation: Observation { views, ..context.observation }, ..context };
+                assert_eq!([context.compares_colors(), with_colors.compares_colors()], [false, expected]);
+            });
+        }
+    }
+}
