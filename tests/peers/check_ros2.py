@@ -70,7 +70,7 @@ def test_depth_arrives_and_skeletons_come_back(images, tmp_path, quality):
     stamps = [stamp for stamp, _ in theirs["states"]]
     assert len(theirs["sent"]) == COUNT
     assert report["received"] == COUNT, message
-    assert report["published"] + report["dropped"] == COUNT
+    assert report["published"] + report["dropped"] == COUNT, report
     assert report["dropped"] <= COUNT // BUSY
     assert len(stamps) == len(theirs["markers"]) == report["with_pose"] >= COUNT - COUNT // BUSY
     assert set(stamps) <= set(theirs["sent"]), "the stamps of the data"
@@ -93,7 +93,7 @@ def test_what_a_bad_network_loses_is_not_made_up(images, tmp_path):
     kept = [stamp for number, stamp in enumerate(theirs["sent"], 1) if number % 5]
     assert report["received"] == len(kept)
     assert {stamp for stamp, _ in theirs["states"]} <= set(kept)
-    assert report["published"] + report["dropped"] == len(kept)
+    assert report["published"] + report["dropped"] == len(kept), report
     assert len(theirs["states"]) == report["with_pose"] >= len(kept) - COUNT // BUSY
 
 
