@@ -64,9 +64,9 @@ impl ColorGirths {
         self.limbs.clear();
     }
 
-    /// Fits the limbs' surfaces to color edges where the frame has colors but no depth points.
+    /// Fits the limbs' surfaces to color edges where colors compare poses.
     pub(super) fn start(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
-        if !setting.observation.candidates.is_empty() || setting.observation.frame().colors.is_empty() {
+        if !setting.with_model(model).compares_colors() {
             return;
         }
         (self.limbs, self.frames) = (vec![Girth::default(); poses.len()], 0);
