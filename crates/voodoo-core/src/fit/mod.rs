@@ -307,8 +307,8 @@ fn problem<'a>(
     step: usize,
 ) -> Problem<'a> {
     let Context { config, model, observation, time_scale, .. } = context;
-    let floor = observation.floor();
-    Problem { body: &model.body, correspondences, predicted, floor, step, time_scale, config }
+    let (floor, by_colors) = (observation.floor(), context.compares_colors());
+    Problem { body: &model.body, correspondences, predicted, floor, step, time_scale, by_colors, config }
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ const HIDDEN_MOTION: f64 = 0.1;
 /// Fraction by which a fully occluded hand, foot or head is pulled towards its rest posture per 1/30 s; otherwise it would keep
 /// its last observed posture forever. It covers half of the way in a quarter of a second.
 const TO_REST: f64 = 0.1;
-/// Minimum expected motion of a joint when only contours are measured, radians: no points hold a wrong shoulder there.
+/// Minimum expected motion of a joint where colors compare poses, radians: no points hold a wrong shoulder there.
 const LEAST_MOTION: f64 = 0.1;
 /// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
 /// length.
@@ -71,7 +71,7 @@ struct Stillness {
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses, true);
-        let follows = problem.step + 1 < problem.config.max_steps && !contours_alone(problem);
+        let follows = problem.step + 1 < problem.config.max_steps && !problem.by_colors;
         let stride = if follows { OVER_RELAXATION } else { 1.0 };
         match &mut self.tree {
             Some(tree) => tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
@@ -136,7 +136,7 @@ impl WholeBody {
             biased.then_some(&detected),
             Some(&prior),
             config.limits.then_some(&limits),
-            contours_alone(problem).then_some(&posture),
+            problem.by_colors.then_some(&posture),
             config.penetration.then_some(&penetration),
             floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
         ];
@@ -164,16 +164,15 @@ impl WholeBody {
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
-        let contours_alone = contours_alone(problem);
         self.joint_sigmas.clear();
         self.rests.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
-            let motion = if contours_alone { motion.max(LEAST_MOTION) } else { motion };
+            let motion = if problem.by_colors { motion.max(LEAST_MOTION) } else { motion };
             // A limb that is hardly visible stays near its prediction: a few stray points must not move it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let measured_fraction = (measured / FREE_WEIGHT).min(1.0);
-            let end = part.match_caps[1] && !contours_alone;
+            let end = part.match_caps[1] && !problem.by_colors;
             let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
             self.rests.push(if rests {
                 ((1.0 - measured_fraction) * TO_REST * problem.time_scale).min(1.0)
@@ -199,12 +198,6 @@ impl Stillness {
         refill(holds, joints.iter().map(|stillness| gain * stillness));
         holds
     }
-}
-
-/// Whether color edges are matched and no points.
-fn contours_alone(problem: &Problem) -> bool {
-    let Problem { correspondences, .. } = problem;
-    !correspondences.regions.is_empty() && correspondences.limbs.iter().all(|matches| matches.candidate.is_empty())
 }
 
 /// Gain of the prior for small deviations from the prediction, in this step.
