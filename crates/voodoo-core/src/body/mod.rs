@@ -2,6 +2,7 @@
 
 mod edit;
 mod fit;
+mod growth;
 mod human;
 mod joint;
 pub(crate) mod kinematics;
