@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import voodoo
 from core_fakes import T_POSE, FakeRecording, install
 from voodoo import cli
 from voodoo.cli import running
 from voodoo.cli.common import NO_POSE
 from voodoo.drawing.ink import LEFT, RIGHT
-from voodoo.errors import RecordingError
+from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation import evaluate as evaluate_module
 from voodoo.export.track import Track
 from voodoo.pipeline.front_end import FrontEnd
@@ -253,6 +254,7 @@ def test_usage_errors_end_with_2(run):
     result = run("track", "x", "--height", "1.7", "--body", "b.toml")
     assert result.exit_code == 2
     assert "not both" in result.stderr
+    assert "not both" in run("track", "x", "--height", "1.1", "--age", "6").stderr
 
 
 @pytest.mark.parametrize(
@@ -415,6 +417,17 @@ def test_height_option_wins_over_the_start(run):
     assert start_tracker(recording).initial.height == 1.76
     assert start_tracker(recording, height=1.6).initial.height == 1.6
     assert start_tracker(recording, init=Init(height_m=1.5, joints=dict(T_POSE))).initial.height == 1.5
+
+
+def test_an_age_stands_for_a_stature(run):
+    recording = FakeRecording(frames=1)
+    ages = {2: 0.87, 6: 1.15, 10: 1.385, 40: 1.70}  # medians of the World Health Organization
+    assert {age: round(start_tracker(recording, age=age).initial.height, 3) for age in ages} == ages
+    for given in ({"height": 1.1}, {"body": voodoo.Body.human()}):
+        with pytest.raises(VoodooError, match=f"at most one of them, found {next(iter(given))} and age"):
+            start_tracker(recording, age=6, **given)
+    with pytest.raises(VoodooError, match="age: expected years"):
+        start_tracker(recording, age="six")
 
 
 def test_nothing_usable_is_no_pose(run):

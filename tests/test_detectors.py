@@ -15,6 +15,7 @@ from commands import run as command
 from test_people import WORLD_FROM_SENSOR, frame
 from voodoo.detectors import JOINTS, LENGTHS, CallableDetector, DetectedPerson, DetectorImage, OnnxDetector
 from voodoo.errors import ConfigError, MeasurementError
+from voodoo.pipeline.start import stature
 from voodoo.recordings import sample_path
 from voodoo.synthetic.render import render_depth
 
@@ -99,6 +100,19 @@ def test_the_shipped_network_may_be_wrapped_and_named(someone):
     tracker, found = run(CallableDetector(detect, joints=JOINTS, lengths=LENGTHS), someone)
     assert tracker.detector_failures == 0 and found[-1].status in ("tracking", "degraded")
     assert [bits(each) for each in run("shipped", someone)[1]] == [bits(each) for each in run(shipped, someone)[1]]
+
+
+def test_lengths_follow_a_stature_that_is_known(someone):
+    def known(height):
+        return voodoo.Detector(stature=height)
+
+    statures = [known(height).detect(frame(0.0, someone))[0].stature for height in (1.5, 1.9)]
+    assert np.allclose(statures, (1.5, 1.9), rtol=0.05)
+    ends = [run(known(height), someone)[0].body for height in (1.6, 1.8)]
+    assert 1.05 < stature(ends[1]) / stature(ends[0]) < 1.14
+    for wrong in ({"stature": 17.0}, {"stature": float("nan")}, {"stature": 1.7, "stature_sigma": 0.0}):
+        with pytest.raises(ConfigError, match=r"stature: expected meters from 0\.3 to 3\.0"):
+            voodoo.Detector(**wrong)
 
 
 def test_without_a_detector_nobody_is_searched_for(someone):

@@ -312,7 +312,7 @@ USED = {
     "markers, `--marker-map`": (),
     "any other registered adapter": (),
     "an adapter with `while_searching`": (),
-    "`--exclude`, `--depth-range`, `--height`, `--upright`": (
+    "`--exclude`, `--depth-range`, `--height`, `--age`, `--upright`": (
         *("--exclude", "8,8,8,9,9,9", "--depth-range", "0.5,7", "--height", "1.7", "--upright"),
     ),
 }

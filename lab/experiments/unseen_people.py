@@ -82,7 +82,7 @@ class Result:
     about: dict[str, object] = field(default_factory=dict)
 
 
-def run(path: Path, init: str) -> Result:
+def run(path: Path, init: str, height: bool = False) -> Result:
     """Track one recording."""
     recording = voodoo.open_recording(path)
     reference = recording.reference
@@ -91,7 +91,12 @@ def run(path: Path, init: str) -> Result:
     column = [reference.names.index(name) for name in metrics.JOINTS]
     file = path / "meta.json"
     about = json.loads(file.read_text()) if file.is_file() else {}
-    tracker = start_tracker(recording, init="auto" if init == "auto" else None, use=("depth",))
+    tracker = start_tracker(
+        recording,
+        init="auto" if init == "auto" else None,
+        height=float(about["stature_m"]) if height else None,
+        use=("depth",),
+    )
     stamps, places, sizes, posed = [], [], [], []
     for frame in track(recording, tracker, settings=FrontEndSettings.of(recording, use=("depth",))):
         estimate = frame.estimate
@@ -223,14 +228,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recordings", nargs="+", type=Path, help="recordings, or folders of them")
     parser.add_argument("--init", choices=("auto", "given"), default="auto")
+    parser.add_argument(
+        "--height", action="store_true", help="give the stature that meta.json says, as `--height` does"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="processes (default 2)")
     options = parser.parse_args()
     paths = find_recordings(options.recordings)
     if options.jobs == 1:
-        results = [run(path, options.init) for path in paths]
+        results = [run(path, options.init, options.height) for path in paths]
     else:
         with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-            results = list(pool.map(run, paths, [options.init] * len(paths)))
+            results = list(pool.map(run, paths, *([value] * len(paths) for value in (options.init, options.height))))
     heads = "start: frame | error, cm | mean, cm | exchanged: first, later | lost at the end | class | lengths, cm | girths, cm"
     print(f"| recording | {heads} |")
     print("|---|---|---|---|---|---|---|---|---|")

@@ -6,6 +6,7 @@ import argparse
 import multiprocessing
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -31,7 +32,9 @@ def save(path: Path, batch: list[Sample]) -> None:
     part.rename(path)
 
 
-def make(out: Path, data: Path, *, seed: int, worker: int, count: int, held_out: bool, others: float) -> None:
+def make(
+    out: Path, data: Path, *, seed: int, worker: int, count: int, held_out: bool, others: float, groups: Sequence[str]
+) -> None:
     """One process' share: files `NAME_worker_number.npz` with `count` pictures in all."""
     os.nice(5)
     scenes = Scenes(Bodies(data / "bodies", held_out=held_out), load(data / "mocap", held_out))
@@ -43,7 +46,7 @@ def make(out: Path, data: Path, *, seed: int, worker: int, count: int, held_out:
         size = min(SHARD, count - made)
         start = time.monotonic()
         while len(batch) < size and not path.exists():
-            group = GROUPS[int(rng.integers(1, len(GROUPS)))] if others and rng.random() < others else GROUPS[0]
+            group = groups[int(rng.integers(len(groups)))] if others and rng.random() < others else GROUPS[0]
             batch += samples(scenes.frame(rng, group), rng)
         if batch:
             save(path, batch[:size])
@@ -62,12 +65,14 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--held-out", action="store_true", help="bodies and motions that training does not see")
     parser.add_argument("--others", type=float, default=0.5, help="share of scenes of other groups than `adult`")
+    parser.add_argument("--group", nargs="+", choices=GROUPS[1:], default=GROUPS[1:], help="which groups those are of")
     a = parser.parse_args()
     a.out.mkdir(parents=True, exist_ok=True)
     fraction = -(-a.count // a.processes)
     workers = []
     for i in range(a.processes):
         options = {"seed": a.seed, "worker": i, "count": fraction, "held_out": a.held_out, "others": a.others}
+        options["groups"] = a.group
         workers.append(multiprocessing.get_context("spawn").Process(target=make, args=(a.out, a.data), kwargs=options))
         workers[-1].start()
     for w in workers:

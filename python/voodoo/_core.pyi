@@ -672,6 +672,7 @@ def person_candidates(
     up: Sequence[float] | None = None,
     floor: tuple[Sequence[float], float] | None = None,
     most: int = 8,
+    enlarged: float = 1.0,
 ) -> list[PersonCandidate]:
     """Person candidates in a depth image (H, W) [m]; training uses this function to crop its images.
 
@@ -681,6 +682,7 @@ def person_candidates(
         up: unit vector upwards in the camera's optical frame; None means upwards in the image.
         floor: unit normal and offset of the ground plane in that frame, normal . p = offset; None means that it is detected.
         most: greatest number returned; candidates of a standing person's size come first.
+        enlarged: factor by which crops are enlarged, their depth included; for small persons.
 
     Raises:
         MeasurementError: an array of another type or shape.
@@ -692,12 +694,21 @@ class Detector:
 
     Args:
         weights: path of another network's weights, as training/ exports them; None means those that ship with the library.
+        stature: stature of the people [m], if it is known: lengths are scaled to it.
+        stature_sigma: relative standard deviation of `stature`.
 
     Raises:
         MeasurementError: a file that holds no such weights.
+        ConfigError: a stature that is no person's.
     """
 
-    def __new__(cls, *, weights: str | os.PathLike[str] | None = None) -> Detector: ...
+    def __new__(
+        cls,
+        *,
+        weights: str | os.PathLike[str] | None = None,
+        stature: float | None = None,
+        stature_sigma: float = 0.02,
+    ) -> Detector: ...
     def detect(self, frame: Frame, *, up: Sequence[float] | npt.NDArray[np.float64] | None = None) -> list[Detection]:
         """Returns the people in the depth images of a frame, in order of decreasing confidence.
 

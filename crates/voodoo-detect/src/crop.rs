@@ -6,9 +6,9 @@ use voodoo_core::math::Vec3;
 
 /// Pixels along an edge.
 pub const SIZE: usize = 96;
-/// Its width at the depth of the candidate's center, meters.
+/// Its width at the depth of the candidate's center, meters, where it is not enlarged.
 pub const WIDTH: f64 = 2.6;
-/// Range of depth in front of and behind the center that is resolved, meters.
+/// Range of depth in front of and behind the center that is resolved there, meters.
 pub const DEPTH: f64 = 1.2;
 /// Below this sine of the angle between up and the optical axis, up is not defined in the image.
 const LEAST_UP: f64 = 0.3;
@@ -22,6 +22,8 @@ pub struct Crop {
     pub middle: [f64; 3],
     /// Angle by which the camera is rotated about its optical axis so that up is up, radians.
     pub roll: f64,
+    /// Factor by which it is enlarged: a person of 1 m looks like one of `enlarged` meters.
+    pub enlarged: f64,
 }
 
 impl Crop {
@@ -31,6 +33,7 @@ impl Crop {
         parts: &Components,
         candidate: &PersonCandidate,
         up: Vec3,
+        enlarged: f64,
     ) -> Option<Self> {
         // Up in the world is up in the image, unless the camera looks along the vertical.
         let roll = if up.x.hypot(up.y) < LEAST_UP { 0.0 } else { (-up.x).atan2(-up.y) };
@@ -46,7 +49,8 @@ impl Crop {
         }
         let middle = [median(&mut xs)?, median(&mut ys)?, median(&mut zs)?];
         let z0 = middle[2];
-        let (pixel, half) = ((WIDTH / SIZE as f64) as f32, 0.5 * (SIZE as f32 - 1.0));
+        let (pixel, half) = ((WIDTH / enlarged / SIZE as f64) as f32, 0.5 * (SIZE as f32 - 1.0));
+        let range = (DEPTH / enlarged) as f32;
         let mut pixels = Vec::with_capacity(SIZE * SIZE);
         for row in 0..SIZE {
             for column in 0..SIZE {
@@ -54,16 +58,17 @@ impl Crop {
                 let y = middle[1] + (row as f32 - half) * pixel / z0;
                 let member_index = view.pixel_at([cos * x + sin * y, cos * y - sin * x]).filter(|index| member(*index));
                 pixels.push(member_index.map_or([1.0, 0.0], |index| {
-                    let behind = (view.depth[index] - z0) / DEPTH as f32;
+                    let behind = (view.depth[index] - z0) / range;
                     [behind.clamp(-1.0, 1.0), 1.0]
                 }));
             }
         }
-        Some(Self { pixels, middle: middle.map(f64::from), roll })
+        Some(Self { pixels, middle: middle.map(f64::from), roll, enlarged })
     }
 
-    /// Converts a position relative to the center (meters right, down and behind) to a point in the camera frame.
+    /// Converts a position relative to the center (meters right, down and behind, enlarged) to a point in the camera frame.
     pub fn to_camera(&self, place: Vec3) -> Vec3 {
+        let place = place / self.enlarged;
         let [x0, y0, z0] = self.middle;
         let z = z0 + place.z;
         let turned = Vec3::new(z * (x0 + place.x / z0), z * (y0 + place.y / z0), z);
@@ -91,13 +96,13 @@ mod tests {
     fn places_of_the_picture_are_where_the_camera_saw_them() {
         let (body, poses) = standing();
         let pixels = before_wall(&body, &poses);
-        for roll in [0.0, 0.6] {
+        for (roll, enlarged) in [(0.0, 1.0), (0.6, 1.0), (0.6, 1.4)] {
             let world_from_sensor = Pose::from_parts(Vec3::ZERO, Quat::from_axis_angle(Vec3::Z, roll));
             let image = DepthImage { world_from_sensor, ..image(&pixels) };
             let mut segmentation = Segmentation::default();
             let around = Surroundings { up: Some(-Vec3::Y), ..Surroundings::default() };
             let candidate = segmentation.find(&image, &around)[0].clone();
-            let crop = segmentation.crop(&candidate).unwrap();
+            let crop = segmentation.crop(&candidate, enlarged).unwrap();
             assert!((crop.roll - roll).abs() < 1e-9, "{}", crop.roll);
             // Every pixel on the person, transformed back to the camera frame, coincides with a measured point.
             let mut mask = Vec::new();
@@ -113,7 +118,7 @@ mod tests {
                 assert!(nearest < 0.02 && *mask == 1.0, "{nearest}");
                 inside += 1;
             }
-            assert!(inside > 300, "{inside}");
+            assert!(inside as f64 > 300.0 * enlarged * enlarged, "{inside}");
         }
     }
 }

@@ -49,9 +49,9 @@ impl Segmentation {
         self.floor
     }
 
-    /// The network's input for a candidate of the last image.
-    pub fn crop(&self, candidate: &PersonCandidate) -> Option<Crop> {
-        Crop::from_candidate(&self.view, &self.parts, candidate, self.up)
+    /// The network's input for a candidate of the last image, `enlarged` by this factor.
+    pub fn crop(&self, candidate: &PersonCandidate, enlarged: f64) -> Option<Crop> {
+        Crop::from_candidate(&self.view, &self.parts, candidate, self.up, enlarged)
     }
 
     /// Writes the full-image indices of all pixels of a candidate, including those skipped by the subsampling.

@@ -11,6 +11,7 @@ mod scene;
 
 mod detector_check;
 mod people;
+mod small;
 mod tracking;
 
 use voodoo_core::{Body, Config, TrackError, Tracker};

@@ -19,7 +19,7 @@ use voodoo_detect::{Detector, JOINTS, LENGTHS};
 use crate::arrays::{Row, contiguous, vector};
 use crate::borrowed::depth_images;
 use crate::camera::camera_of;
-use crate::errors::{MeasurementError, Raise, wrong_argument};
+use crate::errors::{ConfigError, MeasurementError, Raise, wrong_argument};
 use crate::frame::PyFrame;
 
 #[doc = stub!("Detector")]
@@ -29,13 +29,16 @@ pub struct PyDetector(pub Detector);
 #[pymethods]
 impl PyDetector {
     #[new]
-    #[pyo3(signature = (*, weights=None))]
-    fn new(weights: Option<PathBuf>) -> PyResult<Self> {
-        let Some(path) = weights else { return Ok(Self(Detector::new())) };
-        let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
-        let bytes =
-            std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
-        Detector::with_weights(&bytes).map(Self).map_err(|error| refused(error.to_string()))
+    #[pyo3(signature = (*, weights=None, stature=None, stature_sigma=0.02))]
+    fn new(weights: Option<PathBuf>, stature: Option<f64>, stature_sigma: f64) -> PyResult<Self> {
+        let detector = weights.map_or_else(|| Ok(Detector::new()), Self::with_weights)?;
+        let Some(stature) = stature else { return Ok(Self(detector)) };
+        if !((0.3..=3.0).contains(&stature) && stature_sigma > 0.0 && stature_sigma.is_finite()) {
+            let expected = "meters from 0.3 to 3.0, and a relative standard deviation above 0";
+            let text = format!("stature: expected {expected}, found {stature} and {stature_sigma}");
+            return Err(ConfigError::new_err(text));
+        }
+        Ok(Self(detector.with_stature(stature, stature_sigma)))
     }
 
     #[doc = stub!("Detector.detect")]
@@ -71,6 +74,15 @@ impl PyDetector {
 
     fn __repr__(&self) -> String {
         format!("Detector(joints={})", JOINTS.len())
+    }
+}
+
+impl PyDetector {
+    fn with_weights(path: PathBuf) -> PyResult<Detector> {
+        let refused = |found: String| MeasurementError::new_err(format!("{}: {found}", path.display()));
+        let bytes =
+            std::fs::read(&path).map_err(|error| refused(format!("expected a readable file, found {error}")))?;
+        Detector::with_weights(&bytes).map_err(|error| refused(error.to_string()))
     }
 }
 
@@ -162,7 +174,7 @@ pub(crate) struct PyCandidate {
 
 #[doc = stub!("person_candidates")]
 #[pyfunction]
-#[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8))]
+#[pyo3(signature = (depth, *, camera, up=None, floor=None, most=8, enlarged=1.0))]
 pub(crate) fn person_candidates<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
@@ -170,6 +182,7 @@ pub(crate) fn person_candidates<'py>(
     up: Option<[f64; 3]>,
     floor: Option<([f64; 3], f64)>,
     most: usize,
+    enlarged: f64,
 ) -> PyResult<Vec<PyCandidate>> {
     let wrong = || wrong_argument("depth", "an array of shape (height, width) and dtype float32", depth);
     let array = contiguous(depth).map_err(|_| wrong())?.cast_into::<PyArray2<f32>>().map_err(|_| wrong())?;
@@ -195,7 +208,7 @@ pub(crate) fn person_candidates<'py>(
     segmentation.find(&image, &around);
     let (mut found, mut pixels) = (Vec::new(), Vec::new());
     for candidate in segmentation.candidates().iter().take(most) {
-        let Some(crop) = segmentation.crop(candidate) else { continue };
+        let Some(crop) = segmentation.crop(candidate, enlarged) else { continue };
         segmentation.mask(candidate, &mut pixels);
         let channels: Vec<f32> = (0..2).flat_map(|c| crop.pixels.iter().map(move |pixel| pixel[c])).collect();
         found.push(PyCandidate {

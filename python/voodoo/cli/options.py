@@ -31,7 +31,11 @@ ConfigOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Settings as TOML; `voodoo config` prints all of them.")
 ]
 HeightOption = Annotated[
-    float | None, typer.Option(metavar="M", min=0.3, max=3.0, help="Stature of the default human in meters.")
+    float | None, typer.Option(metavar="M", min=0.3, max=3.0, help="Stature of the person in meters.")
+]
+AgeOption = Annotated[
+    float | None,
+    typer.Option(metavar="YEARS", min=1.0, max=120.0, help="Age of the person, where the stature is not known."),
 ]
 InitOption = Annotated[
     str | None,
@@ -213,20 +217,22 @@ class Human:
         Path | None, typer.Option(metavar="FILE", help="Body to track, as TOML; `voodoo body` prints the human.")
     ] = None
     height: HeightOption = None
+    age: AgeOption = None
     model: ModelOption = None
 
     def start(self) -> dict[str, Any]:
         """Options of `start_tracker`.
 
         Raises:
-            typer.BadParameter: a body and the size or model of a human.
+            typer.BadParameter: a body and the size, age or model of a human; or both size and age.
             VoodooError: a file that is wrong.
         """
         from voodoo.model.body import Body
 
-        refuse_both("--body", self.body, **{"--height": self.height, "--model": self.model})
+        refuse_both("--body", self.body, **{"--height": self.height, "--age": self.age, "--model": self.model})
+        refuse_both("--height", self.height, **{"--age": self.age})
         body = None if self.body is None else Body.load(self.body)
-        return {"body": body, "height": self.height, "model": self.model}
+        return {"body": body, "height": self.height, "age": self.age, "model": self.model}
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, get_args
 
+import numpy as np
 from pydantic import ConfigDict, Field, FiniteFloat
 
 from voodoo._core import Estimate
@@ -17,7 +18,7 @@ from voodoo.export.skeleton import bones
 from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.model.body import Body
-from voodoo.model.joint import short, valid
+from voodoo.model.joint import number_of, short, valid
 from voodoo.names import Automatic, HumanModel
 from voodoo.people import People
 from voodoo.pipeline.starts import Starts
@@ -33,6 +34,11 @@ from voodoo.tracker import Tracker
 
 _DEFAULT_M = 1.75
 """Stature of `Body.human()`."""
+_AGES = (1.0, 2.0, 4.0, 8.0, 12.0, 15.0, 18.0)
+_STATURES_M = (0.75, 0.87, 1.03, 1.27, 1.50, 1.65, 1.70)
+"""Median stature at these ages in years, mean of girls and boys (WHO Child Growth Standards, 2006; growth reference, 2007)."""
+_HEIGHT_SIGMA, _AGE_SIGMA = 0.02, 0.05
+"""Relative standard deviations of a stature that is given, with shoes and hair, and of the statures of one age."""
 
 
 class Init(FirstPose):
@@ -117,6 +123,7 @@ def start_tracker(
     init: Beginning | None = None,
     body: Body | None = None,
     height: float | None = None,
+    age: float | None = None,
     model: HumanModel | None = None,
     config: Config | None = None,
     markers: MarkerMap | None = None,
@@ -130,7 +137,8 @@ def start_tracker(
         init: first pose, and stature unless `height` is given. A pose for a given time, an earlier result and "auto" leave the
             tracker without a pose; then pass `starts_of(init)` to `track`.
         body: body to track; None means the default human, or two legs if a laser is the only input to start from.
-        height: stature of the default body [m]; not together with `body`.
+        height: stature of the default body [m], and of a detected person; not together with `body`.
+        age: of the person in years, for the stature; not together with `body` or `height`.
         model: which human, see `Body.human`.
         config: None means the defaults.
         markers: markers worn on limbs, which become sites of the body.
@@ -138,10 +146,12 @@ def start_tracker(
         detector: see `Tracker`.
 
     Raises:
-        VoodooError: the first pose does not determine the pose of this body, both body and height are given, a marker stands
-            for a site that the body does not have, or there is neither a pose nor an input in which this body could be found.
+        VoodooError: the first pose does not determine the pose of this body, two of body, height and age are given, a marker
+            stands for a site that the body does not have, or there is neither a pose nor an input in which this body could be
+            found.
     """
     init = init or Init.of(recording) or AUTO
+    height, detector = _known_stature(body, height=height, age=age, detector=detector)
     if height is None and body is None and isinstance(init, Init):
         height = init.height_m
     # Without another input to start from: no person can be found in images of skin and color.
@@ -163,6 +173,8 @@ def start_people(
     use: Sequence[str] | None = None,
     config: Config | None = None,
     detector: AnyDetector = "shipped",
+    height: float | None = None,
+    age: float | None = None,
     **body: Any,  # noqa: ANN401 - of start_tracker
 ) -> People:
     """A tracker of the persons in a recording, who are found as they come.
@@ -170,14 +182,32 @@ def start_people(
     Args:
         limit: largest number of persons, see `People`.
         use, config, detector: see `start_tracker`.
-        **body: body, height, model, markers: see `start_tracker`.
+        height, age: of every person, see `start_tracker`.
+        **body: body, model, markers: see `start_tracker`.
 
     Raises:
         VoodooError: see `start_tracker`.
     """
-    people = People(_body(**body), config=config, detector=detector, limit=limit)
+    height, detector = _known_stature(body.get("body"), height=height, age=age, detector=detector)
+    people = People(_body(**body, height=height), config=config, detector=detector, limit=limit)
     check_findable(recording, people, use)
     return people
+
+
+def _known_stature(
+    body: Body | None, *, height: float | None, age: float | None, detector: AnyDetector
+) -> tuple[float | None, AnyDetector]:
+    """The stature that a height or an age gives, and the shipped detector for persons of that stature."""
+    given = [name for name, value in (("body", body), ("height", height), ("age", age)) if value is not None]
+    if len(given) > 1:
+        raise VoodooError(f"body, height and age: expected at most one of them, found {' and '.join(given)}")
+    if age is not None:
+        height = float(np.interp(number_of("age", age, "years"), _AGES, _STATURES_M))
+    if height is not None and detector == "shipped":
+        from voodoo._core import Detector
+
+        detector = Detector(stature=height, stature_sigma=_HEIGHT_SIGMA if age is None else _AGE_SIGMA)
+    return height, detector
 
 
 def _body(
@@ -189,8 +219,6 @@ def _body(
     legs: bool = False,
 ) -> Body:
     """The body to track; by default a human, or two legs."""
-    if body is not None and height is not None:
-        raise VoodooError("body and height: expected at most one of them, found both")
     if body is None:
         known = {} if height is None else {"height": height}
         body = legs_body(**known) if legs and model is None else Body.human(**known, model=model or "measured")
