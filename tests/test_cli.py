@@ -426,8 +426,13 @@ def test_an_age_stands_for_a_stature(run):
     for given in ({"height": 1.1}, {"body": voodoo.Body.human()}):
         with pytest.raises(VoodooError, match=f"at most one of them, found {next(iter(given))} and age"):
             start_tracker(recording, age=6, **given)
-    with pytest.raises(VoodooError, match="age: expected years"):
-        start_tracker(recording, age="six")
+    for wrong, message in (
+        ("six", "age: expected years"),
+        (0.5, "age: expected 1 to 120 years"),
+        (float("nan"), "age: "),
+    ):
+        with pytest.raises(VoodooError, match=message):
+            start_tracker(recording, age=wrong)
 
 
 def test_nothing_usable_is_no_pose(run):

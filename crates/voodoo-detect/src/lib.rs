@@ -265,7 +265,8 @@ fn stature_of_joints(detection: &Detection) -> Option<[f64; 2]> {
     let [head, left, right] = [joint(0)?, joint(15)?, joint(16)?].map(|joint| joint.position);
     let straight = head.distance(0.5 * (left + right)) / measured;
     let [stature, _] = detection.lengths.last()?;
-    Some([stature * measured / reported, (ALONG * variance).sqrt() / measured / straight.min(1.0).powi(BENT)])
+    let found = [stature * measured / reported, (ALONG * variance).sqrt() / measured / straight.min(1.0).powi(BENT)];
+    found.iter().all(|value| value.is_normal()).then_some(found)
 }
 
 /// Scales reported lengths, the last of which is the stature, to a stature that was measured otherwise, with its relative standard

@@ -37,6 +37,8 @@ _DEFAULT_M = 1.75
 _AGES = (1.0, 2.0, 4.0, 8.0, 12.0, 15.0, 18.0)
 _STATURES_M = (0.75, 0.87, 1.03, 1.27, 1.50, 1.65, 1.70)
 """Median stature at these ages in years, mean of girls and boys (WHO Child Growth Standards, 2006; growth reference, 2007)."""
+_OLDEST = 120
+"""Greatest age in years."""
 _HEIGHT_SIGMA, _AGE_SIGMA = 0.02, 0.05
 """Relative standard deviations of a stature that is given, with shoes and hair, and of the statures of one age."""
 
@@ -202,7 +204,9 @@ def _known_stature(
     if len(given) > 1:
         raise VoodooError(f"body, height and age: expected at most one of them, found {' and '.join(given)}")
     if age is not None:
-        height = float(np.interp(number_of("age", age, "years"), _AGES, _STATURES_M))
+        if not _AGES[0] <= number_of("age", age, "years") <= _OLDEST:
+            raise VoodooError(f"age: expected {_AGES[0]:g} to {_OLDEST} years, found {age}")
+        height = float(np.interp(age, _AGES, _STATURES_M))
     if height is not None and detector == "shipped":
         from voodoo._core import Detector
 
