@@ -51,15 +51,9 @@ const MAX_EVALUATIONS: usize = 12;
 /// At the scale of adults a child of 1 m has too few pixels.
 const ADULT: f64 = 1.7;
 const SMALL: f64 = 0.9;
-/// Bones from ankles to head: number of the length, the two joints, and how often the bone counts in the sum.
-const UPRIGHT: [([usize; 3], f64); 6] = [
-    ([2, 11, 13], 0.5),
-    ([2, 12, 14], 0.5),
-    ([3, 13, 15], 0.5),
-    ([3, 14, 16], 0.5),
-    ([6, 2, 1], 1.0),
-    ([7, 1, 0], 1.0),
-];
+/// Bones of the left leg and the trunk from ankle to head: number of the length, and of the two joints. Joints of the right leg
+/// follow those of the left.
+const UPRIGHT: [[usize; 3]; 4] = [[2, 11, 13], [3, 13, 15], [6, 2, 1], [7, 1, 0]];
 /// Fraction of the variance of joints that counts for the sum of these bones, because most errors are across them or common; and
 /// the power of the distance from ankles to head over this sum by which its standard deviation grows: the joints of a bent body
 /// cut its corners. Both were chosen on recordings that training does not see.
@@ -256,11 +250,15 @@ fn enlargement(stature: Option<f64>) -> f64 {
 fn stature_of_joints(detection: &Detection) -> Option<[f64; 2]> {
     let [mut measured, mut reported, mut variance] = [0.0; 3];
     let joint = |number: usize| detection.joints.get(number).copied().flatten();
-    for ([length, from, to], count) in UPRIGHT {
-        let (from, to) = (joint(from)?, joint(to)?);
-        measured += count * from.position.distance(to.position);
-        reported += count * detection.lengths.get(length)?[0];
-        variance += count * count * (from.sigma * from.sigma + to.sigma * to.sigma);
+    for [length, from, to] in UPRIGHT {
+        let sides: &[usize] = if from > to { &[0] } else { &[0, 1] };
+        let share = 1.0 / sides.len() as f64;
+        for side in sides {
+            let (from, to) = (joint(from + side)?, joint(to + side)?);
+            measured += share * from.position.distance(to.position);
+            variance += share * share * (from.sigma * from.sigma + to.sigma * to.sigma);
+        }
+        reported += detection.lengths.get(length)?[0];
     }
     let [head, left, right] = [joint(0)?, joint(15)?, joint(16)?].map(|joint| joint.position);
     let straight = head.distance(0.5 * (left + right)) / measured;
