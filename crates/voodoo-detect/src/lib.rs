@@ -193,7 +193,8 @@ impl Detect for Detector {
                     (answer, crop) = again;
                 }
                 let mut detection = detection(&answer, &crop, candidate, &image.world_from_sensor);
-                if let Some(measured) = stature.or_else(|| stature_of_joints(&detection)) {
+                let by_joints = || stature_of_joints(&detection).filter(|_| crop.enlarged > 1.0);
+                if let Some(measured) = stature.or_else(by_joints) {
                     scale_to(&mut detection.lengths, measured);
                 }
                 found.push((number, detection));

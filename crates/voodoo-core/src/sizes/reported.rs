@@ -22,9 +22,8 @@ pub(super) struct ReportedLengths {
 struct LengthEstimate {
     /// Value of the first detection, from which the sizes were set.
     set: f64,
-    /// Mean over all detections, the sum of their weights, and the information of the most precise one.
+    /// Mean over all detections, and the information of the most precise one.
     mean: f64,
-    weight: f64,
     information: f64,
 }
 
@@ -35,20 +34,17 @@ impl ReportedLengths {
     }
 
     /// Updates the estimates with the lengths of a detection and their relative standard deviations. Errors of detections of one
-    /// person are correlated, so all together have only the information of the most precise one; and many detections of a person
-    /// who sits do not outweigh few of one who stands, because weights are squares of the information.
+    /// person are correlated, so all earlier detections together have only the information of the most precise one.
     pub(super) fn update(&mut self, detected: Detected) {
         let reported = &detected.detection.lengths;
         self.lengths.resize(self.lengths.len().max(reported.len()), LengthEstimate::default());
         for ([length, sigma], known) in reported.iter().zip(&mut self.lengths) {
-            let (length, information) = (length.ln(), 1.0 / (sigma * sigma));
-            if known.weight == 0.0 {
+            let (length, information, before) = (length.ln(), 1.0 / (sigma * sigma), known.information);
+            if before == 0.0 {
                 (known.set, known.mean) = (length, length);
             }
-            let weight = information * information;
-            known.weight += weight;
-            known.mean += (length - known.mean) * weight / known.weight;
-            known.information = information.max(known.information);
+            known.mean += (length - known.mean) * information / (information + before);
+            known.information = information.max(before);
         }
         self.bind(detected.map);
     }
