@@ -7,9 +7,9 @@ use crate::error::BodyError;
 use crate::math::{Pose, Vec3};
 
 /// Stature from which on proportions are those of an adult, meters.
-const GROWN: f64 = 1.62;
+const GROWN: f64 = 1.55;
 /// Relative change of head, trunk, arms and legs, and of the girth of arms and legs, per meter below that stature.
-const GROWTH: [f64; 5] = [0.76, 0.12, -0.12, -0.21, 0.08];
+const GROWTH: [f64; 5] = [0.84, 0.13, -0.13, -0.23, 0.09];
 /// Highest point above the lowest point of the skeleton of a standing adult, over stature.
 const UPRIGHT: f64 = 0.98;
 

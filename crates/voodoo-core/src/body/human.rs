@@ -319,7 +319,7 @@ fn mirrored([low, high]: [f64; 2], side: f64) -> [f64; 2] {
 }
 
 impl Body {
-    /// A human of a stature in meters, standing with hanging arms at rest. Below 1.62 m the proportions are those of a child.
+    /// A human of a stature in meters, standing with hanging arms at rest. Below 1.55 m the proportions are those of a child.
     ///
     /// Limb frames have z from the proximal to the distal end, x forward (feet: up) in the standing pose. Hinges rotate about the
     /// joint frame's x axis; a positive angle is flexion.
