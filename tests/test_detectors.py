@@ -13,6 +13,7 @@ import voodoo
 from commands import load_script, refused
 from commands import run as command
 from test_people import WORLD_FROM_SENSOR, frame
+from voodoo._core import person_candidates
 from voodoo.detectors import JOINTS, LENGTHS, CallableDetector, DetectedPerson, DetectorImage, OnnxDetector
 from voodoo.errors import ConfigError, MeasurementError
 from voodoo.pipeline.start import stature
@@ -113,6 +114,11 @@ def test_lengths_follow_a_stature_that_is_known(someone):
     for wrong in ({"stature": 17.0}, {"stature": float("nan")}, {"stature": 1.7, "stature_sigma": 0.0}):
         with pytest.raises(ConfigError, match=r"stature: expected meters from 0\.3 to 3\.0"):
             voodoo.Detector(**wrong)
+    for factor in (0.0, -1.0, float("nan")):
+        with pytest.raises(MeasurementError, match="enlarged: expected a finite factor above 0"):
+            person_candidates(
+                np.zeros((2, 3), np.float32), camera=voodoo.Camera(3, 2, 1.0, 1.0, 1.0, 1.0), enlarged=factor
+            )
 
 
 def test_without_a_detector_nobody_is_searched_for(someone):

@@ -685,7 +685,7 @@ def person_candidates(
         enlarged: factor by which crops are enlarged, their depth included; for small persons.
 
     Raises:
-        MeasurementError: an array of another type or shape.
+        MeasurementError: an array of another type or shape, or a factor that is not above 0.
     """
 
 @final

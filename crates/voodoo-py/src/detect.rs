@@ -191,6 +191,9 @@ pub(crate) fn person_candidates<'py>(
     if view.as_array().dim() != (height, width) {
         return Err(wrong_argument("depth", &format!("shape ({height}, {width}), as its camera has"), depth));
     }
+    if !(enlarged > 0.0 && enlarged.is_finite()) {
+        return Err(MeasurementError::new_err(format!("enlarged: expected a finite factor above 0, found {enlarged}")));
+    }
     let image = DepthImage {
         pixels: DepthPixels::F32(view.as_slice()?),
         camera: &camera,
