@@ -18,9 +18,9 @@ const LENGTH: [f64; 2] = [0.45, 2.5];
 const LEAST_COMPONENT: f64 = 0.004;
 /// Maximum distance between components of one person whose connection is occluded, meters.
 const GAP: f64 = 0.28;
-/// A component whose points have a smaller standard deviation from their plane than this, meters, is flat: walls and table tops
-/// are not people.
-const FLAT_COMPONENT: f64 = 0.022;
+/// A component is flat if the standard deviation of its points from their plane is a smaller part of its longest edge than this:
+/// walls and table tops are not people.
+const FLAT_COMPONENT: f64 = 0.011;
 /// Number of points sampled from a component to compute distances.
 const COMPONENT_SAMPLES: usize = 48;
 /// Maximum number of components considered, the largest first.
@@ -327,7 +327,7 @@ impl Components {
             }
         }
         for part in parts.iter_mut() {
-            part.flat = is_flat(&part.samples[..part.sampled]);
+            part.flat = is_flat(&part.samples[..part.sampled], (part.high - part.low).max_element());
         }
     }
 
@@ -387,8 +387,8 @@ fn near(a: &Component, b: &Component) -> bool {
     a.samples[..a.sampled].iter().any(|p| others.iter().any(|q| p.distance_squared(*q) < GAP * GAP))
 }
 
-/// Whether points lie near a plane.
-fn is_flat(points: &[Vec3]) -> bool {
+/// Whether points, whose box has this longest edge, lie near a plane.
+fn is_flat(points: &[Vec3], edge: f64) -> bool {
     let count = points.len() as f64;
     let mean = points.iter().sum::<Vec3>() / count;
     let mut scatter = Matrix3::zeros();
@@ -396,7 +396,7 @@ fn is_flat(points: &[Vec3]) -> bool {
         let from = Vector3::from((*point - mean).to_array());
         scatter += from * from.transpose() / count;
     }
-    scatter.symmetric_eigenvalues().min() < FLAT_COMPONENT * FLAT_COMPONENT
+    scatter.symmetric_eigenvalues().min() < (FLAT_COMPONENT * edge).powi(2)
 }
 
 /// Absolute difference of the logarithms of the visible surface area and that of a standing person.

@@ -44,7 +44,7 @@ use voodoo_core::{Detect, DetectError, DetectedJoint, Detection, DetectionQuery,
 use weights::WeightsError;
 
 /// Log odds above which a candidate counts as a person.
-const PERSON: f32 = 0.0;
+const PERSON: f64 = 0.0;
 /// Maximum number of candidates that the network evaluates per image for [`DetectionQuery::All`]. Run time is proportional to it.
 const MAX_EVALUATIONS: usize = 12;
 /// Stature to which small persons are enlarged in the network's input, meters; and the fraction of it below which a person is small.
@@ -175,31 +175,28 @@ impl Detect for Detector {
             let candidate = &segmentation.candidates()[number];
             let mut evaluate = |enlarged: f64| {
                 let crop = segmentation.crop(candidate, enlarged)?;
-                Some((network.evaluate(&crop.pixels, memory), crop))
+                let answer = network.evaluate(&crop.pixels, memory);
+                Some(detection(&answer, &crop, candidate, &image.world_from_sensor))
             };
-            let Some((mut answer, mut crop)) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else {
-                continue;
-            };
+            let Some(mut detection) = evaluate(enlargement(stature.map(|[stature, _]| stature))) else { continue };
             evaluations += 1;
             if nearest.is_none() {
-                *nearest = Some((f64::from(answer.person), in_world(candidate, &image.world_from_sensor)));
+                *nearest = Some((detection.person, in_world(candidate, &image.world_from_sensor)));
             }
-            if answer.person > PERSON {
-                let enlarged = enlargement(answer.log_lengths.last().map(|length| f64::from(*length).exp()));
-                if stature.is_none()
-                    && enlarged > 1.0
+            if detection.person > PERSON {
+                let enlarged = enlargement(detection.lengths.last().map(|[length, _]| *length));
+                if let Some(known) = *stature {
+                    scale_to(&mut detection.lengths, known);
+                } else if enlarged > 1.0
                     && let Some(again) = evaluate(enlarged)
                 {
-                    (answer, crop) = again;
+                    detection = of_small_person(&detection, again);
                 }
-                let mut detection = detection(&answer, &crop, candidate, &image.world_from_sensor);
-                let by_joints = || stature_of_joints(&detection).filter(|_| crop.enlarged > 1.0);
-                if let Some(measured) = stature.or_else(by_joints) {
-                    scale_to(&mut detection.lengths, measured);
-                }
+            }
+            rejections.record(candidate, detection.person > PERSON);
+            if detection.person > PERSON {
                 found.push((number, detection));
             }
-            rejections.record(candidate, answer.person > PERSON);
             if evaluations == MAX_EVALUATIONS || query != DetectionQuery::All {
                 break;
             }
@@ -244,6 +241,19 @@ fn in_world(candidate: &PersonCandidate, world_from_camera: &Pose) -> Aabb {
 /// Factor by which a person of this stature is enlarged in the network's input; 1 where the stature is not known.
 fn enlargement(stature: Option<f64>) -> f64 {
     stature.map(|stature| ADULT / stature).filter(|factor| factor * SMALL > 1.0).unwrap_or(1.0)
+}
+
+/// The enlarged evaluation of a person who looked small in the first one, its lengths scaled to its joints. Part of an adult looks
+/// like a child who is enlarged, so the less sure of both tells whether it is a person, and how precisely the stature is known.
+fn of_small_person(first: &Detection, mut enlarged: Detection) -> Detection {
+    if let Some(measured) = stature_of_joints(&enlarged) {
+        scale_to(&mut enlarged.lengths, measured);
+    }
+    enlarged.person = enlarged.person.min(first.person);
+    if let (Some([_, before]), Some([_, sigma])) = (first.lengths.last(), enlarged.lengths.last_mut()) {
+        *sigma = sigma.max(*before);
+    }
+    enlarged
 }
 
 /// The stature that the joints of a detection measure, meters, and its relative standard deviation: the reported one times the
