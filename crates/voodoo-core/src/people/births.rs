@@ -176,10 +176,11 @@ impl People {
                 |number: &usize| person_cost(&self.persons[*number], size(*number), track, &clothes, frame.stamp);
             absent.iter().map(|number| cost(number) + FIRST * rank as f64).collect()
         };
-        let costs: Vec<Vec<f64>> =
-            confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).enumerate().map(cost).collect();
-        let known: Vec<Option<usize>> =
-            assign::assign(&costs, NEW).into_iter().map(|column| column.map(|column| absent[column])).collect();
+        let tracks: Vec<&TentativeTrack> = confirmed.iter().chain(self.tentative.updated_at(frame.stamp)).collect();
+        let costs: Vec<Vec<f64>> = tracks.iter().copied().enumerate().map(cost).collect();
+        // A detection that nobody is left for may be of somebody new, or of nobody.
+        let known = assign::assign(&costs, |row| tracks[row].log_odds().min(NEW));
+        let known: Vec<Option<usize>> = known.into_iter().map(|column| column.map(|column| absent[column])).collect();
         let numbers = self.assign_to_newcomers(frame, confirmed, &known);
         for ((track, known), own) in confirmed.iter().zip(known).zip(numbers) {
             let others = self.tracked_except(known);

@@ -230,7 +230,8 @@ impl People {
         };
         let costs = |detection| tracked.iter().map(|number| distance(detection, &self.persons[*number])).collect();
         let costs: Vec<Vec<f64>> = frame.detections.iter().map(costs).collect();
-        assign::assign(&costs, SAME_PERSON).into_iter().map(|column| column.map(|column| tracked[column])).collect()
+        let shown = assign::assign(&costs, |_| SAME_PERSON);
+        shown.into_iter().map(|column| column.map(|column| tracked[column])).collect()
     }
 
     /// Steps every tracker with its own pixels and points, and with the detections that show the person.

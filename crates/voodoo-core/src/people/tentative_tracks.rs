@@ -45,6 +45,11 @@ impl TentativeTrack {
         Self { place, sum: person.person, detection, image: 0, positions, given: true, stamp }
     }
 
+    /// Sum of the log odds of its detections that it is a person, at least 0.
+    pub(super) fn log_odds(&self) -> f64 {
+        self.sum
+    }
+
     /// Median standard deviation of the joints that are measured or visible, meters; infinite without any.
     fn sigma(&self) -> f64 {
         let given = self.positions.iter().map(|relation| UNIT_SIGMA / relation.weight.sqrt());
@@ -94,7 +99,7 @@ impl TentativeTracks {
 
     /// Returns the greatest sum of log odds of those that were detected in the frame with this stamp.
     pub(super) fn greatest_at(&self, stamp: f64) -> Option<f64> {
-        self.updated_at(stamp).map(|track| track.sum).max_by(f64::total_cmp)
+        self.updated_at(stamp).map(TentativeTrack::log_odds).max_by(f64::total_cmp)
     }
 
     /// Deletes the tracks that coincide with one of `others`.
