@@ -334,16 +334,21 @@ const FIRST: f64 = 1e-6;
 pub(super) const NEW: f64 = 4.0;
 /// Distance that a person may move, meters: at once, and in addition per second.
 const COMES: [f64; 2] = [0.4, 1.2];
+/// Extent of the area in which somebody else may appear, meters.
+const APPEARS: f64 = 4.0;
 /// Mean and standard deviation of the clothes distance between two views of one person.
 const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// Evidence of equal clothes for the same person, nats.
 const LIKE_CLOTHES: f64 = 3.0;
+/// Largest cost of stature and clothes, nats: those of a person of whom a part is visible may be far off.
+const OTHER_LOOKS: f64 = 6.0;
 
-/// Returns the cost of a person's having moved to a position, nats.
+/// Returns the cost of a person's having moved to a position, nats: by the density there of where they may be by now, and of where
+/// somebody else may appear.
 pub(super) fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
     let reach = COMES[0] + COMES[1] * (stamp - person.last_tracked);
     let far = person.place.distance(place) / reach;
-    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far }
+    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far + 2.0 * (reach / APPEARS).min(1.0).ln() }
 }
 
 /// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.
@@ -352,5 +357,5 @@ fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clo
     let distance = person.clothes.distance(clothes);
     let color =
         distance.map_or(0.0, |distance| 0.5 * ((distance - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
-    far + size + color
+    far + (size + color).min(OTHER_LOOKS)
 }
