@@ -189,7 +189,11 @@ impl People {
                 Some(number) => self.reactivate(frame, track, number, own.unwrap_or(number)),
                 None => own.is_some_and(|own| self.spawn(frame, track, own)),
             };
-            if !came && known.is_some_and(|number| self.persons[number].is_tracked()) {
+            let beside = |number: usize| {
+                let person = &self.persons[number];
+                person.is_tracked() && person.place.distance(track.place) > ONE_BODY
+            };
+            if !came && known.is_some_and(beside) {
                 // That person stays where they are, and it is somebody else.
                 let own = self.assign_to_newcomers(frame, std::slice::from_ref(track), &[None]);
                 came = own[0].is_some_and(|own| self.spawn(frame, track, own));
@@ -340,8 +344,6 @@ const APPEARS: f64 = 4.0;
 const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// Evidence of equal clothes for the same person, nats.
 const LIKE_CLOTHES: f64 = 3.0;
-/// Largest cost of stature and clothes, nats: those of a person of whom a part is visible may be far off.
-const OTHER_LOOKS: f64 = 6.0;
 
 /// Returns the cost of a person's having moved to a position, nats: by the density there of where they may be by now, and of where
 /// somebody else may appear.
@@ -354,8 +356,10 @@ pub(super) fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
 /// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.
 fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
     let far = distance_cost(person, track.place, stamp);
-    let distance = person.clothes.distance(clothes);
-    let color =
-        distance.map_or(0.0, |distance| 0.5 * ((distance - CLOTHES[0]).max(0.0) / CLOTHES[1]).powi(2) - LIKE_CLOTHES);
-    far + (size + color).min(OTHER_LOOKS)
+    // Clothes of which a part is visible, or at a wrong pose, may be far off: linear beyond a standard deviation.
+    let color = person.clothes.distance(clothes).map_or(0.0, |distance| {
+        let off = ((distance - CLOTHES[0]) / CLOTHES[1]).max(0.0);
+        off.min(1.0) * (off - 0.5 * off.min(1.0)) - LIKE_CLOTHES
+    });
+    far + size + color
 }

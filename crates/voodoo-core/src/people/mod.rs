@@ -34,8 +34,6 @@ use tentative_tracks::{SAME_PERSON, TentativeTracks};
 
 /// Two tracks whose roots are nearer than this are duplicates, meters.
 const ONE_BODY: f64 = 0.2;
-/// A track that lasted for less than this is not remembered, seconds.
-const KNOWN_AFTER: f64 = 1.0;
 
 /// Tracks several persons through a sequence of frames.
 ///
@@ -279,13 +277,9 @@ impl People {
         }
     }
 
-    /// Deletes persons who have been absent for too long, and absent ones whose track was short.
+    /// Deletes persons who have been absent for too long.
     fn delete_expired(&mut self, stamp: f64) {
         let forget_after = self.options.forget_after;
-        self.persons.retain(|person| {
-            let remembered =
-                person.last_tracked - person.created >= KNOWN_AFTER && stamp - person.last_tracked < forget_after;
-            person.present || person.followed || remembered
-        });
+        self.persons.retain(|person| person.present || person.followed || stamp - person.last_tracked < forget_after);
     }
 }
