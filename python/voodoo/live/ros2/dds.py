@@ -60,7 +60,7 @@ def dds_type(kind: str) -> Any:  # noqa: ANN401 - a class made at run time
     """
     made = _struct(kind, topic=True)
     # The library adds options.
-    made.serialize = lambda message, *_, **__: bytes(message.data_as_sent)
+    made.serialize = lambda message, *_, **__: message.data_as_sent
     made.deserialize = made.deserialize_key = lambda data, *_, **__: message_of(made, data)
     return made
 
@@ -261,8 +261,9 @@ class Publication:
         from cyclonedds.pub import DataWriter
         from cyclonedds.topic import Topic
 
-        self._type, self._failed = dds_type(kind), DDSException
-        self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", self._type), _qos(True, latched, depth))
+        made, self._failed = dds_type(kind), DDSException
+        self._sample = message_of(made, b"")
+        self._writer = DataWriter(participant, Topic(participant, f"rt{topic}", made), _qos(True, latched, depth))
         self.key = str(self._writer.guid)
 
     def write(self, message: bytes) -> None:
@@ -271,8 +272,9 @@ class Publication:
         Raises:
             OSError: a subscriber holds it up, or the network is gone.
         """
+        self._sample.data_as_sent = message
         try:
-            self._writer.write(message_of(self._type, message))
+            self._writer.write(self._sample)
         except self._failed as error:
             raise OSError(str(error)) from error
 

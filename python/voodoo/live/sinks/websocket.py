@@ -7,6 +7,7 @@ import json
 import logging
 import math
 import re
+import selectors
 import socket
 import threading
 import time
@@ -39,6 +40,25 @@ _LOG = logging.getLogger(__name__)
 _LOG.addHandler(logging.NullHandler())  # what is no WebSocket client costs no traceback on the screen
 
 
+class _Releasing(selectors.DefaultSelector):
+    """Releases a lock while its event loop waits. A thread that holds it may use the loop's transports: to send takes less time
+    than to wake the loop.
+    """
+
+    def __init__(self, lock: threading.Lock) -> None:
+        """The loop runs while it holds the lock."""
+        super().__init__()
+        self._lock = lock
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        """See the base class."""
+        self._lock.release()
+        try:
+            return super().select(timeout)
+        finally:
+            self._lock.acquire()
+
+
 class WebSocketSink(Output):
     """A server that sends every receiver the newest pose that it can take.
 
@@ -62,9 +82,10 @@ class WebSocketSink(Output):
         self._root, self._on_message = root_frame, on_message
         host, port, parts = parts_of(address, host="127.0.0.1", port=PORT)
         origins = [None, _OWN_PAGES, *parse_qs(parts.query).get("origin", ())]
-        self._loop = asyncio.new_event_loop()
+        self._lock = threading.Lock()
+        self._loop = asyncio.SelectorEventLoop(_Releasing(self._lock))
         self._late: dict[Any, tuple[float, bool]] = {}
-        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
         async def start() -> Any:  # noqa: ANN401 - of websockets
@@ -80,8 +101,13 @@ class WebSocketSink(Output):
 
     def publish(self, step: Step) -> None:
         """See Output."""
-        if self._server.connections:
-            self._loop.call_soon_threadsafe(self._put, message_of(step, self._root()))
+        with self._lock:
+            if self._server.connections:
+                self._put(message_of(step, self._root()))
+
+    def _run(self) -> None:
+        with self._lock:
+            self._loop.run_forever()
 
     def _put(self, text: str) -> None:
         """Send to all who took what they were sent before."""
@@ -98,6 +124,8 @@ class WebSocketSink(Output):
                 named = True
             self._late[connection] = since, named
         self._broadcast(free, text)
+        if any(one.transport.get_write_buffer_size() or one.transport.is_closing() for one in free):
+            self._loop.call_soon_threadsafe(bool)  # the loop has more to do
 
     async def _serve(self, connection: Any) -> None:  # noqa: ANN401 - of websockets
         """Wait until the receiver leaves; what it says is not heard."""
@@ -116,7 +144,8 @@ class WebSocketSink(Output):
 
     def close(self) -> None:
         """See Output."""
-        self._server.close()
+        with self._lock:
+            self._server.close()
         with suppress(TimeoutError):  # a receiver that does not answer
             asyncio.run_coroutine_threadsafe(self._server.wait_closed(), self._loop).result(_CLOSE_S)
         self._end()
