@@ -20,6 +20,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from visualization_msgs.msg import MarkerArray
 
 TOPIC = "/camera/depth/image_raw"
+STATES = "/humans/bodies/p1/joint_states"
 
 
 def seconds(stamp):
@@ -36,9 +37,14 @@ class Peer(Node):
         qos = qos_profile_sensor_data if sensor_data else QoSProfile(depth=queue)
         self.pictures = self.create_publisher(Image, topic, qos)
         self.infos = self.create_publisher(CameraInfo, topic.rsplit("/", 1)[0] + "/camera_info", qos)
-        self.create_subscription(JointState, "/humans/bodies/p1/joint_states", self.take_state, 50)
+        self.create_subscription(JointState, STATES, self.take_state, 50)
         self.create_subscription(MarkerArray, "/humans/bodies/p1/markers", self.take_markers, 50)
         self.sent, self.states, self.markers, self.names = [], [], [], []
+
+    def is_connected(self):
+        """Whether somebody listens, and publishes joint states."""
+        listen = self.pictures.get_subscription_count() and self.infos.get_subscription_count()
+        return listen and self.count_publishers(STATES)
 
     def send(self, number):
         now = time.time()
@@ -72,14 +78,14 @@ def main():
     options.add_argument(
         "--queue", type=int, default=10, help="images that wait to be confirmed before they are overwritten"
     )
-    options.add_argument("--wait", type=float, default=20.0, help="for somebody who listens [s]")
+    options.add_argument("--wait", type=float, default=20.0, help="for somebody who listens and answers [s]")
     chosen = options.parse_args()
     rclpy.init()
     peer = Peer(chosen.images, chosen.topic, chosen.sensor_data, chosen.queue)
     executor = SingleThreadedExecutor()
     executor.add_node(peer)
     until = time.time() + chosen.wait
-    while not (peer.pictures.get_subscription_count() and peer.infos.get_subscription_count()) and time.time() < until:
+    while not peer.is_connected() and time.time() < until:
         executor.spin_once(timeout_sec=0.05)
     due = time.time() + 0.5
     for number in range(chosen.count):
