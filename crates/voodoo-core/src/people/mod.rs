@@ -192,9 +192,12 @@ impl People {
                 self.scene.release(frame, image, pixels);
             }
         }
-        // A lost person owns no pixels, and must not become part of the scene.
+        // A lost person must not become part of the scene, and is searched for in the pixels assigned to them as well.
         if !self.persons.iter().any(|person| person.present && !person.is_tracked()) {
             self.scene.learn(frame, self.assignment.owners());
+        }
+        for number in (0..self.persons.len()).filter(|number| !self.persons[*number].is_tracked()) {
+            self.assignment.release(number);
         }
         self.prune_tracks();
         self.find_new(frame, &shown);
@@ -206,10 +209,9 @@ impl People {
         for person in self.persons.iter_mut().filter(|person| person.present) {
             person.tracker.predict(frame.stamp, &mut person.expected);
         }
-        // Lost persons own no pixels.
         let predicted = (0..)
             .zip(&self.persons)
-            .filter(|(_, person)| person.is_tracked())
+            .filter(|(_, person)| person.present)
             .map(|(number, person)| PredictedBody { number, body: person.tracker.body(), poses: &person.expected });
         self.assignment.assign(frame, self.scene.known(), predicted);
     }

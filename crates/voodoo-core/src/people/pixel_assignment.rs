@@ -60,6 +60,15 @@ impl PixelAssignment {
         owners.filter(|owner| usize::from(**owner) == number).count()
     }
 
+    /// Releases the pixels and free points that are assigned to a person.
+    pub(super) fn release(&mut self, number: usize) {
+        if !self.assigned.iter().any(|assigned| usize::from(*assigned) == number) {
+            return;
+        }
+        let owners = self.owners.iter_mut().chain(&mut self.cloud_owners).flatten();
+        owners.filter(|owner| usize::from(**owner) == number).for_each(|owner| *owner = NO_OWNER);
+    }
+
     /// Assigns every foreground pixel and every free point to the body with the nearest surface, within reach.
     pub(super) fn assign<'a>(
         &mut self,
