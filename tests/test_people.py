@@ -8,6 +8,7 @@ import pytest
 
 import voodoo
 from measurement_data import data_folder
+from synthetic.stories import four
 from voodoo.errors import BodyError, ConfigError, MeasurementError
 from voodoo.pipeline.front_end import FrontEnd
 from voodoo.pipeline.pairing import paired
@@ -62,6 +63,19 @@ def test_a_person_enters_and_leaves(someone):
     assert len(found) == 0
     with pytest.raises(BodyError, match=r"those who are there \(nobody\), found 1"):
         people.body(1)
+
+
+def test_who_enters_while_somebody_is_hidden_gets_an_id_of_their_own():
+    """The first of four is hidden when the last one, in other clothes, enters 1 m aside."""
+    recording = four(3)
+    *_, last = islice(track(recording, voodoo.People()), 47)
+    truth = recording.people
+    row = np.abs(truth.stamps - last.estimate.stamp).argmin()
+    assert (truth.in_view[row] > 0.4).all()
+    roots = {person.id: person.estimate.joints["humanoid_root"] for person in last.estimate}
+    away = {number: np.linalg.norm(truth.of("humanoid_root")[row] - root, axis=1) for number, root in roots.items()}
+    assert {number: int(each.argmin()) for number, each in away.items()} == {1: 0, 2: 1, 3: 2, 4: 3}
+    assert max(each.min() for each in away.values()) < 0.2
 
 
 def test_what_is_measured_of_one_person_is_theirs(someone):
