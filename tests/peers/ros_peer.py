@@ -87,7 +87,7 @@ def main():
     until = time.time() + chosen.wait
     while not peer.is_connected() and time.time() < until:
         executor.spin_once(timeout_sec=0.05)
-    due = time.time() + 0.5
+    due = time.time() + 1.0  # the publisher of joint states has to discover us as well
     for number in range(chosen.count):
         while time.time() < due:
             executor.spin_once(timeout_sec=max(due - time.time(), 0.0))

@@ -17,10 +17,11 @@ def main():
     chosen = options.parse_args()
     node = Node()
     info, image = "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Image"
-    pairs = {chosen.source: (chosen.target, image)}
-    pairs[chosen.source.rsplit("/", 1)[0] + "/camera_info"] = (chosen.target.rsplit("/", 1)[0] + "/camera_info", info)
+    # A calibration goes before the image that comes with it.
+    pairs = {chosen.source.rsplit("/", 1)[0] + "/camera_info": (chosen.target.rsplit("/", 1)[0] + "/camera_info", info)}
+    pairs[chosen.source] = (chosen.target, image)
     targets = {name: node.advertise(*pair) for name, pair in pairs.items()}
-    while not targets[chosen.source].subscribers:
+    while not all(target.subscribers for target in targets.values()):
         time.sleep(0.05)
     while not pairs.keys() <= node.offers().keys():
         node.wait(0.05)
