@@ -4,6 +4,7 @@
 use crate::body::kinematics::{hinge_axis, place};
 use crate::body::{Body, JointKind};
 use crate::math::{Mat3, Pose, Quat, Vec3};
+use crate::observation::frame::Ground;
 
 /// The chain ends at this fraction of the length of what is attached to its lower limb: in the middle of a fist.
 const GRASP: f64 = 0.6;
@@ -71,6 +72,36 @@ impl TwoBone {
         }
     }
 
+    /// Directions of the two bones of a leg on which the body stands or sits: the lower one is upright, with its foot on the floor,
+    /// and the upper one is bent forward as far as that takes.
+    pub(crate) fn standing(&self, body: &Body, poses: &[Pose], floor: Ground) -> [Vec3; 2] {
+        let joint = |limb: usize| body.limbs()[limb].parent.as_ref();
+        let Some(((trunk, ball), (_, hinge))) = joint(self.upper).zip(joint(self.lower)) else {
+            return [-floor.normal; 2];
+        };
+        let bends = hinge.limits.as_ref().map_or(1.0, |limits| limits.iter().flatten().sum::<f64>().signum());
+        let straight = poses[*trunk].rotation * ball.parent_from_limb_at_rest().rotation;
+        let axis = straight * hinge.parent_from_joint.rotation * (bends * hinge_axis(hinge));
+        let forward = axis.cross(floor.normal).normalize_or_zero();
+        let thickness = |end: &usize| 2.0 * body.limbs()[*end].shape.b0();
+        let height = self.lengths[1] + self.ends.iter().map(thickness).fold(0.0, f64::max);
+        let drop = ((floor.height(self.root(body, poses)) - height) / self.lengths[0]).clamp(-1.0, 1.0);
+        [forward * (1.0 - drop * drop).sqrt() - floor.normal * drop, -floor.normal]
+    }
+
+    /// Rotations of the two bones in these directions relative to their parents, without a twist, where the trunk has this one.
+    pub(crate) fn turned(&self, body: &Body, mut parent: Quat, directions: [Vec3; 2]) -> [Quat; 2] {
+        let mut turn = |limb: usize, direction: Vec3| {
+            let joint = body.limbs()[limb].parent.as_ref().map(|(_, joint)| joint.parent_from_limb_at_rest().rotation);
+            let straight = parent * joint.unwrap_or_default();
+            let from_straight = Quat::from_rotation_arc(straight * Vec3::Z, direction.normalize_or(Vec3::Z));
+            let relative = parent.inverse() * from_straight * straight;
+            parent = from_straight * straight;
+            relative
+        };
+        [turn(self.upper, directions[0]), turn(self.lower, directions[1])]
+    }
+
     /// Length of the stretched chain.
     pub(crate) fn stretched_length(&self) -> f64 {
         self.lengths[0] + self.lengths[1]
@@ -136,6 +167,41 @@ fn basis(main: Vec3, other: Vec3) -> Option<Mat3> {
 mod tests {
     use super::*;
     use crate::body::HumanModel;
+
+    /// The human with its root at this height above the floor, in its rest pose, its legs, and the floor.
+    fn at_height(height: f64) -> (Body, Vec<Pose>, Vec<TwoBone>, Ground) {
+        let body = Body::human(1.75, HumanModel::Full).unwrap();
+        let poses = body.rest_pose(Pose::from_translation(Vec3::Z * height));
+        let legs: Vec<TwoBone> = TwoBone::from_body(&body).into_iter().filter(|chain| chain.leg).collect();
+        assert_eq!(legs.len(), 2);
+        (body, poses, legs, Ground { normal: Vec3::Z, offset: 0.0 })
+    }
+
+    #[test]
+    fn who_is_high_enough_stands_and_who_is_lower_sits_with_the_feet_on_the_floor() {
+        let (body, poses, legs, floor) = at_height(1.2);
+        assert!(legs.iter().all(|leg| leg.standing(&body, &poses, floor) == [-Vec3::Z; 2]));
+        let (body, poses, legs, floor) = at_height(0.55);
+        for leg in legs {
+            let directions = leg.standing(&body, &poses, floor);
+            let knee = leg.root(&body, &poses) + leg.lengths[0] * directions[0];
+            let [foot, thickness] = [knee.z - leg.lengths[1], 2.0 * body.limbs()[leg.ends[0]].shape.b0()];
+            assert!((foot - thickness).abs() < 1e-9 && directions[0].x > 0.9, "{foot}, {directions:?}");
+            assert_eq!(directions[1], -Vec3::Z);
+        }
+    }
+
+    #[test]
+    fn bones_turned_into_directions_point_there() {
+        let (body, poses, legs, _) = at_height(0.9);
+        let directions = [Vec3::new(0.8, 0.1, -0.6), Vec3::new(-0.3, 0.0, -1.0)].map(Vec3::normalize);
+        let trunk = Quat::from_axis_angle(Vec3::Y, 0.3) * poses[0].rotation;
+        for leg in legs {
+            let [upper, lower] = leg.turned(&body, trunk, directions);
+            let found = [trunk * upper, trunk * upper * lower].map(|rotation| rotation * Vec3::Z);
+            assert!(found.iter().zip(directions).all(|(found, direction)| found.distance(direction) < 1e-9));
+        }
+    }
 
     #[test]
     fn reaches_targets_on_bodies_of_any_size() {

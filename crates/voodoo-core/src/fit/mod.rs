@@ -308,7 +308,8 @@ fn problem<'a>(
 ) -> Problem<'a> {
     let Context { config, model, observation, time_scale, .. } = context;
     let (floor, by_colors) = (observation.floor(), context.compares_colors());
-    Problem { body: &model.body, correspondences, predicted, floor, step, time_scale, by_colors, config }
+    let (body, extremities) = (&model.body, model.extremities.as_slice());
+    Problem { body, extremities, correspondences, predicted, floor, step, time_scale, by_colors, config }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::math::Pose;
 use crate::regions::{Backdrop, ColorRegions};
 use crate::solver::{LIMIT_SIGMA, OVERLAP_SIGMA, SITE_SCALE};
 use crate::terms::{
-    Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Surface, Term,
+    Colors, DetectedJoints, Floor, FreeSpace, Limits, PATCH, Penetration, Regions, Sites, Stance, Surface, Term,
 };
 
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
@@ -32,6 +32,7 @@ pub(crate) struct Objective<'a> {
     limits: Limits,
     penetration: Penetration<'a>,
     floor: Option<Floor>,
+    stance: Option<Stance<'a>>,
 }
 
 impl<'a> Objective<'a> {
@@ -55,6 +56,7 @@ impl<'a> Objective<'a> {
             limits: Limits { sigma: LIMIT_SIGMA },
             penetration: Penetration { sigma: OVERLAP_SIGMA, spheres: &[] },
             floor: observation.floor().map(|plane| Floor { plane, sigma: OVERLAP_SIGMA }),
+            stance: observation.floor().map(|floor| Stance { extremities: &model.extremities, floor }),
         }
     }
 
@@ -63,7 +65,8 @@ impl<'a> Objective<'a> {
         let terms: [&dyn Term; 6] =
             [&self.free_space, &self.sites, &self.detected, &self.regions, &self.limits, &self.penetration];
         let floor = self.floor.iter().map(|floor| floor as &dyn Term);
-        terms.into_iter().chain(floor).map(|term| term.cost(self.body, poses, limb)).sum()
+        let stance = self.stance.iter().map(|stance| stance as &dyn Term);
+        terms.into_iter().chain(floor).chain(stance).map(|term| term.cost(self.body, poses, limb)).sum()
     }
 
     /// Cost of the matched poses of the whole body. A point that no limb explains costs a patch of its weight.

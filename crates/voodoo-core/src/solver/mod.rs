@@ -19,6 +19,7 @@ pub(crate) use warm_start::WarmStart;
 pub(crate) use whole_body::{LENGTH_INFORMATION, OVERLAP_SIGMA, SITE_SCALE, WholeBody};
 
 use crate::association::correspondence::Correspondences;
+use crate::body::two_bone::TwoBone;
 use crate::body::{Body, Pair};
 use crate::config::{Config, SolverKind};
 use crate::math::Pose;
@@ -38,6 +39,8 @@ const FLOOR: f64 = 1e-6;
 pub(crate) struct Problem<'a> {
     /// The body.
     pub body: &'a Body,
+    /// Its arms and legs.
+    pub extremities: &'a [TwoBone],
     /// Correspondences at the current poses.
     pub correspondences: &'a Correspondences,
     /// The predicted poses, from before this frame's measurements.

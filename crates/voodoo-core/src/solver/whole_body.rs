@@ -5,9 +5,9 @@ use super::schedule::narrowed;
 use super::{ChainSolver, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
-use crate::math::{Pose, Vec3, refill, reset};
+use crate::math::{Pose, Quat, Vec3, refill, reset};
 use crate::terms::normal_equations::NormalEquations;
-use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Term};
+use crate::terms::{DetectedJoints, Floor, Limits, Measurements, Penetration, Posture, Prior, Rest, Term};
 
 /// Standard deviation of the depth of an axis inside another limb or below the ground, meters.
 pub(crate) const OVERLAP_SIGMA: f64 = 0.03;
@@ -27,6 +27,8 @@ const HIDDEN_MOTION: f64 = 0.1;
 /// Fraction by which a fully occluded hand, foot or head is pulled towards its rest posture per 1/30 s; otherwise it would keep
 /// its last observed posture forever. It covers half of the way in a quarter of a second.
 const TO_REST: f64 = 0.1;
+/// The same for a leg, which swings while its person walks: half of the way in three quarters of a second.
+const LEG_TO_REST: f64 = 0.03;
 /// Minimum expected motion of a joint where colors compare poses, radians: no points hold a wrong shoulder there.
 const LEAST_MOTION: f64 = 0.1;
 /// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
@@ -49,8 +51,8 @@ pub(crate) struct WholeBody {
     lengths: Lengths,
     warm_start: WarmStart,
     joint_sigmas: Vec<f64>,
-    /// Fractions by which joints are pulled towards their rest rotations.
-    rests: Vec<f64>,
+    /// Where joints rest that nothing shows.
+    rests: Vec<Rest>,
     /// Weight of the sites on each limb and its descendants.
     sites: Vec<f64>,
     /// Weight of the color edges on each limb.
@@ -173,16 +175,39 @@ impl WholeBody {
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let measured_fraction = (measured / FREE_WEIGHT).min(1.0);
             let end = part.match_caps[1] && !problem.by_colors;
-            let rests = end && part.parent.as_ref().is_some_and(|(_, joint)| joint.kind() == JointKind::Elliptic);
-            self.rests.push(if rests {
-                ((1.0 - measured_fraction) * TO_REST * problem.time_scale).min(1.0)
-            } else {
-                0.0
+            let joint = part.parent.as_ref().map(|(_, joint)| joint);
+            let rests = end && joint.is_some_and(|joint| joint.kind() == JointKind::Elliptic);
+            self.rests.push(Rest {
+                rotation: joint.map_or(Quat::IDENTITY, |joint| joint.parent_from_limb_at_rest().rotation),
+                fraction: if rests { to_rest(problem, TO_REST, measured_fraction) } else { 0.0 },
             });
             let measured_fraction = measured_fraction.max(HIDDEN_MOTION);
             self.joint_sigmas.push(motion * measured_fraction * problem.time_scale * problem.config.motion_scale);
         }
+        self.rest_legs(problem);
     }
+
+    /// Lets legs that nothing shows stand or sit on the floor.
+    fn rest_legs(&mut self, problem: &Problem) {
+        let Problem { body, extremities, correspondences, predicted, .. } = problem;
+        let Some(floor) = problem.floor.filter(|_| problem.config.penetration && !problem.by_colors) else { return };
+        for leg in extremities.iter().filter(|chain| chain.leg) {
+            let trunk = body.parent(leg.upper).map_or(Quat::IDENTITY, |trunk| predicted[trunk].rotation);
+            let rotations = leg.turned(body, trunk, leg.standing(body, predicted, floor));
+            let weight = |limb: &usize| correspondences.limbs[*limb].total_weight() + self.sites[*limb];
+            let mut measured = leg.ends.iter().map(weight).sum::<f64>();
+            for (limb, rotation) in [leg.lower, leg.upper].into_iter().zip(rotations.into_iter().rev()) {
+                measured += weight(&limb);
+                let fraction = to_rest(problem, LEG_TO_REST, (measured / FREE_WEIGHT).min(1.0));
+                self.rests[limb] = Rest { rotation, fraction };
+            }
+        }
+    }
+}
+
+/// Fraction of the way to its rest that a limb moves in a frame of which this fraction is measured, at `rate` where nothing is.
+fn to_rest(problem: &Problem, rate: f64, measured: f64) -> f64 {
+    ((1.0 - measured) * rate * problem.time_scale).min(1.0)
 }
 
 impl Stillness {

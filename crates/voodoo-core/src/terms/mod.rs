@@ -11,6 +11,7 @@ mod posture;
 mod prior;
 mod regions;
 mod sites;
+mod stance;
 mod surface;
 
 pub(crate) use contour::Contour;
@@ -20,9 +21,10 @@ pub(crate) use free_space::FreeSpace;
 pub(crate) use limits::Limits;
 pub(crate) use penetration::Penetration;
 pub(crate) use posture::Posture;
-pub(crate) use prior::Prior;
+pub(crate) use prior::{Prior, Rest};
 pub(crate) use regions::{Colors, Regions};
 pub(crate) use sites::{APART, Sites};
+pub(crate) use stance::Stance;
 pub(crate) use surface::{Surface, unexplained};
 
 use crate::association::correspondence::Correspondences;

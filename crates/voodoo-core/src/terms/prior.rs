@@ -9,8 +9,8 @@
 
 use super::Term;
 use super::surface::geman_mcclure;
-use crate::body::{Body, Joint};
-use crate::math::{Pose, Vec3, rotation_vector};
+use crate::body::Body;
+use crate::math::{Pose, Quat, Vec3, rotation_vector};
 use crate::terms::normal_equations::{NormalEquations, line};
 
 /// Deviation, in standard deviations of the expected motion, at which the stillness is a quarter: smaller ones count as noise.
@@ -29,8 +29,16 @@ pub(crate) struct Prior<'a> {
     pub joints: &'a [f64],
     /// Additional information of the root (first) and of each joint, as multiples of their information; empty for none.
     pub holds: &'a [f64],
-    /// Fraction by which the expected rotation of each joint is moved towards its rest rotation; empty for none.
-    pub rests: &'a [f64],
+    /// Where each joint rests when nothing shows it; empty for none.
+    pub rests: &'a [Rest],
+}
+
+/// The rotation of a limb relative to its parent that it takes when nothing shows it, and the fraction of the way to it from the
+/// prediction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rest {
+    pub rotation: Quat,
+    pub fraction: f64,
 }
 
 impl Prior<'_> {
@@ -43,7 +51,7 @@ impl Prior<'_> {
                 let (r, d) = self.root_deviation(poses);
                 fraction((r.length() / self.root[0]).hypot(d.length() / self.root[1]))
             }
-            Some((parent, joint)) => fraction(self.turn(poses, *parent, index, joint).length() / self.joints[index]),
+            Some((parent, _)) => fraction(self.turn(poses, *parent, index).length() / self.joints[index]),
         }));
     }
 
@@ -54,12 +62,10 @@ impl Prior<'_> {
     }
 
     /// Rotation from the expected to the current orientation of a limb relative to its parent, in the parent frame.
-    fn turn(&self, poses: &[Pose], parent: usize, limb: usize, joint: &Joint) -> Vec3 {
+    fn turn(&self, poses: &[Pose], parent: usize, limb: usize) -> Vec3 {
         let relative = |poses: &[Pose]| poses[parent].rotation.inverse() * poses[limb].rotation;
         let expected = match self.rests.get(limb) {
-            Some(fraction) if *fraction > 0.0 => {
-                relative(self.predicted).slerp(joint.parent_from_limb_at_rest().rotation, *fraction)
-            }
+            Some(rest) if rest.fraction > 0.0 => relative(self.predicted).slerp(rest.rotation, rest.fraction),
             _ => relative(self.predicted),
         };
         rotation_vector(relative(poses) * expected.inverse())
@@ -80,9 +86,9 @@ impl Term for Prior<'_> {
             block.g[i] += turn * r[i];
             block.add_row(shift, &line(poses[0].translation, axis), d[i]);
         }
-        for (index, parent, joint) in body.joints() {
+        for (index, parent, _) in body.joints() {
             // In world axes its derivative with respect to the relative rotation is one.
-            let r = poses[parent].rotation * self.turn(poses, parent, index, joint);
+            let r = poses[parent].rotation * self.turn(poses, parent, index);
             let weight = information(self.joints[index], hold(index));
             normal.joints[index].add_turn(weight, r);
             normal.cost += weight * r.length_squared();

@@ -9,11 +9,11 @@ use voodoo_core::association::correspondence::{
 };
 use voodoo_core::body::HumanModel;
 use voodoo_core::body::kinematics::exp;
-use voodoo_core::math::{Mat3, Pose, Vec3};
+use voodoo_core::math::{Mat3, Pose, Quat, Vec3};
 use voodoo_core::observation::frame::Ground;
 use voodoo_core::terms::normal_equations::NormalEquations;
 use voodoo_core::terms::{
-    Contour, DetectedJoints, Floor, Limits, Penetration, Posture, Prior, Regions, Sites, Surface, Term,
+    Contour, DetectedJoints, Floor, Limits, Penetration, Posture, Prior, Regions, Rest, Sites, Surface, Term,
 };
 
 /// Compares the analytic gradient with differences of the cost; `evaluate` fills the system at given poses. Where the cost has a
@@ -79,7 +79,11 @@ proptest! {
     fn prior(angles in angles(), other in angles(), hold in prop::sample::select(vec![0.0, 30.0])) {
         let body = Body::human(1.75, HumanModel::Full).unwrap();
         let predicted = random_pose(&body, &other);
-        let [sigmas, holds, rests] = [0.02, hold, 0.01].map(|value| vec![value; predicted.len()]);
+        let [sigmas, holds] = [0.02, hold].map(|value| vec![value; predicted.len()]);
+        let rests: Vec<Rest> = body.limbs().iter().map(|limb| {
+            let joint = limb.parent.as_ref().map(|(_, joint)| joint.parent_from_limb_at_rest());
+            Rest { rotation: joint.map_or(Quat::IDENTITY, |joint| joint.rotation), fraction: 0.01 }
+        }).collect();
         // Rotation errors beyond a small one make the linearized geodesic (R07 eq. 25) an approximation: stay near.
         let near: Vec<Pose> = predicted.iter().zip(random_pose(&body, &angles)).map(|(pose, push)| {
             *pose * Pose::new(0.02 * push.translation, 0.01 * push.translation)
