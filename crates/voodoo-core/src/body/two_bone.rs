@@ -82,7 +82,8 @@ impl TwoBone {
         let bends = hinge.limits.as_ref().map_or(1.0, |limits| limits.iter().flatten().sum::<f64>().signum());
         let straight = poses[*trunk].rotation * ball.parent_from_limb_at_rest().rotation;
         let axis = straight * hinge.parent_from_joint.rotation * (bends * hinge_axis(hinge));
-        let forward = axis.cross(floor.normal).normalize_or_zero();
+        // Who lies on a side has no direction to the front.
+        let Some(forward) = axis.cross(floor.normal).try_normalize() else { return [-floor.normal; 2] };
         let thickness = |end: &usize| 2.0 * body.limbs()[*end].shape.b0();
         let height = self.lengths[1] + self.ends.iter().map(thickness).fold(0.0, f64::max);
         let drop = ((floor.height(self.root(body, poses)) - height) / self.lengths[0]).clamp(-1.0, 1.0);
