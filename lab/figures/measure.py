@@ -121,13 +121,11 @@ def made_up(output: Output) -> dict[str, float]:
 
 
 def passed_by(output: Output) -> dict[str, float]:
-    """Speeds at which a joint was far off, and the frames of the only one if there is one."""
+    """Speeds at which the person was far off, and the frames of the worst."""
     rows = [[number(cell) for cell in row[1:5]] for row in output.rows if row[0].startswith("dev_")]
-    bad = [row for row in rows if row[3] > 0]
-    values: dict[str, float] = {"speeds": len(rows), "bad": len(bad)}
-    if len(bad) == 1:
-        values["bad_at"], _, values["tracking"], values["far"] = bad[0]
-    return values
+    speed, _, tracking, far = max(rows, key=lambda row: row[3])
+    bad = sum(row[3] > 0 for row in rows)
+    return {"speeds": len(rows), "bad": bad, "bad_at": speed, "tracking": tracking, "far": far}
 
 
 def changed(kind: str) -> Read:
