@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use super::*;
-use crate::Tracker;
 use crate::testing::{before_wall, farthest, moved, put_board, standing, with_frame};
+use crate::{Ground, Tracker};
 
 /// Returns a tracker that has tracked the standing body for three frames, and the image.
 fn tracking() -> (Tracker, Vec<u16>) {
@@ -110,4 +110,27 @@ fn a_lost_body_is_found_beside_its_place_and_no_board_of_its_size_is() {
     }
     let off = farthest(&tracker.estimate().world_from_limb, &aside);
     assert!(tracker.estimate().status == Status::Tracking && off < 0.05, "{off} m");
+}
+
+#[test]
+fn a_leg_that_a_board_hides_comes_to_stand_where_the_floor_is_known() {
+    let (model, poses) = standing();
+    let leg = model.extremities.iter().find(|chain| chain.leg).unwrap();
+    let mut pixels = before_wall(&model.body, &poses);
+    put_board(&mut pixels, Vec3::new(0.0, 0.65, 1.8), [1.2, 0.9]);
+    let mut bent = poses.clone();
+    leg.reach(&model.body, &mut bent, leg.root(&model.body, &poses) + Vec3::new(0.0, 0.4, 0.5), 0.0);
+    let ground = Ground { normal: -Vec3::Y, offset: -leg.end(&poses).y - 0.07 };
+    let tilt = |ground| {
+        let mut tracker = Tracker::new(model.body.clone(), Config::default()).unwrap();
+        tracker.reset_pose(&bent).unwrap();
+        for frame in 0..60 {
+            with_frame(&pixels, f64::from(frame) / 30.0, |frame| {
+                tracker.step(&Frame { ground, ..*frame }).unwrap();
+            });
+        }
+        (tracker.estimate().world_from_limb[leg.lower].rotation * Vec3::Z).angle_between(Vec3::Y)
+    };
+    let [known, unknown] = [Some(ground), None].map(tilt);
+    assert!(known < 0.3 && unknown > 0.8, "{known}, {unknown}");
 }
