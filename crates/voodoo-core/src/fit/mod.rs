@@ -307,9 +307,8 @@ fn problem<'a>(
     step: usize,
 ) -> Problem<'a> {
     let Context { config, model, observation, time_scale, .. } = context;
-    let (floor, by_colors) = (observation.floor(), context.compares_colors());
-    let (body, extremities) = (&model.body, model.extremities.as_slice());
-    Problem { body, extremities, correspondences, predicted, floor, step, time_scale, by_colors, config }
+    let (body, extremities, floor) = (&model.body, model.extremities.as_slice(), observation.floor());
+    Problem { body, extremities, correspondences, predicted, floor, step, time_scale, config }
 }
 
 #[cfg(test)]

@@ -78,8 +78,12 @@ impl LimbLabels {
     pub(super) fn make_room(&mut self, bits: u32, width: usize, height: usize) {
         let size = [width, height].map(|size| size.div_ceil(1 << bits));
         self.clear(bits, size);
+        // What is left of the last limb would be reserved on top.
+        self.sides.clear();
         self.sides.reserve(size[1]);
+        self.corners.clear();
         self.corners.reserve(2 * CORNERS.len());
+        self.hull.clear();
         self.hull.reserve(2 * CORNERS.len() + 1);
     }
 

@@ -51,8 +51,6 @@ pub(crate) struct Problem<'a> {
     pub step: usize,
     /// Time since the last frame, in units of 1/30 s; the standard deviations of motion grow with it.
     pub time_scale: f64,
-    /// Whether the colors of pixels compare poses, see [`Context::compares_colors`](crate::fit::Context::compares_colors).
-    pub by_colors: bool,
     /// Parameters.
     pub config: &'a Config,
 }

@@ -3,6 +3,7 @@
 use super::lengths::Lengths;
 use super::schedule::narrowed;
 use super::{ChainSolver, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
+use crate::association::correspondence::LimbMatches;
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
@@ -16,10 +17,10 @@ const ROUGH: f64 = 0.35;
 /// From this step on, a remaining deviation from the prediction may be noise; in earlier steps the points are still being
 /// matched.
 const STILL_FROM: usize = 3;
-/// Over-relaxation: where points are measured, every step of a frame but the last is scaled by this factor. Closest points move
+/// Over-relaxation: where points are measured, every step of a frame but the last is longer by this fraction. Closest points move
 /// with the body, so the linear system yields only a part of the way (P. Besl and N. McKay, "A Method for Registration of 3-D
-/// Shapes", IEEE PAMI 1992, whose accelerated steps also extrapolate along a line).
-const OVER_RELAXATION: f64 = 1.4;
+/// Shapes", IEEE PAMI 1992, whose accelerated steps also extrapolate along a line). Edges of color do not.
+const OVER_RELAXATION: f64 = 0.4;
 /// Weight of matched patches from which a limb moves freely. With less, its expected motion is reduced in proportion, down to
 /// the fraction below.
 const FREE_WEIGHT: f64 = 20.0;
@@ -29,8 +30,6 @@ const HIDDEN_MOTION: f64 = 0.1;
 const TO_REST: f64 = 0.1;
 /// The same for a leg, which swings while its person walks: half of the way in three quarters of a second.
 const LEG_TO_REST: f64 = 0.03;
-/// Minimum expected motion of a joint where colors compare poses, radians: no points hold a wrong shoulder there.
-const LEAST_MOTION: f64 = 0.1;
 /// Information that damps the relative change of a length in one frame, and information that pulls it towards the configured
 /// length.
 pub(crate) const LENGTH_INFORMATION: [f64; 2] = [1e4, 5e2];
@@ -57,6 +56,8 @@ pub(crate) struct WholeBody {
     sites: Vec<f64>,
     /// Weight of the color edges on each limb.
     edges: Vec<f64>,
+    /// Fraction of points in the weight of points and color edges, 1 without any.
+    points: f64,
     /// Bounding sphere of each limb.
     spheres: Vec<(Vec3, f64)>,
     stillness: Stillness,
@@ -73,8 +74,8 @@ struct Stillness {
 impl Solver for WholeBody {
     fn solve(&mut self, problem: &Problem, poses: &mut [Pose]) {
         self.sum_terms(problem, poses, true);
-        let follows = problem.step + 1 < problem.config.max_steps && !problem.by_colors;
-        let stride = if follows { OVER_RELAXATION } else { 1.0 };
+        let follows = problem.step + 1 < problem.config.max_steps;
+        let stride = if follows { 1.0 + self.points * OVER_RELAXATION } else { 1.0 };
         match &mut self.tree {
             Some(tree) => tree.step(problem.body, &self.normal, stride, problem.config.band_sigma, poses),
             None => self.chain.step(problem.body, &self.normal, stride, poses),
@@ -138,7 +139,7 @@ impl WholeBody {
             biased.then_some(&detected),
             Some(&prior),
             config.limits.then_some(&limits),
-            problem.by_colors.then_some(&posture),
+            Some(&posture),
             config.penetration.then_some(&penetration),
             floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
         ];
@@ -166,17 +167,18 @@ impl WholeBody {
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
+        let points: f64 = problem.correspondences.limbs.iter().map(LimbMatches::total_weight).sum();
+        let edges: f64 = self.edges.iter().sum();
+        self.points = if edges > 0.0 { points / (points + edges) } else { 1.0 };
         self.joint_sigmas.clear();
         self.rests.clear();
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
-            let motion = if problem.by_colors { motion.max(LEAST_MOTION) } else { motion };
             // A limb that is hardly visible stays near its prediction: a few stray points must not move it.
             let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
             let measured_fraction = (measured / FREE_WEIGHT).min(1.0);
-            let end = part.match_caps[1] && !problem.by_colors;
             let joint = part.parent.as_ref().map(|(_, joint)| joint);
-            let rests = end && joint.is_some_and(|joint| joint.kind() == JointKind::Elliptic);
+            let rests = part.match_caps[1] && joint.is_some_and(|joint| joint.kind() == JointKind::Elliptic);
             self.rests.push(Rest {
                 rotation: joint.map_or(Quat::IDENTITY, |joint| joint.parent_from_limb_at_rest().rotation),
                 fraction: if rests { to_rest(problem, TO_REST, measured_fraction) } else { 0.0 },
@@ -190,15 +192,15 @@ impl WholeBody {
     /// Lets legs that nothing shows stand or sit on the floor.
     fn rest_legs(&mut self, problem: &Problem) {
         let Problem { body, extremities, correspondences, predicted, .. } = problem;
-        let Some(floor) = problem.floor.filter(|_| problem.config.penetration && !problem.by_colors) else { return };
+        let Some(floor) = problem.floor.filter(|_| problem.config.penetration) else { return };
         for leg in extremities.iter().filter(|chain| chain.leg) {
             let trunk = body.parent(leg.upper).map_or(Quat::IDENTITY, |trunk| predicted[trunk].rotation);
             let rotations = leg.turned(body, trunk, leg.standing(body, predicted, floor));
-            let weight = |limb: &usize| correspondences.limbs[*limb].total_weight() + self.sites[*limb];
-            let mut measured = leg.ends.iter().map(weight).sum::<f64>();
+            let shown = |limb: &usize| correspondences.limbs[*limb].total_weight() + self.edges[*limb];
+            let mut measured = leg.ends.iter().map(shown).sum::<f64>();
             for (limb, rotation) in [leg.lower, leg.upper].into_iter().zip(rotations.into_iter().rev()) {
-                measured += weight(&limb);
-                let fraction = to_rest(problem, LEG_TO_REST, (measured / FREE_WEIGHT).min(1.0));
+                measured += shown(&limb);
+                let fraction = to_rest(problem, LEG_TO_REST, ((measured + self.sites[limb]) / FREE_WEIGHT).min(1.0));
                 self.rests[limb] = Rest { rotation, fraction };
             }
         }
