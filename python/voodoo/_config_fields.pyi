@@ -106,8 +106,8 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     limits: bool = True
     """Penalize joint angles outside their limits (whole-body solvers)."""
     penetration: bool = True
-    """Push the axes of limbs out of other limbs that they are not joined to, and their ends above the ground
-    plane if it is known (whole-body solvers).
+    """Push the axes of limbs out of other limbs that they are not joined to, and, if the ground plane is known,
+    their ends above it; hidden legs stand or sit on it (whole-body solvers).
     """
     fit_girths: bool = True
     """After a reset with fitted sizes, also fit the girths to the points of the first frame."""
