@@ -3,7 +3,6 @@
 use super::lengths::Lengths;
 use super::schedule::narrowed;
 use super::{ChainSolver, Gate, LIMIT_SIGMA, Problem, Schedule, Solver, TreeSolver, WarmStart};
-use crate::association::correspondence::LimbMatches;
 use crate::body::{JointKind, Pair};
 use crate::config::Config;
 use crate::math::{Pose, Quat, Vec3, refill, reset};
@@ -167,15 +166,15 @@ impl WholeBody {
         for pair in &problem.correspondences.regions {
             self.edges[pair.limb] += pair.information / information;
         }
-        let points: f64 = problem.correspondences.limbs.iter().map(LimbMatches::total_weight).sum();
-        let edges: f64 = self.edges.iter().sum();
-        self.points = if edges > 0.0 { points / (points + edges) } else { 1.0 };
         self.joint_sigmas.clear();
         self.rests.clear();
+        let mut all_points = 0.0;
         for (limb, part) in problem.body.limbs().iter().enumerate() {
             let motion = part.parent.as_ref().map_or(1.0, |(_, joint)| joint.motion);
+            let points = problem.correspondences.limbs[limb].total_weight();
+            all_points += points;
             // A limb that is hardly visible stays near its prediction: a few stray points must not move it.
-            let measured = problem.correspondences.limbs[limb].total_weight() + self.sites[limb] + self.edges[limb];
+            let measured = points + self.sites[limb] + self.edges[limb];
             let measured_fraction = (measured / FREE_WEIGHT).min(1.0);
             let joint = part.parent.as_ref().map(|(_, joint)| joint);
             let rests = part.match_caps[1] && joint.is_some_and(|joint| joint.kind() == JointKind::Elliptic);
@@ -186,6 +185,8 @@ impl WholeBody {
             let measured_fraction = measured_fraction.max(HIDDEN_MOTION);
             self.joint_sigmas.push(motion * measured_fraction * problem.time_scale * problem.config.motion_scale);
         }
+        let edges: f64 = self.edges.iter().sum();
+        self.points = if edges > 0.0 { all_points / (all_points + edges) } else { 1.0 };
         self.rest_legs(problem);
     }
 
