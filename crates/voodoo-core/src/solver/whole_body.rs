@@ -138,7 +138,7 @@ impl WholeBody {
             biased.then_some(&detected),
             Some(&prior),
             config.limits.then_some(&limits),
-            (self.points == 0.0).then_some(&posture),
+            Some(&posture),
             config.penetration.then_some(&penetration),
             floor.as_ref().filter(|_| config.penetration).map(|floor| floor as &dyn Term),
         ];

@@ -1,8 +1,8 @@
 //! Rest posture: pulls joints with a small range of motion towards their rest position.
 //!
-//! The errors of color edges are correlated, and two cameras on opposite sides give almost no evidence for a rotation about
-//! their line of sight. Without this term, the pelvis rotates and the spine twists a little farther with every frame, and
-//! nothing pulls them back.
+//! Depth from one side gives little evidence for a twist of the spine, and two cameras on opposite sides almost none for a
+//! rotation about their line of sight, while errors of neighboring measurements are correlated. Without this term, the pelvis
+//! rotates and the spine twists a little farther with every frame, and nothing pulls them back.
 
 use super::Term;
 use super::limits::add_angles;
