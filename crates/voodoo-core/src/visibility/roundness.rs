@@ -11,11 +11,11 @@ use crate::visibility::EXPLAINED;
 use crate::visibility::surface::surface_rows;
 
 /// Returns how far the observed surface recedes between the middle of limbs and their rims, relative to the model: approximately
-/// one on a body, zero on a plane; `None` when the images show too little of it.
+/// one on a body, zero on a plane: the sums of the least-squares factor's numerator and denominator, m^2.
 ///
-/// The result is the least-squares factor between both over all sections where the middle and the rims are observed near the
-/// model. The two rims are averaged, so that the direction of a limb relative to the camera has no effect.
-pub(crate) fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Option<f64> {
+/// The factor is between both over all sections where the middle and the rims are observed near the model. The two rims are
+/// averaged, so that the direction of a limb relative to the camera has no effect.
+pub(crate) fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> [f64; 2] {
     let (mut product, mut square) = (0.0, 0.0);
     for view in views.iter() {
         let camera_from_working = view.working_from_camera.inverse();
@@ -34,5 +34,5 @@ pub(crate) fn roundness(views: DepthViews, body: &Body, poses: &[Pose]) -> Optio
             }
         }
     }
-    (square > 0.0).then(|| product / square)
+    [product, square]
 }

@@ -38,8 +38,11 @@ use exclusive::Exclusive;
 use limb_filter::LimbFilter;
 use two_state::{EVEN, all_log_odds, any_log_odds, probability, support_log_odds};
 
-/// Weight of past frames in the running mean of the roundness: a single blurred frame must not make the body flat.
+/// Weight of past frames in the sums of the roundness: a single blurred frame must not make the body flat.
 const ROUNDNESS_MEMORY: f64 = 0.9;
+/// Sums with which a round body begins, m^2: those of ten frames of a whole body for a pose that the user set, and those of a
+/// hand's breadth for any other, because a body of whom hardly anything shows is not flat.
+const ROUND: [f64; 2] = [0.15, 0.001];
 /// Limits for the fraction of limbs. A tracked body has at most this fraction not measured. A body is lost if less than this
 /// fraction is measured, or, where the root is not measured, less than twice this fraction.
 const SOME: f64 = 0.25;
@@ -56,8 +59,8 @@ const MISSED: f64 = 0.15;
 #[derive(Debug, Default)]
 pub(super) struct Assessor {
     limbs: Vec<LimbFilter>,
-    /// Running mean of the roundness of the surface observed at the tracked pose.
-    round: Option<f64>,
+    /// Sums of the roundness of the surface observed at the tracked pose.
+    round: [f64; 2],
     /// Internal status of the body and of its limbs, which the tracker itself uses; `internal` is empty before the first frame.
     status: Status,
     internal: Vec<LimbStatus>,
@@ -79,7 +82,7 @@ impl Assessor {
     pub(super) fn trust_pose(&mut self) {
         self.forget_limbs();
         self.status = Status::Tracking;
-        self.round = Some(1.0);
+        self.round = [ROUND[0]; 2];
     }
 
     /// Restarts the assessment after an edit of the limbs; the body keeps the reported `status`.
@@ -91,13 +94,13 @@ impl Assessor {
     /// Restarts the evidence after the body was moved: only the current frame counts at the new position.
     pub(super) fn moved(&mut self) {
         self.limbs.clear();
-        self.round = None;
+        self.round = [ROUND[1]; 2];
     }
 
     /// Starts with a pose that the user did not set: the evidence of the current frame decides.
     pub(super) fn distrust_pose(&mut self) {
         self.forget_limbs();
-        self.round = None;
+        self.round = [ROUND[1]; 2];
     }
 
     /// Whether the last assessment found the body not tracked or one of its limbs lost.
@@ -149,11 +152,12 @@ impl Assessor {
             }
         }
         self.status = overall(internal, |limb| limbs[limb].is_visible());
-        if let Some(now) = roundness(context.observation.views, &context.model.body, matched.poses) {
-            let mixed = |before: f64| ROUNDNESS_MEMORY * before + (1.0 - ROUNDNESS_MEMORY) * now;
-            self.round = Some(self.round.map_or(now, mixed));
+        let [product, square] = roundness(context.observation.views, &context.model.body, matched.poses);
+        if square > 0.0 {
+            let [products, squares] = self.round.map(|sum| ROUNDNESS_MEMORY * sum);
+            self.round = [products + product, squares + square];
         }
-        if self.round.is_some_and(|round| round < LITTLE) {
+        if self.round[0] < LITTLE * self.round[1] {
             self.give_up();
         }
     }
