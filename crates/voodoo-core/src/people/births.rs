@@ -12,6 +12,7 @@ use crate::math::{Pose, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
+use crate::relocalize::distance_sigma;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
 const DETECT_EVERY: f64 = 0.06;
@@ -36,11 +37,40 @@ impl People {
             }
         }
         self.detect_new(frame);
-        let confirmed = self.tentative.take_confirmed(frame.stamp);
+        let mut confirmed = self.tentative.take_confirmed(frame.stamp);
+        confirmed.retain(|track| !self.is_part_of_tracked(frame, track));
         self.refusal = self.tentative.greatest_at(frame.stamp).map(|log_odds| Refusal::Doubtful { log_odds });
         if !confirmed.is_empty() {
             self.associate(frame, &confirmed);
         }
+    }
+
+    /// Whether a tentative track is a part of a person who is tracked beside it: their pixels and its own, taken together, are
+    /// detected as one person who is where that person is.
+    fn is_part_of_tracked(&mut self, frame: &Frame, track: &TentativeTrack) -> bool {
+        let Some(image) = frame.images.get(track.image).filter(|_| !track.detection.pixels.is_empty()) else {
+            return false;
+        };
+        let beside =
+            self.tracked_except(None).into_iter().filter(|(_, place)| place.distance(track.place) < SAME_PERSON);
+        let nearest = beside.min_by(|a, b| a.1.distance(track.place).total_cmp(&b.1.distance(track.place)));
+        let Some((number, place)) = nearest else { return false };
+        self.assignment.release_newcomers(self.persons.len());
+        let around = Surroundings {
+            ground: frame.ground,
+            excluded: frame.excluded,
+            owners: &self.assignment.owners()[track.image],
+            own: Some(number as u16),
+            ..Surroundings::default()
+        };
+        let found = self.detector.detect(&self.prototype, image, &around, DetectionQuery::Near(track.place));
+        found.into_iter().next().is_some_and(|mut found| {
+            let both = &mut found.detection.pixels;
+            both.sort_unstable();
+            let shared = track.detection.pixels.iter().filter(|pixel| both.binary_search(pixel).is_ok()).count();
+            shared as f64 > (1.0 - LEFT_OVER) * track.detection.pixels.len() as f64
+                && found.root.distance(place) < found.root.distance(track.place)
+        })
     }
 
     /// Detects persons in pixels that no person explains, if it is time to.
@@ -336,8 +366,6 @@ fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
 const FIRST: f64 = 1e-6;
 /// Cost of a new person in the assignment, nats.
 pub(super) const NEW: f64 = 4.0;
-/// Distance that a person may move, meters: at once, and in addition per second.
-const COMES: [f64; 2] = [0.4, 1.2];
 /// Extent of the area in which somebody else may appear, meters.
 const APPEARS: f64 = 4.0;
 /// Mean and standard deviation of the clothes distance between two views of one person.
@@ -348,9 +376,9 @@ const LIKE_CLOTHES: f64 = 3.0;
 /// Returns the cost of a person's having moved to a position, nats: by the density there of where they may be by now, and of where
 /// somebody else may appear.
 pub(super) fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
-    let reach = COMES[0] + COMES[1] * (stamp - person.last_tracked);
-    let far = person.place.distance(place) / reach;
-    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far + 2.0 * (reach / APPEARS).min(1.0).ln() }
+    let sigma = distance_sigma(stamp - person.last_tracked);
+    let far = person.place.distance(place) / sigma;
+    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far + 2.0 * (sigma / APPEARS).min(1.0).ln() }
 }
 
 /// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.

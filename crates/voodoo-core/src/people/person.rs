@@ -35,6 +35,9 @@ pub(super) struct Person {
     /// Stamps of the first and of the last tracked frame, seconds.
     pub(super) created: f64,
     pub(super) last_tracked: f64,
+    /// How far the lost person is from being absent, from 0 to 1, and the stamp up to which this was counted, seconds.
+    absence: f64,
+    counted: f64,
     /// Last tracked position of the root, world frame.
     pub(super) place: Vec3,
     /// Natural logarithm of the detected stature and its variance: the mean of all detections, weighted by their variances.
@@ -64,6 +67,8 @@ impl Person {
             stays: false,
             created: stamp,
             last_tracked: stamp,
+            absence: 0.0,
+            counted: f64::NEG_INFINITY,
             place: Vec3::ZERO,
             stature: None,
             clothes: Clothes::default(),
@@ -101,7 +106,9 @@ impl Person {
     /// Updates the person after the tracker's step. A person who has been lost for too long becomes absent.
     pub(super) fn update(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let estimate = self.tracker.estimate();
+        let elapsed = frame.stamp - std::mem::replace(&mut self.counted, frame.stamp);
         if self.is_tracked() {
+            self.absence = 0.0;
             self.last_tracked = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
             // Half the interval makes the updates of all persons coincide, so that they need a single picture.
@@ -123,7 +130,8 @@ impl Person {
             Presence::Outside => OUTSIDE,
             Presence::Gone => LEAVES,
         };
-        self.present &= frame.stamp - self.last_tracked < patience;
+        self.absence += elapsed / patience;
+        self.present &= self.absence < 1.0;
     }
 
     /// Returns whether most sites of the lost person are hidden, outside of the images, or neither.

@@ -69,6 +69,15 @@ impl PixelAssignment {
         owners.filter(|owner| usize::from(**owner) == number).for_each(|owner| *owner = NO_OWNER);
     }
 
+    /// Releases the pixels of all bodies whose number is this or a greater one.
+    pub(super) fn release_newcomers(&mut self, first: usize) {
+        self.owners
+            .iter_mut()
+            .flatten()
+            .filter(|owner| usize::from(**owner) >= first)
+            .for_each(|owner| *owner = NO_OWNER);
+    }
+
     /// Assigns every foreground pixel and every free point to the body with the nearest surface, within reach.
     pub(super) fn assign<'a>(
         &mut self,

@@ -22,6 +22,16 @@ const FALSE_TRACK_ODDS: f64 = 12.0;
 /// of a tracked person contributes more.
 pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 
+/// Standard deviation of the distance between a detection and the place where the same person was tracked last, meters: of both
+/// places, and of what a person moves in a second.
+const DISTANCE_SIGMA: [f64; 2] = [0.2, 1.2];
+
+/// Returns the standard deviation of the distance between a detection and the place where the same person was tracked `elapsed`
+/// seconds before, meters. A person is not detected farther away than twice this.
+pub(crate) fn distance_sigma(elapsed: f64) -> f64 {
+    DISTANCE_SIGMA[0] + DISTANCE_SIGMA[1] * elapsed
+}
+
 /// What the frame before gave as reasons to run the detector.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Reasons {

@@ -6,6 +6,7 @@ use crate::body::Body;
 use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings,
 };
+use crate::math::Vec3;
 use crate::observation::frame::{Frame, Ground};
 use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
@@ -80,6 +81,11 @@ impl PersonDetector {
         self.detection = Some(detection);
     }
 
+    /// Clears the detection if it is farther than this from a position, world frame, meters.
+    pub(super) fn forget_beyond(&mut self, root: Vec3, distance: f64) {
+        self.detection.take_if(|detection| detection.root.distance(root) > distance);
+    }
+
     /// Clears the detection.
     pub(super) fn forget(&mut self) {
         (self.detection, self.person_odds) = (None, None);
@@ -125,7 +131,6 @@ mod tests {
     use super::*;
     use crate::body::HumanModel;
     use crate::detect::{DetectedJoint, Detection};
-    use crate::math::Vec3;
 
     #[test]
     fn a_plane_at_the_ankles_is_the_floor_and_one_at_another_height_is_not() {
