@@ -78,6 +78,19 @@ def test_who_enters_while_somebody_is_hidden_gets_an_id_of_their_own():
     assert max(each.min() for each in away.values()) < 0.2
 
 
+def test_who_is_hidden_does_not_move_to_who_enters():
+    """The first of four is 9 % in view in the frame in which the last one comes in 1.7 m aside."""
+    recording = four(155)
+    *_, last = islice(track(recording, voodoo.People()), 41)
+    truth = recording.people
+    row = np.abs(truth.stamps - last.estimate.stamp).argmin()
+    assert 0.05 < truth.in_view[row, 0] < 0.1 and truth.in_view[row, 3] >= 0.5
+    first = next((person for person in last.estimate if person.id == 1), None)
+    if first is not None:
+        away = first.estimate.joints["humanoid_root"] - truth.of("humanoid_root")[row, 0]
+        assert np.linalg.norm(away) < 0.3
+
+
 def test_what_is_measured_of_one_person_is_theirs(someone):
     people = voodoo.People()
     assert people.add(STANDING, fit_sizes=False) == 1
