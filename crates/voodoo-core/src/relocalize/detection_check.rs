@@ -118,7 +118,12 @@ impl DetectionCheck {
 
     /// Whether a detection or a second of tracking confirmed the track.
     pub(super) fn is_confirmed(&self, stamp: f64) -> bool {
-        self.auto_initialized || self.confirmed || !self.is_new(stamp)
+        self.is_detected() || !self.is_new(stamp)
+    }
+
+    /// Whether a detection confirmed the track.
+    pub(super) fn is_detected(&self) -> bool {
+        self.auto_initialized || self.confirmed
     }
 
     /// Whether the detection of this frame is compared with the pose. For a new track only some detections are, because a

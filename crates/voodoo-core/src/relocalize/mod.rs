@@ -117,6 +117,11 @@ impl Relocalizer {
         self.check.confirm();
     }
 
+    /// Whether a detection confirmed the track.
+    pub(crate) fn is_detected(&self) -> bool {
+        self.check.is_detected()
+    }
+
     /// Whether the track was started less than a second ago.
     pub(crate) fn is_new(&self, stamp: f64) -> bool {
         self.check.is_new(stamp)

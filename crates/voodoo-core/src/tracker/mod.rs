@@ -256,7 +256,7 @@ impl BodyTracker {
             relocalizer.forget();
         } else {
             relocalizer.detect(&model.body, frame, ownership, root, reasons);
-            if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.is_confirmed(frame.stamp)) {
+            if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.is_detected()) {
                 // Farther away it is somebody else.
                 relocalizer.forget_beyond(root, 2.0 * distance_sigma(frame.stamp - last));
             }

@@ -40,9 +40,9 @@ use two_state::{EVEN, all_log_odds, any_log_odds, probability, support_log_odds}
 
 /// Weight of past frames in the sums of the roundness: a single blurred frame must not make the body flat.
 const ROUNDNESS_MEMORY: f64 = 0.9;
-/// Sums with which a round body begins, m^2: those of ten frames of a whole body for a pose that the user set, and those of a
-/// hand's breadth for any other, because a body of whom hardly anything shows is not flat.
-const ROUND: [f64; 2] = [0.15, 0.001];
+/// Sums with which a round body begins, m^2: those of ten frames of a whole body for a pose that the user set, and those of one
+/// section of a trunk for any other, because a body of whom hardly anything shows is not flat.
+const ROUND: [f64; 2] = [0.15, 0.0003];
 /// Limits for the fraction of limbs. A tracked body has at most this fraction not measured. A body is lost if less than this
 /// fraction is measured, or, where the root is not measured, less than twice this fraction.
 const SOME: f64 = 0.25;
