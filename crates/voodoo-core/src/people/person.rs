@@ -35,7 +35,7 @@ pub(super) struct Person {
     /// Stamps of the first and of the last tracked frame, seconds.
     pub(super) created: f64,
     pub(super) last_tracked: f64,
-    /// How far the lost person is from being absent, from 0 to 1, and the stamp up to which this was counted, seconds.
+    /// Fraction of the time after which the lost person becomes absent, and the stamp up to which it was counted, seconds.
     absence: f64,
     counted: f64,
     /// Last tracked position of the root, world frame.
@@ -106,9 +106,7 @@ impl Person {
     /// Updates the person after the tracker's step. A person who has been lost for too long becomes absent.
     pub(super) fn update(&mut self, frame: &Frame, ownership: OwnershipMask) {
         let estimate = self.tracker.estimate();
-        let elapsed = frame.stamp - std::mem::replace(&mut self.counted, frame.stamp);
         if self.is_tracked() {
-            self.absence = 0.0;
             self.last_tracked = frame.stamp;
             self.place = estimate.world_from_limb.first().map_or(self.place, |root| root.translation);
             // Half the interval makes the updates of all persons coincide, so that they need a single picture.
@@ -130,7 +128,11 @@ impl Person {
             Presence::Outside => OUTSIDE,
             Presence::Gone => LEAVES,
         };
-        self.absence += elapsed / patience;
+        if self.last_tracked >= self.counted {
+            (self.absence, self.counted) = (0.0, self.last_tracked);
+        }
+        self.absence += (frame.stamp - self.counted) / patience;
+        self.counted = frame.stamp;
         self.present &= self.absence < 1.0;
     }
 
