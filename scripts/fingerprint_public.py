@@ -43,7 +43,7 @@ def virtual(solver: str, model: str, speed: str, inputs: str, threads: str) -> N
             depth[:] = WALL_M  # nobody is seen, and then again
         if "depth" in inputs:
             image = np.rint(1000.0 * depth).astype(np.uint16)
-            frame.add_depth(image, camera=CAMERA, metres_per_unit=0.001, world_from_sensor=WORLD_FROM_SENSOR)
+            frame.add_depth(image, camera=CAMERA, meters_per_unit=0.001, world_from_sensor=WORLD_FROM_SENSOR)
         if "points" in inputs:
             row, column = np.nonzero((seen > 0.0) & (rng.random(seen.shape) < 0.3))
             z = depth[row, column]
