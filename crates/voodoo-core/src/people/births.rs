@@ -12,7 +12,6 @@ use crate::math::{Pose, Vec3};
 use crate::observation::background::Background;
 use crate::observation::frame::{DepthImage, Frame, PositionRelation};
 use crate::observation::ownership::NO_OWNER;
-use crate::relocalize::distance_sigma;
 
 /// Shortest time between two detections in pixels that no person explains, seconds, while anybody is tracked.
 const DETECT_EVERY: f64 = 0.06;
@@ -55,7 +54,7 @@ impl People {
             self.tracked_except(None).into_iter().filter(|(_, place)| place.distance(track.place) < SAME_PERSON);
         let nearest = beside.min_by(|a, b| a.1.distance(track.place).total_cmp(&b.1.distance(track.place)));
         let Some((number, place)) = nearest else { return false };
-        self.assignment.release_newcomers(self.persons.len());
+        self.assignment.release(self.persons.len()..);
         let around = Surroundings {
             ground: frame.ground,
             excluded: frame.excluded,
@@ -366,24 +365,14 @@ fn sites_of(positions: &[PositionRelation]) -> Vec<(usize, Vec3)> {
 const FIRST: f64 = 1e-6;
 /// Cost of a new person in the assignment, nats.
 pub(super) const NEW: f64 = 4.0;
-/// Extent of the area in which somebody else may appear, meters.
-const APPEARS: f64 = 4.0;
 /// Mean and standard deviation of the clothes distance between two views of one person.
 const CLOTHES: [f64; 2] = [0.10, 0.07];
 /// Evidence of equal clothes for the same person, nats.
 const LIKE_CLOTHES: f64 = 3.0;
 
-/// Returns the cost of a person's having moved to a position, nats: by the density there of where they may be by now, and of where
-/// somebody else may appear.
-pub(super) fn distance_cost(person: &Person, place: Vec3, stamp: f64) -> f64 {
-    let sigma = distance_sigma(stamp - person.last_tracked);
-    let far = person.place.distance(place) / sigma;
-    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far + 2.0 * (sigma / APPEARS).min(1.0).ln() }
-}
-
 /// Returns the cost of assigning a tentative track to this person, nats; `size` is the part from the person's stature.
 fn person_cost(person: &Person, size: f64, track: &TentativeTrack, clothes: &Clothes, stamp: f64) -> f64 {
-    let far = distance_cost(person, track.place, stamp);
+    let far = person.distance_cost(track.place, stamp);
     // Clothes of which a part is visible, or at a wrong pose, may be far off: linear beyond a standard deviation.
     let color = person.clothes.distance(clothes).map_or(0.0, |distance| {
         let off = ((distance - CLOTHES[0]) / CLOTHES[1]).max(0.0);

@@ -23,7 +23,7 @@ use crate::math::Vec3;
 use crate::observation::frame::{DetectedPerson, Frame, PositionRelation};
 use crate::threads::Threads;
 use crate::tracker::BodyTracker;
-use births::{NEW, distance_cost};
+use births::NEW;
 pub use options::PeopleOptions;
 use person::Person;
 use pixel_assignment::{PixelAssignment, PredictedBody};
@@ -143,7 +143,7 @@ impl People {
         person.tracker.reset(positions, fit_sizes)?;
         person.present = true;
         person.place = person.tracker.estimate().world_from_limb.first().map_or(Vec3::ZERO, |root| root.translation);
-        let far = |known: &Person| distance_cost(known, person.place, stamp);
+        let far = |known: &Person| known.distance_cost(person.place, stamp);
         let known = self.persons.iter_mut().filter(|known| !known.is_tracked() && far(known) < NEW);
         if let Some(known) = known.min_by(|a, b| far(a).total_cmp(&far(b))) {
             known.tracker.reset(positions, false)?;
@@ -197,7 +197,7 @@ impl People {
             self.scene.learn(frame, self.assignment.owners());
         }
         for number in (0..self.persons.len()).filter(|number| !self.persons[*number].is_tracked()) {
-            self.assignment.release(number);
+            self.assignment.release(number..=number);
         }
         self.prune_tracks();
         self.find_new(frame, &shown);

@@ -8,6 +8,7 @@ use crate::error::TrackError;
 use crate::math::{Pose, Vec3};
 use crate::observation::frame::Frame;
 use crate::observation::ownership::OwnershipMask;
+use crate::relocalize::distance_cost;
 use crate::tracker::BodyTracker;
 use crate::tracker::estimate::Status;
 
@@ -95,6 +96,11 @@ impl Person {
             let gain = before / (before + variance);
             [known + gain * (log_stature - known), before.min(variance)]
         }));
+    }
+
+    /// Returns the cost of the person's being at a position, nats.
+    pub(super) fn distance_cost(&self, place: Vec3, stamp: f64) -> f64 {
+        distance_cost(self.place.distance(place), stamp - self.last_tracked)
     }
 
     /// Returns the cost of the detected stature for this person, nats.

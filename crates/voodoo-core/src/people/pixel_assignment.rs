@@ -1,5 +1,7 @@
 //! Assigns each pixel and each free point of a frame to the person whose surface explains it.
 
+use std::ops::RangeBounds;
+
 use crate::body::Body;
 use crate::math::{Aabb, Points, Pose, Vec3, shifted};
 use crate::observation::background::{Background, Backgrounds};
@@ -60,22 +62,13 @@ impl PixelAssignment {
         owners.filter(|owner| usize::from(**owner) == number).count()
     }
 
-    /// Releases the pixels and free points that are assigned to a person.
-    pub(super) fn release(&mut self, number: usize) {
-        if !self.assigned.iter().any(|assigned| usize::from(*assigned) == number) {
-            return;
+    /// Releases the pixels and free points that are assigned to the bodies with these numbers.
+    pub(super) fn release(&mut self, numbers: impl RangeBounds<usize>) {
+        let is_released = |owner: &u16| numbers.contains(&usize::from(*owner));
+        if self.assigned.iter().any(is_released) {
+            let owners = self.owners.iter_mut().chain(&mut self.cloud_owners).flatten();
+            owners.filter(|owner| is_released(owner)).for_each(|owner| *owner = NO_OWNER);
         }
-        let owners = self.owners.iter_mut().chain(&mut self.cloud_owners).flatten();
-        owners.filter(|owner| usize::from(**owner) == number).for_each(|owner| *owner = NO_OWNER);
-    }
-
-    /// Releases the pixels of all bodies whose number is this or a greater one.
-    pub(super) fn release_newcomers(&mut self, first: usize) {
-        self.owners
-            .iter_mut()
-            .flatten()
-            .filter(|owner| usize::from(**owner) >= first)
-            .for_each(|owner| *owner = NO_OWNER);
     }
 
     /// Assigns every foreground pixel and every free point to the body with the nearest surface, within reach.

@@ -26,10 +26,16 @@ pub(crate) const ENOUGH_ODDS: f64 = 4.0;
 /// places, and of what a person moves in a second.
 const DISTANCE_SIGMA: [f64; 2] = [0.2, 1.2];
 
-/// Returns the standard deviation of the distance between a detection and the place where the same person was tracked `elapsed`
-/// seconds before, meters. A person is not detected farther away than twice this.
-pub(crate) fn distance_sigma(elapsed: f64) -> f64 {
-    DISTANCE_SIGMA[0] + DISTANCE_SIGMA[1] * elapsed
+/// Extent of the area in which somebody else may appear, meters.
+const APPEARS: f64 = 4.0;
+
+/// Returns the cost of a person's being detected `distance` meters from where they were tracked `elapsed` seconds before, nats: by
+/// the density there of where they may be by now, and of where somebody else may appear. Beyond two standard deviations it is
+/// infinite: that is somebody else.
+pub(crate) fn distance_cost(distance: f64, elapsed: f64) -> f64 {
+    let sigma = DISTANCE_SIGMA[0] + DISTANCE_SIGMA[1] * elapsed;
+    let far = distance / sigma;
+    if far > 2.0 { f64::INFINITY } else { 0.5 * far * far + 2.0 * (sigma / APPEARS).min(1.0).ln() }
 }
 
 /// What the frame before gave as reasons to run the detector.

@@ -23,7 +23,7 @@ use crate::observation::observer::Own;
 use crate::observation::ownership::OwnershipMask;
 use detection_check::{DetectionCheck, SIGMAS};
 pub(crate) use detection_check::{DetectionVerdict, Reasons};
-pub(crate) use detection_check::{ENOUGH_ODDS, distance_sigma, trunk_is_elsewhere};
+pub(crate) use detection_check::{ENOUGH_ODDS, distance_cost, trunk_is_elsewhere};
 pub(crate) use loss_monitor::FrameOutcome;
 use loss_monitor::LossMonitor;
 use person_detector::PersonDetector;
@@ -171,9 +171,10 @@ impl Relocalizer {
         }
     }
 
-    /// Drops the detection of this frame if it is farther than this from a position, world frame, meters.
-    pub(crate) fn forget_beyond(&mut self, root: Vec3, distance: f64) {
-        self.people.forget_beyond(root, distance);
+    /// Drops the detection of this frame if it is too far from a position, world frame, to be of a person who was tracked `elapsed`
+    /// seconds before.
+    pub(crate) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
+        self.people.forget_somebody_else(root, elapsed);
     }
 
     /// Drops the detection of this frame.

@@ -1,7 +1,7 @@
 //! Detections of the tracked person, or of any person while there is none: for the start of a track, for recovery of a lost body,
 //! and to verify a track.
 
-use super::detection_check::ELSEWHERE;
+use super::detection_check::{ELSEWHERE, distance_cost};
 use crate::body::Body;
 use crate::detect::{
     BoundDetector, Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, Surroundings,
@@ -81,9 +81,10 @@ impl PersonDetector {
         self.detection = Some(detection);
     }
 
-    /// Clears the detection if it is farther than this from a position, world frame, meters.
-    pub(super) fn forget_beyond(&mut self, root: Vec3, distance: f64) {
-        self.detection.take_if(|detection| detection.root.distance(root) > distance);
+    /// Clears the detection if it is too far from a position, world frame, to be of a person who was tracked `elapsed` seconds
+    /// before.
+    pub(super) fn forget_somebody_else(&mut self, root: Vec3, elapsed: f64) {
+        self.detection.take_if(|detection| distance_cost(detection.root.distance(root), elapsed).is_infinite());
     }
 
     /// Clears the detection.

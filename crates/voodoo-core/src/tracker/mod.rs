@@ -18,7 +18,7 @@ use crate::observation::candidates::body_box;
 use crate::observation::frame::Frame;
 use crate::observation::observer::{Observer, Own};
 use crate::observation::ownership::OwnershipMask;
-use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, distance_sigma, trunk_is_elsewhere};
+use crate::relocalize::{DetectionVerdict, FrameOutcome, Reasons, Relocalizer, trunk_is_elsewhere};
 use crate::sizes::{Reliance, Sizes, Start};
 use crate::uncertainty::FittedPose;
 use assess::Assessor;
@@ -257,8 +257,7 @@ impl BodyTracker {
         } else {
             relocalizer.detect(&model.body, frame, ownership, root, reasons);
             if let Some(last) = motion.stamp.filter(|_| !interrupted && relocalizer.is_detected()) {
-                // Farther away it is somebody else.
-                relocalizer.forget_beyond(root, 2.0 * distance_sigma(frame.stamp - last));
+                relocalizer.forget_somebody_else(root, frame.stamp - last);
             }
         }
         if config.relocalization {

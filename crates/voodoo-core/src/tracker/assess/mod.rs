@@ -450,6 +450,20 @@ mod tests {
     }
 
     #[test]
+    fn a_small_flat_part_counts_less_for_roundness_than_a_body() {
+        let (model, poses) = standing();
+        let flat = |size: [f64; 2]| {
+            let mut assessor = trusting();
+            assess_frames(&mut assessor, &before_wall(&model.body, &poses), &poses, 1);
+            let mut pixels = vec![0; depth(&model.body, &poses).len()];
+            put_board(&mut pixels, Vec3::new(0.0, 0.0, 2.5), size);
+            assess_frames(&mut assessor, &pixels, &poses, 20);
+            assessor.round[0] < LITTLE * assessor.round[1]
+        };
+        assert_eq!([flat([0.35, 0.9]), flat([0.35, 0.1])], [true, false]);
+    }
+
+    #[test]
     fn a_lost_body_has_no_measured_limb_and_a_moved_one_is_assessed_again() {
         let (model, poses) = standing();
         let pixels = before_wall(&model.body, &poses);
