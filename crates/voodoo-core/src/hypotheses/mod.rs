@@ -9,7 +9,7 @@ mod rough;
 mod rough_points;
 mod unexplained;
 
-pub(crate) use objective::{MARGIN, Objective, REVERSAL_MARGIN};
+pub(crate) use objective::{MARGIN, Objective};
 pub(crate) use proposals::SWIVELS;
 pub(crate) use refined::REFINE;
 pub(crate) use rough_points::{ROUGH_SAMPLE, explain};
@@ -22,7 +22,7 @@ use crate::math::Pose;
 use crate::terms::PATCH;
 use crate::visibility::LITTLE;
 use branch::Branch;
-use proposals::{ColorDirections, DetectedBody, DetectedEnd, Pool, Propose, UnexplainedCluster};
+use proposals::{ColorDirections, DetectedEnd, Pool, Propose, UnexplainedCluster};
 use refined::{Refined, is_elsewhere};
 use rough::{Extremity, RoughSearch};
 use unexplained::Unexplained;
@@ -80,8 +80,7 @@ impl Hypotheses {
     }
 
     /// Tests every arm and leg. Where the frame contradicts one, proposes and refines alternatives, and accepts one that explains
-    /// the frame better. `detection` holds the detections in this frame, and `detected` the poses of all limbs that were fitted
-    /// to them, world frame; empty without detections. Returns the number of ICP steps.
+    /// the frame better. Returns the number of ICP steps.
     pub(crate) fn improve(
         &mut self,
         context: Context,
@@ -89,7 +88,6 @@ impl Hypotheses {
         poses: &mut Vec<Pose>,
         predicted: &mut Vec<Pose>,
         detection: Option<Detected>,
-        mut detected: &[Pose],
     ) -> usize {
         self.before.clone_from(poses);
         self.make_room(context, fit);
@@ -102,11 +100,7 @@ impl Hypotheses {
             if !self.is_due(at) {
                 continue;
             }
-            self.propose(at, detection, detected);
-            if self.pool.body.found {
-                // It is the same for every leg.
-                detected = &[];
-            }
+            self.propose(at, detection);
             let (taken, better) = self.try_proposals(context, fit, poses, predicted);
             steps += taken;
             if better {
@@ -167,14 +161,13 @@ impl Hypotheses {
     }
 
     /// Fills the pool with alternative configurations of one arm or leg.
-    fn propose(&mut self, at: Extremity, detection: Option<Detected>, detected: &[Pose]) {
+    fn propose(&mut self, at: Extremity, detection: Option<Detected>) {
         let Self { rough, clusters, color_directions, pool, .. } = self;
         rough.score.begin(at);
         let current = rough.score.cost(at, at.matched.poses, f64::INFINITY);
         pool.begin(current);
         // All kinds of proposals. To add one, add a file in `proposals` and an element here.
-        let kinds: [&mut dyn Propose; 4] =
-            [clusters, color_directions, &mut DetectedEnd(detection), &mut DetectedBody(detected)];
+        let kinds: [&mut dyn Propose; 3] = [clusters, color_directions, &mut DetectedEnd(detection)];
         for kind in kinds {
             kind.propose(at, rough, pool);
         }
@@ -224,7 +217,7 @@ mod tests {
             let mut predicted = previous.clone();
             with_context(&pixels, &config, &model, &previous, |context| {
                 fit.match_last(context, &poses);
-                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None, &[]);
+                let steps = hypotheses.improve(context, &mut fit, &mut poses, &mut predicted, None);
                 assert_eq!(poses == previous, predicted == previous, "poses and prediction change together");
                 found.push((poses.clone(), steps));
             });

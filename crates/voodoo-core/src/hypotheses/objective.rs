@@ -12,8 +12,6 @@ use crate::terms::{
 /// Decrease of the cost at which another pose is better, nats: the odds are 20 to 1. An arm or leg is tested only where that much
 /// is unexplained.
 pub(crate) const MARGIN: f64 = 3.0;
-/// The decrease for a change to the opposite direction, which depth hardly tells apart.
-pub(crate) const REVERSAL_MARGIN: f64 = 12.0;
 
 /// Negative log-likelihood of poses of a body in a frame, nats.
 #[derive(Debug)]

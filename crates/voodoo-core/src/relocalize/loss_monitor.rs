@@ -1,13 +1,10 @@
-//! Counts for how long a body has been lost, and monitors it for a while after recovery.
+//! Counts for how long a body has been lost.
 
 use super::PATIENCE;
-use super::detection_check::NEW_TRACK_AGE;
 
 /// Outcome of a frame for the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FrameOutcome {
-    /// Stamp of the frame, seconds.
-    pub stamp: f64,
     /// The body is lost.
     pub lost: bool,
     /// The body is tracked, neither lost nor degraded.
@@ -16,13 +13,11 @@ pub(crate) struct FrameOutcome {
     pub silent: bool,
 }
 
-/// For how long the body has been lost, and until when it is monitored after recovery.
+/// For how long the body has been lost.
 #[derive(Debug, Default)]
 pub(super) struct LossMonitor {
     /// Number of consecutive frames in which the body was lost.
     lost: usize,
-    /// Stamp until which a recovered body is monitored, seconds.
-    until: Option<f64>,
 }
 
 impl LossMonitor {
@@ -37,26 +32,12 @@ impl LossMonitor {
         self.lost.checked_sub(PATIENCE)
     }
 
-    /// Monitors the body as if it had just recovered, after a time without frames.
-    pub(super) fn interrupt(&mut self, stamp: f64) {
-        self.until = Some(stamp + NEW_TRACK_AGE);
-    }
-
-    /// Whether the body recovered recently and is still monitored.
-    pub(super) fn recently_recovered(&self) -> bool {
-        self.until.is_some()
-    }
-
     /// Updates with the outcome of a frame.
     pub(super) fn observe(&mut self, outcome: FrameOutcome) {
-        let FrameOutcome { stamp, lost, tracked, silent } = outcome;
-        self.until = self.until.filter(|until| stamp < *until);
+        let FrameOutcome { lost, tracked, silent } = outcome;
         if lost {
             self.lost += usize::from(!silent);
         } else if tracked || self.frames_searched().is_none() {
-            if self.frames_searched().is_some() {
-                self.until = Some(stamp + NEW_TRACK_AGE);
-            }
             self.lost = 0;
         }
     }
@@ -72,32 +53,27 @@ mod tests {
         loss
     }
 
-    fn outcome(stamp: f64, lost: bool) -> FrameOutcome {
-        FrameOutcome { stamp, lost, tracked: !lost, silent: false }
+    fn outcome(lost: bool) -> FrameOutcome {
+        FrameOutcome { lost, tracked: !lost, silent: false }
     }
 
     #[test]
     fn a_body_is_searched_for_from_the_second_lost_frame_on() {
-        let searched = |frames: i32| after((0..frames).map(|frame| outcome(f64::from(frame), true))).frames_searched();
+        let searched = |frames| after([outcome(true)].repeat(frames)).frames_searched();
         assert_eq!([1, 2, 3, 4].map(searched), [None, Some(0), Some(1), Some(2)]);
     }
 
     #[test]
     fn a_single_lost_frame_is_ignored_and_frames_without_images_do_not_count() {
-        let blurred = [(0.0, false), (0.1, true), (0.2, false), (0.3, true)].map(|(stamp, lost)| outcome(stamp, lost));
-        let loss = after(blurred);
-        assert_eq!((loss.frames_searched(), loss.recently_recovered()), (None, false));
-        let silent = (0..20).map(|frame| FrameOutcome { silent: true, ..outcome(f64::from(frame), true) });
-        assert_eq!(after(silent).frames_searched(), None);
+        assert_eq!(after([false, true, false, true].map(outcome)).frames_searched(), None);
+        let silent = FrameOutcome { silent: true, ..outcome(true) };
+        assert_eq!(after([silent; 20]).frames_searched(), None);
     }
 
     #[test]
-    fn a_recovered_body_is_monitored_for_a_while_and_a_degraded_one_is_not_recovered() {
-        let lost = [0.1, 0.2].map(|stamp| outcome(stamp, true));
-        let back = |stamp| after(lost.into_iter().chain([outcome(0.3, false), outcome(stamp, false)]));
-        assert!(back(0.4).recently_recovered() && back(0.4).frames_searched().is_none());
-        assert!(!back(0.3 + NEW_TRACK_AGE).recently_recovered());
-        let degraded = FrameOutcome { tracked: false, ..outcome(0.3, false) };
-        assert_eq!(after(lost.into_iter().chain([degraded])).frames_searched(), Some(0));
+    fn a_tracked_body_is_no_longer_lost_and_a_degraded_one_is() {
+        let degraded = FrameOutcome { tracked: false, ..outcome(false) };
+        let back = |last| after([outcome(true), outcome(true), last]).frames_searched();
+        assert_eq!([outcome(false), degraded].map(back), [None, Some(0)]);
     }
 }

@@ -1,7 +1,7 @@
 //! Verifies a track by detections, and moves the body to one: a body that was lost, or is elsewhere than its track.
 //!
-//! The body is put at the detected pose and refined. The new pose is adopted if it explains the frame no worse, by the score of
-//! all hypotheses, and is not itself lost.
+//! The body is put at the detected pose and refined. The new pose is adopted if it explains the frame better, by the cost of
+//! all terms, and is not itself lost.
 
 mod detection_check;
 mod loss_monitor;
@@ -15,7 +15,6 @@ use crate::detect::{
     Detect, DetectError, Detected, DetectionQuery, JointMap, PlacedDetection, fit_body, fit_pose, is_sized_like,
 };
 use crate::fit::{Context, Fit, UNKNOWN_MOTION};
-use crate::hypotheses::REVERSAL_MARGIN;
 use crate::math::{Aabb, Pose, Vec3, shifted};
 use crate::observation::candidates::{Candidates, body_box};
 use crate::observation::frame::{Frame, Ground};
@@ -142,16 +141,6 @@ impl Relocalizer {
         }
     }
 
-    /// Returns the poses of this body that fit the detection of this frame, world frame.
-    pub(crate) fn detected_pose(&self, body: &Body) -> Option<Vec<Pose>> {
-        fit_pose(body, self.people.detection()?)
-    }
-
-    /// Notes that no frame has come for long before the one of `stamp`: the body may be anywhere, in any pose.
-    pub(crate) fn interrupt(&mut self, stamp: f64) {
-        self.loss.interrupt(stamp);
-    }
-
     /// Runs the detector on the owned part of a frame where that is due. `root` is the expected position of the body, world frame.
     pub(crate) fn detect(
         &mut self,
@@ -161,9 +150,7 @@ impl Relocalizer {
         root: Vec3,
         reasons: Reasons,
     ) {
-        // A body that was just found may face the other way, so it is monitored closely.
-        let often = Reasons { anywhere: reasons.anywhere || self.loss.recently_recovered(), ..reasons };
-        if self.check.is_due(frame.stamp, often, ownership.others) && self.people.detects() {
+        if self.check.is_due(frame.stamp, reasons, ownership.others) && self.people.detects() {
             let query = if reasons.anywhere { DetectionQuery::Any } else { DetectionQuery::Near(root) };
             self.people.detect(body, frame, ownership, query);
         } else {
@@ -203,7 +190,7 @@ impl Relocalizer {
         self.check.is_false_track(self.people.person_odds())
     }
 
-    /// Returns whether the detected poses of this frame, refined, explain the frame no worse than the present ones; working frame.
+    /// Returns whether the detected poses of this frame, refined, explain the frame better than the present ones; working frame.
     /// The matches of `fit` are restored before it returns.
     pub(crate) fn try_detected(&mut self, context: Context, fit: &mut Fit, present: &[Pose], lost: bool) -> bool {
         let Some(detected) = self.people.detection() else { return false };
@@ -234,10 +221,7 @@ impl Relocalizer {
             fit.run(Context { observation, ..context }, present, &mut fitted);
         }
         let at = Context { observation, previous: &[], time_scale: UNKNOWN_MOTION, ..context };
-        // Depth is nearly symmetric front to back, so a detection may override a slightly better cost.
-        let better = self.trials.try_at(at, fit, &fitted, &place, REVERSAL_MARGIN)
-            && (first || self.trials.explains_most(at))
-            && !self.trials.is_somebody_else(at, &fitted);
+        let better = self.trials.try_at(at, fit, &fitted, &place) && !self.trials.is_somebody_else(at, &fitted);
         fit.swap_matches(&mut self.matched);
         better
     }
@@ -304,16 +288,16 @@ mod tests {
         let config = without_background();
         let mut relocalizer = Relocalizer::default();
         relocalizer.restart(&model, &present);
-        let outcome = |stamp, lost| FrameOutcome { stamp, lost, tracked: !lost, silent: false };
+        let outcome = |lost: bool| FrameOutcome { lost, tracked: !lost, silent: false };
         with_context(pixels, &config, &model, &present, |context| {
             let mut fit = Fit::new(&config).unwrap();
             fit.match_last(context, &present);
             let before = format!("{:?}", fit.correspondences());
-            for (stamp, lost) in [(-0.4, false), (-0.3, true)] {
-                relocalizer.observe(outcome(stamp, lost), &present);
+            for lost in [false, true] {
+                relocalizer.observe(outcome(lost), &present);
                 assert!(!relocalizer.search(context, &mut fit, &present));
             }
-            relocalizer.observe(outcome(-0.2, true), &present);
+            relocalizer.observe(outcome(true), &present);
             let found = relocalizer.search(context, &mut fit, &present);
             let mut found = found.then(|| relocalizer.found().to_vec());
             assert_eq!(format!("{:?}", fit.correspondences()), before);

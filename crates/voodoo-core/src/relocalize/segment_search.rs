@@ -68,6 +68,6 @@ impl SegmentSearch {
                 std::mem::swap(best, turned);
             }
         }
-        !best.is_empty() && trials.try_at(context, fit, present, best, 0.0) && trials.explains_most(context)
+        !best.is_empty() && trials.try_at(context, fit, present, best) && trials.explains_most(context)
     }
 }

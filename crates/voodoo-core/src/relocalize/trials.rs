@@ -1,12 +1,13 @@
-//! Tries a body at a new position: after refinement there, it must explain the points no worse than the present pose.
+//! Tries a body at a new position: after refinement there, it must explain the points better than the present pose.
 
 use crate::fit::{Context, Fit};
 use crate::hypotheses::{Objective, REFINE, ROUGH_SAMPLE, explain};
-use crate::math::{Pose, Vec3, WeightedPoints};
+use crate::math::{Pose, WeightedPoints};
 use crate::visibility::EXPLAINED;
 
-/// Maximum fraction of the points that a body found elsewhere may leave far from it.
+/// Maximum fraction of the points of a segment that a body found there may leave far from it.
 const STRAY: f64 = 0.15;
+
 /// Minimum fractions that a body explains alone, if it is somebody else than the one found elsewhere: of what it explains, and of
 /// what either explains. A body that was put behind the person explains little.
 const SOMEBODY_ELSE: [f64; 2] = [0.25, 0.1];
@@ -29,21 +30,11 @@ impl Trials {
         &self.poses
     }
 
-    /// Tries the body at the poses `place`. Returns whether it explains the points there no worse than the present pose does, or
-    /// by less than `turning` worse where it faces the other way.
-    pub(super) fn try_at(
-        &mut self,
-        context: Context,
-        fit: &mut Fit,
-        present: &[Pose],
-        place: &[Pose],
-        turning: f64,
-    ) -> bool {
+    /// Tries the body at the poses `place`. Returns whether it explains the points there better than the present pose does.
+    pub(super) fn try_at(&mut self, context: Context, fit: &mut Fit, present: &[Pose], place: &[Pose]) -> bool {
         fit.match_all(context, present, context.config.max_steps);
         let present_cost = Objective::new(context, fit.matched(present), 1.0, None).body();
-        let cost = self.refine(context, fit, place);
-        let turned = (self.poses[0].rotation * Vec3::X).dot(present[0].rotation * Vec3::X) < 0.0;
-        cost < present_cost + if turned { turning } else { 0.0 }
+        self.refine(context, fit, place) < present_cost
     }
 
     /// Whether the poses of the last trial explain most of the candidates.

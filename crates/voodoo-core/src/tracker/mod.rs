@@ -208,7 +208,7 @@ impl BodyTracker {
         started && !matches!(self.estimate.status, Status::Lost | Status::Searching)
     }
 
-    /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame no worse. Returns whether
+    /// Moves the lost body to a detection of the frame that was stepped last, if that explains the frame better. Returns whether
     /// the person is there.
     pub(crate) fn recover(&mut self, frame: &Frame, ownership: OwnershipMask, detection: PlacedDetection) -> bool {
         self.relocalizer.set_detection(detection);
@@ -240,7 +240,6 @@ impl BodyTracker {
         let interrupted = motion.stamp.is_some_and(|last| frame.stamp - last > INTERRUPTION);
         if interrupted {
             assessor.moved();
-            relocalizer.interrupt(frame.stamp);
         }
         let origin = motion.origin;
         let root = origin + motion.expect(&model.body, frame.stamp, config.prediction)[0].translation;
@@ -317,9 +316,7 @@ impl BodyTracker {
         steps += fit.run(setting.with_model(model), predicted, poses);
         // Alternative hypotheses for arms and legs.
         if config.hypotheses && schedule.whole_body && known && assessor.status() != Status::Lost {
-            let detected = relocalizer.detected_pose(&model.body).unwrap_or_default();
-            steps +=
-                hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected(), &detected);
+            steps += hypotheses.improve(setting.with_model(model), fit, poses, predicted, relocalizer.detected());
         }
         // Refinement of the sizes with this frame.
         let lost = assessor.status() == Status::Lost;
@@ -351,7 +348,7 @@ impl BodyTracker {
         self.fit.regions().check(frame)
     }
 
-    /// Whether the body explains the frame no worse at the current detection than where it is expected.
+    /// Whether the body explains the frame better at the current detection than where it is expected.
     fn is_at_detection(&mut self, frame: &Frame, ownership: OwnershipMask) -> bool {
         let Self { config, model, motion, observer, fit, relocalizer, assessor, .. } = self;
         observer.begin(frame, ownership);
@@ -423,7 +420,6 @@ impl BodyTracker {
     fn frame_outcome(&self, frame: &Frame) -> FrameOutcome {
         let status = self.assessor.status();
         FrameOutcome {
-            stamp: frame.stamp,
             lost: status == Status::Lost,
             tracked: status == Status::Tracking,
             silent: self.observer.silent(frame),

@@ -1,12 +1,10 @@
 //! Proposals of alternative configurations of an arm or leg, one file for each kind.
 
 mod color_directions;
-mod detected_body;
 mod detected_end;
 mod unexplained_cluster;
 
 pub(super) use color_directions::ColorDirections;
-pub(super) use detected_body::DetectedBody;
 pub(super) use detected_end::DetectedEnd;
 pub(super) use unexplained_cluster::UnexplainedCluster;
 
@@ -42,8 +40,6 @@ pub(super) struct Pool {
     pub(super) stretched: Proposal,
     /// The end is at its detected position.
     pub(super) detected: Proposal,
-    /// The whole body has the detected poses.
-    pub(super) body: Proposal,
 }
 
 impl Pool {
@@ -65,12 +61,12 @@ impl Pool {
 
     /// The proposals found, in the order in which they are refined.
     pub(super) fn found(&self) -> impl Iterator<Item = &Proposal> {
-        let Self { points, stretched, detected, body, .. } = self;
-        [points, stretched, detected, body].into_iter().filter(|slot| slot.found)
+        let Self { points, stretched, detected, .. } = self;
+        [points, stretched, detected].into_iter().filter(|slot| slot.found)
     }
 
-    fn slots(&mut self) -> [&mut Proposal; 4] {
-        let Self { points, stretched, detected, body, .. } = self;
-        [points, stretched, detected, body]
+    fn slots(&mut self) -> [&mut Proposal; 3] {
+        let Self { points, stretched, detected, .. } = self;
+        [points, stretched, detected]
     }
 }
