@@ -112,8 +112,8 @@ class ConfigFields(BaseModel, frozen=True, extra="forbid"):
     fit_girths: bool = True
     """After a reset with fitted sizes, also fit the girths to the points of the first frame."""
     fit_lengths: bool = True
-    """After a reset with fitted sizes, select between unequal lengths of arms or legs in the first frame, and
-    with the whole-body solvers refine the lengths of limbs in the following frames.
+    """After a reset with fitted sizes, refine the lengths of limbs in the following frames; whole-body solvers
+    only.
     """
     ground_clearance: float = 0.04
     """Free points below this height above the ground plane are background, if the frame has a ground plane.

@@ -345,8 +345,7 @@ config! {
     penetration: bool = true, "";
     /// After a reset with fitted sizes, also fit the girths to the points of the first frame.
     fit_girths: bool = true, "";
-    /// After a reset with fitted sizes, select between unequal lengths of arms or legs in the first frame, and with the
-    /// whole-body solvers refine the lengths of limbs in the following frames.
+    /// After a reset with fitted sizes, refine the lengths of limbs in the following frames; whole-body solvers only.
     fit_lengths: bool = true, "";
     /// Free points below this height above the ground plane are background, if the frame has a ground plane.
     ground_clearance: f64 = 0.04, "m", 0.0 ..= 1.0;

@@ -87,11 +87,8 @@ pub(super) struct DetectionCheck {
     auto_initialized: bool,
     /// Stamp of the start, seconds.
     since: Option<f64>,
-    /// Stamps of the last detection and of the last one that was compared with the pose, seconds; whether the detection of this
-    /// frame is compared.
+    /// Stamp of the last detection that counted, seconds.
     last_detection: Option<f64>,
-    last_comparison: Option<f64>,
-    compares: bool,
     /// Whether the detection of this frame counts against the track's being a person: those of following frames are alike.
     counts: bool,
     /// Whether a detection agreed with the track.
@@ -132,12 +129,6 @@ impl DetectionCheck {
         self.auto_initialized || self.confirmed
     }
 
-    /// Whether the detection of this frame is compared with the pose. For a new track only some detections are, because a
-    /// comparison may restart the track and discard its motion; the other detections are for uncertain limbs.
-    pub(super) fn compares(&self) -> bool {
-        self.compares
-    }
-
     /// Notes that the track is right.
     pub(super) fn confirm(&mut self) {
         self.confirmed = true;
@@ -148,14 +139,8 @@ impl DetectionCheck {
         let Reasons { uncertain, anywhere, unlike } = reasons;
         let new_track = self.is_new(stamp);
         self.since = self.since.or(Some(stamp));
-        let waited = |last: Option<f64>, wait: f64| last.is_none_or(|last| stamp - last >= wait);
-        let shared = EVERY * (1.0 + others as f64);
-        let comparison_due = new_track && waited(self.last_comparison, EVERY);
-        self.counts = comparison_due || (uncertain || anywhere) && waited(self.last_detection, shared);
-        self.compares = comparison_due || !new_track;
-        if comparison_due {
-            self.last_comparison = Some(stamp);
-        }
+        let waited = |wait: f64| self.last_detection.is_none_or(|last| stamp - last >= wait);
+        self.counts = new_track && waited(EVERY) || (uncertain || anywhere) && waited(EVERY * (1.0 + others as f64));
         if self.counts {
             self.last_detection = Some(stamp);
         }

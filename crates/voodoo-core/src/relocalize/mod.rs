@@ -181,7 +181,7 @@ impl Relocalizer {
 
     /// Compares the detection of this frame with a body at these poses, working frame, whose origin is at `origin` in the world.
     pub(crate) fn compare(&mut self, body: &Body, poses: &[Pose], origin: Vec3) -> Option<DetectionVerdict> {
-        let detected = self.people.detection().filter(|_| self.check.compares())?;
+        let detected = self.people.detection()?;
         Some(self.check.compare(detected, body, poses, origin))
     }
 

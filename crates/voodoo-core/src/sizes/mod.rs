@@ -1,7 +1,6 @@
 //! Sizes of the body: fitted to the first frame after a reset and refined by later frames.
 
 mod color_girth;
-mod equalize;
 pub(crate) mod girth;
 mod reported;
 
@@ -11,12 +10,13 @@ use crate::config::Config;
 use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3};
-use crate::solver::LENGTH_INFORMATION;
+use crate::solver::{Gate, LENGTH_INFORMATION};
 use color_girth::ColorGirths;
-use equalize::{START_GATE, equalize_limb_lengths};
 use girth::{ASIDE_SIGMA, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, side_system};
 use reported::ReportedLengths;
 
+/// Points farther than this from the given pose are not used for the sizes, meters.
+const START_GATE: Gate = Gate { box_margin: 0.10, distance: 0.10 };
 /// Greatest relative change of a limb's length in one frame.
 const LENGTH_STEP: f64 = 0.02;
 /// Limits of the factor by which all frames together change a limb's length.
@@ -132,14 +132,11 @@ impl Sizes {
     }
 
     /// Fits the sizes to the first frame after a reset, whose pose is known.
-    pub(crate) fn initialize(&mut self, setting: Setting, model: &mut Model, poses: &mut Vec<Pose>, fit: &mut Fit) {
+    pub(crate) fn initialize(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         if !self.open {
             return;
         }
         self.open = false;
-        if setting.config.fit_lengths {
-            equalize_limb_lengths(setting, model, poses, fit);
-        }
         if setting.config.fit_girths {
             self.fit_girths(setting, model, poses, fit);
             self.color_girths.start(setting, model, poses, fit);
@@ -268,7 +265,6 @@ pub(crate) struct Reliance<F> {
 #[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 mod tests {
     use super::*;
-    use crate::math::Quat;
     use crate::shape::TaperedEllipticCylinder;
     use crate::testing::{before_wall, stand, standing, with_setting};
 
@@ -284,13 +280,8 @@ mod tests {
 
     /// Returns the body after a first frame that shows `person`. It was set as `set`, with the feet at the person's feet.
     fn first_frame(person: &Body, set: &Body, config: &Config) -> Body {
-        first_frame_from(person, set, stand(set), config)
-    }
-
-    /// Like `first_frame`, but from given poses.
-    fn first_frame_from(person: &Body, set: &Body, mut poses: Vec<Pose>, config: &Config) -> Body {
         let pixels = before_wall(person, &stand(person));
-        let mut model = Model::new(set.clone());
+        let (mut model, mut poses) = (Model::new(set.clone()), stand(set));
         let (before, start) = (model.clone(), poses.clone());
         let (mut sizes, mut fit) = (Sizes::default(), Fit::new(config).unwrap());
         sizes.restart(&model, Start::Positions, config);
@@ -331,34 +322,6 @@ mod tests {
         }
         let same = first_frame(&person, &body, &Config { fit_girths: false, ..Config::default() });
         assert_eq!(same, body);
-    }
-
-    #[test]
-    fn a_leg_set_too_short_takes_the_lengths_of_the_other_and_legs_that_differ_stay() {
-        let body = standing().0.body;
-        let left = ["l_thigh", "l_calf"];
-        let short = changed(&body, &left, 0.85, 1.0);
-        let config = Config { fit_girths: false, ..Config::default() };
-        let ratios = |found: &Body| {
-            ["thigh", "calf"].map(|name| length(found, &format!("l_{name}")) / length(&body, &format!("r_{name}")))
-        };
-        let near = |ratios: [f64; 2], expected: f64| ratios.iter().all(|ratio| (ratio - expected).abs() < 1e-6);
-        let (wrong, real) =
-            (ratios(&first_frame(&body, &short, &config)), ratios(&first_frame(&short, &short, &config)));
-        let girth_system = ratios(&first_frame(&body, &short, &Config { fit_lengths: false, ..config.clone() }));
-        // A smaller difference may be real.
-        let little = ratios(&first_frame(&body, &changed(&body, &left, 0.9, 1.0), &config));
-        assert!(near(wrong, 1.0) && near(real, 0.85) && near(girth_system, 0.85) && near(little, 0.9));
-        // The length is also corrected when the joint angles were set wrong.
-        for turns in [[0.0, 0.5], [0.3, -0.3], [-0.2, 0.4]] {
-            let mut poses = stand(&short);
-            for (name, turn) in left.iter().zip(turns) {
-                let limb = short.limb_index(name).unwrap();
-                poses[limb].rotation = Quat::from_axis_angle(Vec3::Z, turn) * poses[limb].rotation;
-            }
-            short.close_joints(&mut poses);
-            assert!(near(ratios(&first_frame_from(&body, &short, poses, &config)), 1.0), "{turns:?}");
-        }
     }
 
     /// Returns the body after some frames of a person, starting from the sizes and the pose of `set`.
