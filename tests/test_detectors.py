@@ -109,8 +109,10 @@ def test_lengths_follow_a_stature_that_is_known(someone):
 
     statures = [known(height).detect(frame(0.0, someone))[0].stature for height in (1.5, 1.9)]
     assert np.allclose(statures, (1.5, 1.9), rtol=0.05)
-    ends = [run(known(height), someone)[0].body for height in (1.6, 1.8)]
-    assert 1.05 < stature(ends[1]) / stature(ends[0]) < 1.14
+    alone = stature(run("shipped", someone)[0].body)
+    for height in (1.6, 1.7, 1.9):
+        drawn = (stature(run(known(height), someone)[0].body) - alone) / (height - alone)
+        assert 0.33 < drawn < 1.0, "a stature is a measurement beside those of the limbs"
     for wrong in ({"stature": 17.0}, {"stature": float("nan")}, {"stature": 1.7, "stature_sigma": 0.0}):
         with pytest.raises(ConfigError, match=r"stature: expected meters from 0\.3 to 3\.0"):
             voodoo.Detector(**wrong)

@@ -19,6 +19,8 @@ pub(crate) struct LimbMatches {
     pub weight: Vec<f32>,
     /// Closest points, normals, signed distances.
     pub surface: SurfaceBatch,
+    /// Variance of the limb's radius, square meters.
+    pub radius_variance: f64,
 }
 
 /// A site with its target: a measured position, or the closest point of a ray.

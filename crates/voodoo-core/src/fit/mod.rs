@@ -19,7 +19,7 @@ use crate::body::{Body, Pair};
 use crate::config::Config;
 use crate::detect::{Detected, MeasuredJoint};
 use crate::error::TrackError;
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, refill};
 use crate::regions;
 use crate::solver::{Gate, Problem, Schedule, Solver, solver};
 use crate::threads::Threads;
@@ -42,6 +42,8 @@ pub(crate) struct Fit {
     /// Probability that each limb is visible, by the detection of this frame; empty without one. Points are a limb's own with it:
     /// others, of furniture, would hold a hidden limb.
     visible: Vec<f32>,
+    /// Variance of each limb's radius, square meters.
+    radius_variances: Vec<f64>,
     band_weights: Vec<f64>,
     threads: Threads,
 }
@@ -58,6 +60,7 @@ impl Fit {
             regions: regions::ColorRegions::default(),
             detected: Vec::new(),
             visible: Vec::new(),
+            radius_variances: Vec::new(),
             band_weights: Vec::new(),
             threads: Threads::new(config)?,
         })
@@ -70,6 +73,11 @@ impl Fit {
             detected.visible_limbs(body, &mut self.visible);
             detected.measure(body, poses, origin, &self.correspondences.limbs, &mut self.detected);
         }
+    }
+
+    /// Sets the standard deviation of each limb's radius, meters; NaN where it is known.
+    pub(crate) fn set_radius_sigmas(&mut self, sigmas: impl Iterator<Item = f64>) {
+        refill(&mut self.radius_variances, sigmas.map(|sigma| if sigma.is_nan() { 0.0 } else { sigma * sigma }));
     }
 
     /// Forgets the detection: poses are compared by what the sensors measure.
@@ -105,6 +113,7 @@ impl Fit {
         self.correspondences.contour.clear();
         self.correspondences.regions.clear();
         self.correspondences.region_support.clear();
+        self.radius_variances.clear();
         self.regions.clear();
     }
 
@@ -264,7 +273,7 @@ impl Fit {
     /// call.
     fn match_surface(&mut self, context: Context, poses: &[Pose], gate: &Gate, anew: bool, visible_side: bool) {
         let Context { config, model, observation, .. } = context;
-        let Self { solver, assignment, correspondences, threads, visible, .. } = self;
+        let Self { solver, assignment, correspondences, threads, visible, radius_variances, .. } = self;
         let (assignment, limbs, candidates) = (&*assignment, model.body.limbs(), observation.candidates);
         let whole_body = solver.schedule(config).whole_body;
         correspondences.limbs.resize_with(poses.len(), LimbMatches::default);
@@ -275,6 +284,7 @@ impl Fit {
                     matches.base_weight.iter_mut().for_each(|weight| *weight *= visible);
                 }
             }
+            matches.radius_variance = radius_variances.get(index).copied().unwrap_or_default();
             match_limb(&limbs[index], &poses[index], gate.distance, whole_body, matches);
             if visible_side {
                 match_visible_side(&limbs[index].shape, &poses[index], candidates, gate.distance, matches);

@@ -229,7 +229,7 @@ impl Girth {
         }
         let own = system.without_shift(axis_sigma, Vector2::zeros())?;
         let (alike, remembered, before) = (ALIKE / frames, 1.0 - frames / REMEMBERED, self.changes());
-        let information = own.information / alike + kept;
+        let information = (own.information + kept) / alike;
         self.information = self.information * remembered + information;
         self.measured = self.measured * remembered + information * before + own.pull / alike;
         let girths = self.most_likely(prior)? - before;

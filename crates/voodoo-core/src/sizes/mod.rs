@@ -9,7 +9,7 @@ use crate::body::{Body, Model, Pair};
 use crate::config::Config;
 use crate::detect::{Detected, JointMap};
 use crate::fit::{CONTOUR_FROM, Fit, Setting};
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, reset};
 use crate::solver::{Gate, LENGTH_INFORMATION};
 use color_girth::ColorGirths;
 use girth::{ASIDE_SIGMA, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, side_system};
@@ -41,7 +41,7 @@ pub(crate) struct Sizes {
     rough: bool,
     /// The body as it was set, unless its sizes are known.
     set: Option<Body>,
-    /// Girth estimates since the first frame fitted them; empty when the girths were given.
+    /// Girth estimates; empty when the girths were given.
     girths: Vec<Girth>,
     /// Girth estimates from color edges.
     color_girths: ColorGirths,
@@ -61,7 +61,8 @@ impl Sizes {
         let fit = start != Start::SizesKnown;
         (self.open, self.rough) = (fit, start == Start::Detected);
         self.set = fit.then(|| model.body.clone());
-        self.girths.clear();
+        let estimated = if fit && config.fit_girths { model.body.limbs().len() } else { 0 };
+        reset(&mut self.girths, estimated, Girth::default());
         self.color_girths.clear();
         self.pairs.clear();
         self.reported.clear();
@@ -104,6 +105,11 @@ impl Sizes {
         known.map_or(f64::NAN, |(girth, prior)| girth.sigma(&body.limbs()[limb].shape, &prior))
     }
 
+    /// Tells `fit` how well the limbs' radii are known.
+    pub(crate) fn set_radius_sigmas(&self, body: &Body, fit: &mut Fit) {
+        fit.set_radius_sigmas((0..body.limbs().len()).map(|limb| self.girth_sigma(body, limb)));
+    }
+
     /// Whether the sizes are known, so that no frame changes them.
     pub(crate) fn known(&self) -> bool {
         self.set.is_none()
@@ -117,7 +123,9 @@ impl Sizes {
     /// Takes over limbs that the user changed: their girths count as given, and the lengths are refined from the new ones.
     pub(crate) fn edited(&mut self, model: &Model, map: &JointMap) {
         self.reported.bind(map);
-        self.girths.clear();
+        if !self.open {
+            self.girths.clear();
+        }
         self.color_girths.clear();
         self.set = self.set.is_some().then(|| model.body.clone());
         if !self.pairs.is_empty() {
@@ -144,7 +152,6 @@ impl Sizes {
     }
 
     fn fit_girths(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
-        self.girths = vec![Girth::default(); poses.len()];
         let mut edges_found = Vec::new();
         for _ in 0..GIRTH_STEPS {
             // The pose is known, so the closest limb is the one that was observed.
@@ -177,6 +184,7 @@ impl Sizes {
         if self.rough {
             self.girths.iter_mut().for_each(Girth::discount);
         }
+        self.set_radius_sigmas(&model.body, fit);
     }
 
     /// Updates the sizes with a frame in which the body was fitted at `poses`: lengths unless the body is `lost`, and girths, if
@@ -353,7 +361,8 @@ mod tests {
                 let off = length(&found, name) / length(&body, name) - 1.0;
                 assert!(off.abs() < 0.05, "{name} is off by {off} after {}", wrong - 1.0);
             }
-            assert_eq!(followed(&body, &set, &Config::default(), true, 3), set, "a lost body teaches nothing");
+            let lengths_alone = Config { fit_girths: false, ..Config::default() };
+            assert_eq!(followed(&body, &set, &lengths_alone, true, 3), set, "a lost body teaches nothing");
         }
     }
 

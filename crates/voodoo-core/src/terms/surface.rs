@@ -1,4 +1,7 @@
 //! Measured surface points: robust point-to-plane distance with a small point-to-point part (method section 1).
+//!
+//! The radius of a limb is uncertain, so that all distances on it share one unknown error of known variance. It is eliminated from the
+//! limb's system by its Schur complement.
 
 use super::{PATCH, Term};
 use crate::association::correspondence::{Correspondences, LimbMatches};
@@ -31,7 +34,7 @@ impl Term for Surface<'_> {
     fn add(&self, _body: &Body, _poses: &[Pose], normal: &mut NormalEquations) {
         for (matches, block) in self.correspondences.limbs.iter().zip(&mut normal.limbs) {
             let sums = vectorized!(self.sum(matches));
-            normal.cost += sums.add_to(block);
+            normal.cost += sums.add_to(block, matches.radius_variance);
         }
     }
 
@@ -57,6 +60,9 @@ struct Sums {
     /// Lower triangle of the point-to-plane information, row by row.
     plane: [SurfaceLanes; 21],
     gradient: [SurfaceLanes; 6],
+    /// Weights and weighted residuals, and the information that each unknown shares with the radius.
+    radius: [SurfaceLanes; 2],
+    shared: [SurfaceLanes; 6],
     /// The isotropic part: w, w x, w x x^T (upper triangle).
     iso: [SurfaceLanes; 10],
 }
@@ -68,6 +74,8 @@ impl Surface<'_> {
             cost: [0.0; LANES],
             plane: [[0.0; LANES]; 21],
             gradient: [[0.0; LANES]; 6],
+            radius: [[0.0; LANES]; 2],
+            shared: [[0.0; LANES]; 6],
             iso: [[0.0; LANES]; 10],
         };
         let (points, normals) = (&matches.surface.points, &matches.surface.normals);
@@ -105,6 +113,7 @@ impl Surface<'_> {
         let (information, tangential) = (self.information as f32, self.tangential_weight as f32);
         let inverse_square = (1.0 / (self.scale * self.scale)) as f32;
         let (mut pull, mut plane, mut iso) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let mut all = [0.0; LANES];
         let mut row = [[0.0; LANES], [0.0; LANES], [0.0; LANES], nx, ny, nz];
         for l in 0..LANES {
             let square = distance[l] * distance[l];
@@ -114,11 +123,20 @@ impl Surface<'_> {
             let weight = weight * falloff * falloff;
             // The residual n . (x - p) is the negative signed distance of the measured point.
             pull[l] = -weight * distance[l];
+            all[l] = weight;
             plane[l] = weight * (1.0 - tangential);
             iso[l] = weight * tangential;
             row[0][l] = y[l] * nz[l] - z[l] * ny[l];
             row[1][l] = z[l] * nx[l] - x[l] * nz[l];
             row[2][l] = x[l] * ny[l] - y[l] * nx[l];
+        }
+        for (sum, values) in sums.radius.iter_mut().zip([&all, &pull]) {
+            for l in 0..LANES {
+                sum[l] += values[l];
+            }
+        }
+        for (sum, row) in sums.shared.iter_mut().zip(&row) {
+            add_product(sum, &all, row);
         }
         // One row at a time: loops of one length each are fully unrolled.
         sums.add_row::<0>(&row, &plane, &pull);
@@ -170,8 +188,8 @@ impl Sums {
         }
     }
 
-    /// Adds the sums to a limb's normal equations; returns the cost.
-    fn add_to(&self, block: &mut LimbBlock) -> f64 {
+    /// Adds the sums to a limb's normal equations, without its radius; returns the cost.
+    fn add_to(&self, block: &mut LimbBlock, radius_variance: f64) -> f64 {
         let total = |lanes: &SurfaceLanes| lanes.iter().map(|value| f64::from(*value)).sum::<f64>();
         let mut entry = 0;
         for i in 0..6 {
@@ -186,7 +204,15 @@ impl Sums {
             }
         }
         add_isotropic(block, &self.iso.map(|lanes| total(&lanes)));
-        total(&self.cost)
+        let ([weight, pull], shared) = (self.radius.map(|lanes| total(&lanes)), self.shared.map(|lanes| total(&lanes)));
+        let variance = radius_variance / (1.0 + radius_variance * weight);
+        for i in 0..6 {
+            block.g[i] -= variance * pull * shared[i];
+            for j in 0..6 {
+                block.h[(i, j)] -= variance * shared[i] * shared[j];
+            }
+        }
+        total(&self.cost) - variance * pull * pull
     }
 }
 
@@ -202,5 +228,79 @@ fn add_isotropic(block: &mut LimbBlock, iso: &[f64; 10]) {
             block.h[(3 + j, i)] += cross[i][j];
         }
         block.h[(3 + i, 3 + i)] += w;
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+mod tests {
+    use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
+
+    use super::*;
+    use crate::body::HumanModel;
+    use crate::math::Vec3;
+    use crate::terms::normal_equations::line;
+
+    /// Points around a limb as (foot, normal, signed distance, weight).
+    fn points(shift: Vec3) -> Vec<(Vec3, Vec3, f64, f64)> {
+        (0..21)
+            .map(|index| {
+                let (turn, height) = (0.4 * f64::from(index), 0.02 * f64::from(index));
+                let normal = Vec3::new(turn.cos(), turn.sin(), 0.0);
+                let foot = 0.1 * normal + height * Vec3::Z;
+                (foot, normal, normal.dot(shift) + 0.004 * (3.0 * turn).sin(), 1.0 + f64::from(index % 3))
+            })
+            .filter(|(_, normal, ..)| normal.x > -0.3)
+            .collect()
+    }
+
+    fn block(points: &[(Vec3, Vec3, f64, f64)], radius_variance: f64) -> LimbBlock {
+        let mut matches = LimbMatches { radius_variance, ..LimbMatches::default() };
+        for (foot, normal, distance, weight) in points {
+            let f32s = |v: &Vec3| v.to_array().map(|value| value as f32);
+            matches.weight.push(*weight as f32);
+            matches.surface.points.push(f32s(foot));
+            matches.surface.normals.push(f32s(normal));
+            matches.surface.signed_distance.push(*distance as f32);
+        }
+        let correspondences = Correspondences { limbs: vec![matches], ..Correspondences::default() };
+        let body = Body::human(1.75, HumanModel::Measured).unwrap();
+        let mut normal = NormalEquations::default();
+        normal.clear(1);
+        Surface { correspondences: &correspondences, information: 1e3, tangential_weight: 0.0, scale: 1e3 }.add(
+            &body,
+            &[],
+            &mut normal,
+        );
+        normal.limbs[0]
+    }
+
+    #[test]
+    fn an_uncertain_radius_is_eliminated_like_any_other_unknown() {
+        let damping = 10.0;
+        for sigma in [0.002, 0.01, 0.1] {
+            let points = points(Vec3::new(0.02, -0.01, 0.0));
+            // The system of the twist and the radius, of which the solution's first six elements are the twist.
+            let (mut h, mut g) = (SMatrix::<f64, 7, 7>::identity() * damping, SVector::<f64, 7>::zeros());
+            h[(6, 6)] = 1.0 / (sigma * sigma);
+            for (foot, normal, distance, weight) in &points {
+                let row = line(*foot, *normal).push(1.0);
+                h += 1e3 * weight * row * row.transpose();
+                g -= 1e3 * weight * *distance * row;
+            }
+            let expected = h.cholesky().unwrap().solve(&g);
+            let found = block(&points, sigma * sigma);
+            let twist = (found.h + Matrix6::identity() * damping).cholesky().unwrap().solve(&found.g);
+            assert!((expected.fixed_rows::<6>(0) - twist).norm() < 1e-4 * twist.norm(), "{expected} {twist}");
+        }
+    }
+
+    #[test]
+    fn points_on_one_side_tell_less_of_the_distance_the_less_the_radius_is_known() {
+        let [known, uncertain, unknown] = [0.0, 1e-4, 1e3].map(|variance| block(&points(Vec3::X), variance).h);
+        let ahead = Vector6::ith(3, 1.0);
+        let information = |h: Matrix6<f64>| ahead.dot(&(h * ahead));
+        assert!(information(known) > 1.5 * information(uncertain));
+        assert!(information(uncertain) > information(unknown) && information(unknown) > 0.0);
     }
 }

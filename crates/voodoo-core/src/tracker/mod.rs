@@ -303,6 +303,7 @@ impl BodyTracker {
         let here = |detected: &Detected| !trunk_is_elsewhere(*detected, &model.body, poses, *origin);
         let detected = relocalizer.detected().filter(here);
         fit.set_detected(detected, &model.body, poses, *origin);
+        sizes.set_radius_sigmas(&model.body, fit);
         // Sizes from the first frame, then warm start and ICP steps (steps 2 to 7).
         let mut steps = 0;
         fit.begin_regions(setting.with_model(model), poses);

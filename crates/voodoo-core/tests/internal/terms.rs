@@ -217,9 +217,11 @@ proptest! {
             let start = part.shape.closest_point(Vec3::new(turn.cos(), turn.sin(), z));
             *pose * (start.point + start.normal * (offsets[6 * limb + k as usize].abs() + 0.004))
         }).collect()).collect();
+        // With an uncertain radius, the weights of the kernel are taken as constant: it is wide there.
+        for (radius_variance, scale) in [(0.0, 0.05), (0.5, 1e3)] {
         check(&body, &poses, &|poses, normal| {
             let limbs = body.limbs().iter().zip(poses).zip(&measured).map(|((part, pose), points)| {
-                let mut matches = LimbMatches::default();
+                let mut matches = LimbMatches { radius_variance, ..LimbMatches::default() };
                 for point in points {
                     let found = part.shape.closest_point(pose.inverse_transform_point(*point));
                     let f32s = |v: Vec3| v.to_array().map(|value| value as f32);
@@ -234,7 +236,8 @@ proptest! {
                 matches
             }).collect();
             let correspondences = Correspondences { limbs, ..Default::default() };
-            Surface { correspondences: &correspondences, information: 1.0, tangential_weight: 0.07, scale: 0.05 }.add(&body, poses, normal);
+            Surface { correspondences: &correspondences, information: 1.0, tangential_weight: 0.07, scale }.add(&body, poses, normal);
         })?;
+        }
     }
 }
