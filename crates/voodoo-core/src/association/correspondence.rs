@@ -100,15 +100,13 @@ pub(crate) struct RegionPair {
 /// Color evidence for and against a limb, from its lines: fractions of the lines that are informative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct RegionSupport {
-    /// Fraction of lines on which the limb's colors end at its contour: for the whole limb, each line weighted by its distance
-    /// from the proximal joint; and for its outer part.
-    pub own: [f64; 2],
-    /// Fraction of lines on which the colors of the surroundings appear inside the contour, in the same two forms.
-    pub against: [f64; 2],
+    /// Fraction of lines on which the limb's colors end at its contour, each line weighted by its distance from the proximal
+    /// joint.
+    pub own: f64,
+    /// Fraction of lines on which the colors of the surroundings appear inside the contour, in the same way.
+    pub against: f64,
     /// Informative lines, as a fraction of all.
     pub visible: f64,
-    /// Number of lines.
-    pub lines: f64,
     /// For limbs of arms and legs: image area that this limb explains, and that no limb of another arm or leg or of the trunk
     /// explains, patches.
     pub gained: f64,

@@ -4,9 +4,6 @@ use crate::association::correspondence::RegionSupport;
 
 /// Least absolute mean log ratio beside the contour that counts as evidence.
 const DECISIVE: f32 = 0.15;
-/// The outer part of a limb begins at this fraction of its length.
-const OUTER_FROM: f64 = 0.6;
-
 /// The evidence for a limb is weak when a smaller fraction of its informative lines supports it.
 const WEAK: f64 = 0.15;
 
@@ -15,9 +12,8 @@ const WEAK: f64 = 0.15;
 pub(super) struct Evidence {
     lines: f64,
     decided: f64,
-    /// Weights of the informative lines, of those that support the limb, and of those that contradict it: for the whole limb and
-    /// for its outer part.
-    sums: [[f64; 2]; 3],
+    /// Weights of the informative lines, of those that support the limb, and of those that contradict it.
+    sums: [f64; 3],
 }
 
 impl Evidence {
@@ -27,30 +23,25 @@ impl Evidence {
         self.lines += 1.0;
         let Some([inside, outside]) = beside else { return };
         self.decided += 1.0;
-        let weights = [t.max(0.1), if t > OUTER_FROM { 1.0 } else { 0.0 }];
         let own = inside > DECISIVE && outside < -DECISIVE;
         let against = inside < -DECISIVE;
         for (sum, counts) in self.sums.iter_mut().zip([true, own, against]) {
-            for (sum, weight) in sum.iter_mut().zip(weights) {
-                *sum += if counts { weight } else { 0.0 };
-            }
+            *sum += if counts { t.max(0.1) } else { 0.0 };
         }
     }
 
     /// Whether the color evidence for the limb's pose is weak.
     pub(super) fn is_weak(&self) -> bool {
-        self.decided > 0.0 && self.support().own[0] < WEAK
+        self.decided > 0.0 && self.support().own < WEAK
     }
 
     pub(super) fn support(&self) -> RegionSupport {
         let [all, own, against] = self.sums;
-        let fraction =
-            |part: [f64; 2]| [0, 1].map(|index| if all[index] > 0.0 { part[index] / all[index] } else { 0.0 });
+        let fraction = |part: f64| if all > 0.0 { part / all } else { 0.0 };
         RegionSupport {
             own: fraction(own),
             against: fraction(against),
             visible: self.decided / self.lines.max(1.0),
-            lines: self.lines,
             ..RegionSupport::default()
         }
     }

@@ -91,30 +91,29 @@ impl ColorHistogram {
         self.counted += 1.0;
     }
 
-    /// Updates the histogram with the counts if there are at least `least`: the first time it takes them over, later it mixes
-    /// them in at `rate`. Resets the counts.
-    pub(super) fn learn(&mut self, kind: Kind, rate: f32, least: f32, room: &mut Vec<f32>) {
-        if self.counted >= least {
-            match kind {
-                Kind::Color => smooth_color(&mut self.counts, room),
-                Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, kind.bins())),
+    /// Updates the histogram with the counts, if there are any: the first time it takes them over, later it mixes them in at
+    /// `rate`. Resets the counts.
+    pub(super) fn learn(&mut self, kind: Kind, rate: f32, room: &mut Vec<f32>) {
+        if self.counted == 0.0 {
+            return;
+        }
+        match kind {
+            Kind::Color => smooth_color(&mut self.counts, room),
+            Kind::Gray => (0..GRAY_PASSES).for_each(|_| smooth(&mut self.counts, room, 1, kind.bins())),
+        }
+        let rate = if self.known { rate } else { 1.0 };
+        let (keep, new) = (1.0 - rate, rate / self.counted);
+        let uniform = UNIFORM / self.frequency.len() as f32;
+        let Self { frequency, log, counts, .. } = self;
+        vectorized!({
+            for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
+                *frequency = keep * *frequency + new * count;
+                *log = ln((1.0 - UNIFORM) * *frequency + uniform);
             }
-            let rate = if self.known { rate } else { 1.0 };
-            let (keep, new) = (1.0 - rate, rate / self.counted);
-            let uniform = UNIFORM / self.frequency.len() as f32;
-            let Self { frequency, log, counts, .. } = self;
-            vectorized!({
-                for ((frequency, log), count) in frequency.iter_mut().zip(log).zip(&*counts) {
-                    *frequency = keep * *frequency + new * count;
-                    *log = ln((1.0 - UNIFORM) * *frequency + uniform);
-                }
-            });
-            self.known = true;
-        }
-        if self.counted > 0.0 {
-            self.counts.fill(0.0);
-            self.counted = 0.0;
-        }
+        });
+        self.known = true;
+        self.counts.fill(0.0);
+        self.counted = 0.0;
     }
 }
 

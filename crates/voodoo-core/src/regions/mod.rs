@@ -51,8 +51,6 @@ const MOST_LINES: usize = 16;
 const MANY: usize = 4;
 /// A unit is one pixel of a camera with this focal length, pixels.
 const FOCAL: f64 = 520.0;
-/// Standard deviation of the model's contour, units: real limbs are not cones.
-const MODEL_ERROR: f32 = 2.0;
 
 /// What was learned from the images of one camera, and working memory.
 #[derive(Debug, Default)]
@@ -247,14 +245,13 @@ impl ColorRegions {
                 let Some(edge) = found.map(|found| found.edge).filter(|edge| edge.information > 0.0) else { continue };
                 let motion = line.motion / f64::from(unit);
                 let slope = motion.length();
-                let information = edge.information / (1.0 + edge.information * MODEL_ERROR * MODEL_ERROR);
                 let limb = usize::from(line.limb);
                 pairs.push(RegionPair {
                     limb,
                     x: posed.poses[limb] * line.foot,
                     normal: working_from_camera.rotation * (motion / slope),
                     distance: f64::from(edge.mean) / slope,
-                    information: f64::from(information) * slope * slope,
+                    information: f64::from(edge.information) * slope * slope,
                     source: picture.source,
                 });
             }

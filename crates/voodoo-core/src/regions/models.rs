@@ -5,8 +5,6 @@ use crate::math::reset;
 
 /// Weight of the new colors of two frames in the model of a limb, and in that of its surroundings: clothes stay the same.
 const RATES: [f32; 2] = [0.19, 0.36];
-/// Fewer pixels than this are not learned from.
-const LEAST_PIXELS: f32 = 15.0;
 
 /// Colors by group of limbs: the left and the right limb of a pair share one model.
 #[derive(Clone, Debug, Default)]
@@ -34,7 +32,7 @@ impl ColorModel {
     pub(super) fn learn(&mut self) {
         let Self { kind, limbs, around, ratios, room } = self;
         for (histograms, rate) in [&mut *limbs, &mut *around].into_iter().zip(RATES) {
-            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, LEAST_PIXELS, room));
+            histograms.iter_mut().for_each(|histogram| histogram.learn(*kind, rate, room));
         }
         for (group, ratios) in ratios.chunks_exact_mut(kind.bins()).enumerate() {
             let logs = limbs[group].log.iter().zip(&around[group].log);

@@ -127,7 +127,7 @@ impl EdgeFilter {
         Regions { pairs: &correspondences.regions, colors: None }.add(body, poses, normal);
         for (limb, block) in normal.limbs.iter_mut().enumerate() {
             let support_net =
-                correspondences.region_support.get(limb).map_or(0.0, |support| support.own[0] - support.against[0]);
+                correspondences.region_support.get(limb).map_or(0.0, |support| support.own - support.against);
             let weight = (support_net.max(0.0) * support_net).max(MIN_WEIGHT);
             let loose = extremities.iter().flat_map(TwoBone::limbs).all(|other| other != limb);
             block.h *= if loose { LOOSE * weight } else { weight };
@@ -161,7 +161,7 @@ mod tests {
                 let x = poses[limb] * (f64::from(step) / 7.0 * part.shape.length() * Vec3::Z);
                 found.regions.push(RegionPair { limb, x, normal, distance: 0.0, information: 1e4, source: 0 });
             }
-            found.region_support.push(RegionSupport { own: [own; 2], ..RegionSupport::default() });
+            found.region_support.push(RegionSupport { own, ..RegionSupport::default() });
         }
         found
     }

@@ -39,7 +39,7 @@ impl Assessor {
                 let sigma = edges.end_sigma(limb) * branch_distance(limb).map_or(1.0, sigma_factor);
                 // A standard deviation of `EXPLAINED` suffices. Full support of a limb by color reduces its uncertainty by a factor
                 // of e.
-                log_odds[limb] = own[0] * visible - (sigma / EXPLAINED).ln();
+                log_odds[limb] = own * visible - (sigma / EXPLAINED).ln();
             }
             chain.ends.iter().for_each(|end| log_odds[*end] = log_odds[chain.lower]);
         }
@@ -69,7 +69,7 @@ mod tests {
                 let (distance, source) = (0.0, 0);
                 correspondences.regions.push(RegionPair { limb, x, normal, distance, information, source });
             }
-            let support = RegionSupport { own: [0.6; 2], visible: 0.6, ..RegionSupport::default() };
+            let support = RegionSupport { own: 0.6, visible: 0.6, ..RegionSupport::default() };
             correspondences.region_support.push(support);
         }
         correspondences

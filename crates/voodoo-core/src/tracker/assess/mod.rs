@@ -223,7 +223,7 @@ impl Assessor {
             }
             // Without depth coverage, color images give the evidence.
             if let Some(colors) = matched.correspondences.region_support.get(limb).filter(|_| unseen && now[0] == 0.0) {
-                now = [OF_EXCLUSIVE * colors.own[0] * colors.visible, colors.against[0], colors.visible];
+                now = [OF_EXCLUSIVE * colors.own * colors.visible, colors.against, colors.visible];
             }
             // Depth images do not contradict a limb that point clouds of other sensors measure.
             support.known &= self.exclusive.clouds[limb] < FEW;
