@@ -2,16 +2,13 @@
 //! is not the body's: legs in a skirt, a trunk under a backpack.
 
 use super::{Detected, DetectedJoint};
-use crate::association::correspondence::{Correspondences, DetectedPair, LimbMatches};
+use crate::association::correspondence::{Correspondences, DetectedPair};
 use crate::body::Body;
 use crate::math::{Pose, Vec3, reset};
-use crate::visibility::FEW;
 
-/// By how many times its own a detected joint's information grows where the detection doubts the pose, see [`Detected::doubt`]:
-/// a surface that is not the body's has hundreds of points.
-const DOUBTED: f64 = 15.0;
-/// Distance of a limb's points, root mean square, from which on its surface is not that of the person, meters.
-const UNLIKE_SURFACE: f64 = 0.03;
+/// By how many times its own a detected joint's information grows where the pose deviates from the detection, see
+/// [`Detected::excess_deviation`]: a surface that is not the body's has hundreds of points.
+const EXCESS_GAIN: f64 = 5.0;
 
 /// A detected joint of the body: its site, its position, world frame, its standard deviation along each axis, meters, and its
 /// information, 1/m^2.
@@ -26,7 +23,7 @@ pub(crate) struct MeasuredJoint {
 impl Detected<'_> {
     /// How far trunk and legs at these poses, working frame, are from where they were detected: the mean squared deviation in
     /// space, in variances, beyond the one that is expected; from 0 to 1.
-    fn doubt(&self, body: &Body, poses: &[Pose], origin: Vec3) -> f64 {
+    fn excess_deviation(&self, body: &Body, poses: &[Pose], origin: Vec3) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0_f64);
         for joint in self.map.trunk().iter().chain(self.map.legs()) {
             if let (Some(joint), Some(site)) = (self.joint(*joint), self.map.site(*joint)) {
@@ -50,21 +47,10 @@ impl Detected<'_> {
         limbs.iter_mut().filter(|visible| visible.is_nan()).for_each(|visible| *visible = 1.0);
     }
 
-    /// Writes the joints to `joints`, for a body that is expected at these poses, working frame. `last` are the matches of the last
-    /// frame: limbs whose points lay on them are doubted less.
-    pub(crate) fn measure(
-        &self,
-        body: &Body,
-        poses: &[Pose],
-        origin: Vec3,
-        last: &[LimbMatches],
-        joints: &mut Vec<MeasuredJoint>,
-    ) {
-        let doubt = self.doubt(body, poses, origin);
-        let off = |limb: usize| last.get(limb).map_or(1.0, roughness);
+    /// Writes the joints to `joints`, for a body that is expected at these poses, working frame.
+    pub(crate) fn measure(&self, body: &Body, poses: &[Pose], origin: Vec3, joints: &mut Vec<MeasuredJoint>) {
+        let factor = 1.0 + EXCESS_GAIN * self.excess_deviation(body, poses, origin);
         joints.extend(self.on_sites().map(|(site, joint)| {
-            let [limb, parent] = joined_limbs(body, site);
-            let factor = 1.0 + DOUBTED * doubt * off(limb).max(off(parent));
             let DetectedJoint { position, sigma, visible } = *joint;
             MeasuredJoint { site, position, sigma, information: visible * factor / (sigma * sigma) }
         }));
@@ -75,12 +61,6 @@ impl Detected<'_> {
 fn joined_limbs(body: &Body, site: usize) -> [usize; 2] {
     let limb = body.sites()[site].limb;
     [limb, body.parent(limb).unwrap_or(limb)]
-}
-
-/// Mean square of the distances of a limb's points in units of `UNLIKE_SURFACE`; at most 1, also where there are hardly any points.
-fn roughness(matches: &LimbMatches) -> f64 {
-    let (weight, square) = matches.weighed();
-    if weight < FEW { 1.0 } else { (square / (weight * UNLIKE_SURFACE * UNLIKE_SURFACE)).min(1.0) }
 }
 
 impl Correspondences {
@@ -111,7 +91,7 @@ mod tests {
         let detection = Detection { joints: (0..names.len()).map(joint).collect(), ..Detection::default() };
         let map = JointMap::new(body, &names, &[]);
         let mut joints = Vec::new();
-        Detected { detection: &detection, map: &map }.measure(body, &poses, origin, &[], &mut joints);
+        Detected { detection: &detection, map: &map }.measure(body, &poses, origin, &mut joints);
         joints
     }
 
@@ -119,7 +99,7 @@ mod tests {
     fn a_detection_counts_more_where_it_is_farther_than_its_deviations() {
         let factor = |off: f64, sigma: f64| measured(off * Vec3::Y, sigma)[0].information * sigma * sigma;
         assert!((factor(0.0, 0.03) - 1.0).abs() < 1e-9 && (factor(0.1, 0.1) - 1.0).abs() < 1e-9);
-        assert!((factor(0.2, 0.03) - 1.0 - DOUBTED).abs() < 1e-9);
+        assert!((factor(0.2, 0.03) - 1.0 - EXCESS_GAIN).abs() < 1e-9);
     }
 
     #[test]

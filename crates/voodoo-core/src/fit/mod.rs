@@ -71,7 +71,7 @@ impl Fit {
         self.forget_detected();
         if let Some(detected) = detected {
             detected.visible_limbs(body, &mut self.visible);
-            detected.measure(body, poses, origin, &self.correspondences.limbs, &mut self.detected);
+            detected.measure(body, poses, origin, &mut self.detected);
         }
     }
 
