@@ -105,9 +105,11 @@ impl Sizes {
         known.map_or(f64::NAN, |(girth, prior)| girth.sigma(&body.limbs()[limb].shape, &prior))
     }
 
-    /// Tells `fit` how well the limbs' radii are known.
+    /// Tells `fit` how well the limbs' radii are known. Where the joints were given, the first frame measured how far from them the
+    /// surface is.
     pub(crate) fn set_radius_sigmas(&self, body: &Body, fit: &mut Fit) {
-        fit.set_radius_sigmas((0..body.limbs().len()).map(|limb| self.girth_sigma(body, limb)));
+        let sigma = |limb| if self.rough { self.girth_sigma(body, limb) } else { f64::NAN };
+        fit.set_radius_sigmas((0..body.limbs().len()).map(sigma));
     }
 
     /// Whether the sizes are known, so that no frame changes them.
