@@ -8,7 +8,7 @@ use crate::math::{Pose, Vec3, reset};
 
 /// By how many times its own a detected joint's information grows where the pose deviates from the detection, see
 /// [`Detected::excess_deviation`]: a surface that is not the body's has hundreds of points.
-const EXCESS_GAIN: f64 = 15.0;
+const EXCESS_GAIN: f64 = 5.0;
 
 /// A detected joint of the body: its site, its position, world frame, its standard deviation along each axis, meters, and its
 /// information, 1/m^2.
