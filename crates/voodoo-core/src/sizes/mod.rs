@@ -369,6 +369,25 @@ mod tests {
     }
 
     #[test]
+    fn radii_are_uncertain_where_the_joints_were_found_with_the_pose() {
+        let (model, poses) = standing();
+        let (pixels, config) = (before_wall(&model.body, &poses), Config::default());
+        let sigma = |start| {
+            let (mut sizes, mut fit) = (Sizes::default(), Fit::new(&config).unwrap());
+            sizes.restart(&model, start, &config);
+            sizes.set_radius_sigmas(&model.body, &mut fit);
+            with_setting(&pixels, &config, &model, &poses, |setting| {
+                fit.match_last(setting.with_model(&model), &poses)
+            });
+            fit.correspondences().limbs[0].radius_variance.sqrt()
+        };
+        assert_eq!([Start::SizesKnown, Start::Positions].map(sigma), [0.0; 2]);
+        let radius = 0.25 * model.body.limbs()[0].shape.ends().map(|end| end.a + end.b).iter().sum::<f64>();
+        let share = sigma(Start::Detected) / radius;
+        assert!((0.05..0.15).contains(&share), "{share} of the radius");
+    }
+
+    #[test]
     fn girths_follow_the_contour_of_limbs_that_are_relied_on() {
         let body = standing().0.body;
         let names = ["l_thigh", "r_thigh", "l_calf", "r_calf"];

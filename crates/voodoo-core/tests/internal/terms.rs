@@ -219,25 +219,26 @@ proptest! {
         }).collect()).collect();
         // With an uncertain radius, the weights of the kernel are taken as constant: it is wide there.
         for (radius_variance, scale) in [(0.0, 0.05), (0.5, 1e3)] {
-        check(&body, &poses, &|poses, normal| {
-            let limbs = body.limbs().iter().zip(poses).zip(&measured).map(|((part, pose), points)| {
-                let mut matches = LimbMatches { radius_variance, ..LimbMatches::default() };
-                for point in points {
-                    let found = part.shape.closest_point(pose.inverse_transform_point(*point));
-                    let f32s = |v: Vec3| v.to_array().map(|value| value as f32);
-                    matches.candidate.push(0);
-                    matches.measured.push(f32s(*point));
-                    matches.weight.push(1.0);
-                    matches.surface.points.push(f32s(*pose * found.point));
-                    matches.surface.normals.push(f32s(pose.rotation * found.normal));
-                    matches.surface.signed_distance.push(found.signed_distance as f32);
-                    matches.surface.region.push(found.region as u8);
-                }
-                matches
-            }).collect();
-            let correspondences = Correspondences { limbs, ..Default::default() };
-            Surface { correspondences: &correspondences, information: 1.0, tangential_weight: 0.07, scale }.add(&body, poses, normal);
-        })?;
+            check(&body, &poses, &|poses, normal| {
+                let limbs = body.limbs().iter().zip(poses).zip(&measured).map(|((part, pose), points)| {
+                    let mut matches = LimbMatches { radius_variance, ..LimbMatches::default() };
+                    for point in points {
+                        let found = part.shape.closest_point(pose.inverse_transform_point(*point));
+                        let f32s = |v: Vec3| v.to_array().map(|value| value as f32);
+                        matches.candidate.push(0);
+                        matches.measured.push(f32s(*point));
+                        matches.weight.push(1.0);
+                        matches.surface.points.push(f32s(*pose * found.point));
+                        matches.surface.normals.push(f32s(pose.rotation * found.normal));
+                        matches.surface.signed_distance.push(found.signed_distance as f32);
+                        matches.surface.region.push(found.region as u8);
+                    }
+                    matches
+                }).collect();
+                let correspondences = Correspondences { limbs, ..Default::default() };
+                Surface { correspondences: &correspondences, information: 1.0, tangential_weight: 0.07, scale }
+                    .add(&body, poses, normal);
+            })?;
         }
     }
 }
