@@ -85,7 +85,7 @@ impl ColorGirths {
                 if system.is_empty() {
                     continue;
                 }
-                let Some(step) = self.limbs[limb].start(&system, &prior) else { continue };
+                let Some(step) = self.limbs[limb].start(&system, &prior, 1.0) else { continue };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;

@@ -27,6 +27,8 @@ const POINT_SIGMA: f64 = 0.015;
 const INDEPENDENT: f64 = 30.0;
 /// Standard deviation of a depth-contour edge, meters: approximately a pixel.
 const EDGE_SIGMA: f64 = 0.01;
+/// Share of a limb's shift that is the body's where the pose was found, not given: the error of a detected pose is as large.
+pub(super) const FOUND_SHARE: f64 = 0.5;
 /// Lateral standard deviation of a tracked limb's axis, across the line of sight, meters.
 pub(super) const ASIDE_SIGMA: f64 = 0.01;
 /// Number of successive frames that have the information of one, because their edge errors are correlated.
@@ -201,15 +203,18 @@ pub(super) fn side_system(
 }
 
 impl Girth {
-    /// Takes over what the first frame measured of a limb of known pose: one Gauss-Newton step for shift and semi-axes. Returns the
-    /// change since the last step.
-    pub(super) fn start(&mut self, system: &GirthSystem, prior: &GirthPrior) -> Option<GirthFit> {
-        let own = system.without_shift(SHIFT_SIGMA, Vector2::new(self.total.shift.x, self.total.shift.y))?;
+    /// Takes over what the first frame measured of a limb: one Gauss-Newton step for shift and semi-axes. `share` of the distance
+    /// between its axis and its surface is the body's shift, the rest is the error of its pose. Returns the change since the last
+    /// step.
+    pub(super) fn start(&mut self, system: &GirthSystem, prior: &GirthPrior, share: f64) -> Option<GirthFit> {
+        let so_far = Vector2::new(self.total.shift.x, self.total.shift.y);
+        let own = system.without_shift(SHIFT_SIGMA, so_far)?;
         let before = self.changes();
         self.information = own.information;
         self.measured = own.information * before + own.pull;
         let girths = self.most_likely(prior)? - before;
-        self.change(own.shift + own.shift_by_factors * girths, girths)
+        let shift = own.shift + own.shift_by_factors * girths;
+        self.change(shift - (1.0 - share) * (so_far + shift), girths)
     }
 
     /// Adds what later frames measured, by a Kalman filter, and returns the change of the semi-axes. The lateral offset of the axis
@@ -343,6 +348,27 @@ mod tests {
         let (a, b) = (0.5 * (shape.a0() + shape.a1()), 0.5 * (shape.b0() + shape.b1()));
         assert!((b - truth).abs() < 0.003, "width {b}");
         assert!((a - 0.1).abs() < 0.003, "thickness {a}");
+    }
+
+    #[test]
+    fn a_found_pose_takes_half_of_a_shift_and_an_exact_one_none() {
+        let shape = TaperedEllipticCylinder::new(0.3, 0.08, 0.08, 0.08, 0.08).unwrap();
+        let (aside, prior) = (Vec3::new(0.03, -0.04, 0.0), GirthPrior::given(None).unwrap());
+        for share in [1.0, FOUND_SHARE] {
+            let mut girth = Girth::default();
+            for _ in 0..GIRTH_STEPS {
+                let mut system = GirthSystem::default();
+                for turn in (0..24).map(f64::from) {
+                    let n = Vec3::new((0.4 * turn).cos(), (0.4 * turn).sin(), 0.0);
+                    let foot = 0.08 * n + 0.01 * turn * Vec3::Z;
+                    system.add(&shape, foot, n, n.dot(aside - girth.total.shift), 1e4);
+                }
+                girth.start(&system, &prior, share).unwrap();
+            }
+            let found = girth.total.shift;
+            assert!(found.distance(share * aside) < 0.05 * aside.length(), "{share}: {found:?}");
+            assert!(girth.total.factors.iter().all(|factor| (factor - 1.0).abs() < 0.01), "{:?}", girth.total.factors);
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::fit::{CONTOUR_FROM, Fit, Setting};
 use crate::math::{Pose, Vec3, reset};
 use crate::solver::{Gate, LENGTH_INFORMATION};
 use color_girth::ColorGirths;
-use girth::{ASIDE_SIGMA, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, side_system};
+use girth::{ASIDE_SIGMA, FOUND_SHARE, GIRTH_STEPS, Girth, GirthPrior, TIP_FACTORS, first_system, side_system};
 use reported::ReportedLengths;
 
 /// Points farther than this from the given pose are not used for the sizes, meters.
@@ -155,6 +155,7 @@ impl Sizes {
 
     fn fit_girths(&mut self, setting: Setting, model: &mut Model, poses: &mut [Pose], fit: &mut Fit) {
         let mut edges_found = Vec::new();
+        let share = if self.rough { FOUND_SHARE } else { 1.0 };
         for _ in 0..GIRTH_STEPS {
             // The pose is known, so the closest limb is the one that was observed.
             fit.match_points(setting.with_model(model), poses, &START_GATE);
@@ -176,7 +177,9 @@ impl Sizes {
                 let matches = &fit.correspondences().limbs[limb];
                 let Some(prior) = GirthPrior::of(&model.body, limb, &self.girths) else { continue };
                 let system = first_system(&shape, matches, &poses[limb], &edges_found);
-                let Some(step) = system.and_then(|system| self.girths[limb].start(&system, &prior)) else { continue };
+                let Some(step) = system.and_then(|system| self.girths[limb].start(&system, &prior, share)) else {
+                    continue;
+                };
                 if model.body.change_girth(limb, step.shift, step.axes()) {
                     let pose = &mut poses[limb];
                     pose.translation += pose.rotation * step.shift;
