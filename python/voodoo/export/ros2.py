@@ -70,7 +70,7 @@ def description(body: Body, person: str) -> dict[str, Any]:
 
 def tracked(stamp: float, persons: Sequence[str], *, root_frame: str) -> dict[str, Any]:
     """Topic of TRACKED -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s]."""
-    return dict.fromkeys(TRACKED, new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons)))
+    return dict.fromkeys(TRACKED, new(IDS, header=header_at(stamp, root_frame), ids=list(persons)))
 
 
 _KEYPOINTS = ("", "vc7") + tuple(
@@ -96,7 +96,7 @@ def keypoints_message(estimate: Estimate, image: DepthImage | ColorImage) -> Any
         probability = sure.get(f"{side}_{_LIMB_TO.get(joint)}", sure[estimate.limb_names[0]])
         if ((at >= 0.0) & (at <= 1.0)).all():
             points[number] = new(_POINT, x=float(at[0]), y=float(at[1]), c=float(np.nan_to_num(probability)))
-    return new(SKELETON, header=header_at(round(image.stamp * 1e9), image.sensor), skeleton=points)
+    return new(SKELETON, header=header_at(image.stamp, image.sensor), skeleton=points)
 
 
 def write_bag(
@@ -106,7 +106,6 @@ def write_bag(
     *,
     root_frame: str,
     person: str = "p1",
-    markers: bool = True,
     turn: Turn | None = None,
 ) -> None:
     """Write a new bag folder.
@@ -127,7 +126,6 @@ def write_bag(
         body: in the sizes it was tracked with.
         root_frame: frame of the track, e.g. "base_link".
         person: REP-155 id.
-        markers: also write the markers.
         turn: how the root frame is turned upright; None: a camera's optical frame, by its name, by its axes.
 
     Raises:
@@ -135,16 +133,11 @@ def write_bag(
             of another body.
         OSError: the bag cannot be written.
     """
-    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, markers=markers, turn=turn)
+    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, turn=turn)
 
 
 def write_people_bag(
-    path: str | Path,
-    people: Mapping[str, tuple[Track, Body]],
-    *,
-    root_frame: str,
-    markers: bool = True,
-    turn: Turn | None = None,
+    path: str | Path, people: Mapping[str, tuple[Track, Body]], *, root_frame: str, turn: Turn | None = None
 ) -> None:
     """Write a new bag folder of several people.
 
@@ -154,7 +147,6 @@ def write_people_bag(
         path: the folder, which must not exist.
         people: REP-155 id, which begins with a letter -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
-        markers: also write the markers.
         turn: see `write_bag`.
 
     Raises:
@@ -173,7 +165,7 @@ def write_people_bag(
     frames: list[tuple[float, int, int]] = []
     there: dict[float, list[str]] = {}
     for number, human in enumerate(humans):
-        kinds |= human.kinds(markers)
+        kinds |= human.kinds()
         first |= description(human.body, human.person)
         frames += [(float(stamp), number, index) for index, stamp in enumerate(human.track.stamps)]
     kinds |= {topic: message.__msgtype__ for topic, message in first.items()}
@@ -183,7 +175,7 @@ def write_people_bag(
     with appearing_whole(path) as place, Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
         for stamp, number, index in frames:
-            messages = first | humans[number].messages(index, markers=markers)
+            messages = first | humans[number].messages(index)
             if stamp in there:
                 messages |= tracked(stamp, there.pop(stamp), root_frame=humans[number].root)
             first = {}
@@ -214,16 +206,18 @@ class _Human:
             sure = _core.moved_covariances(known, frames.places[:, 0] - roots)
             self._rows = zip(angles, frames.on_parents, sure, strict=True)
 
-    def kinds(self, markers: bool) -> dict[str, str]:
+    def kinds(self) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
         kinds = {f"{self.topic}/joint_states": JOINTS}
         kinds |= {f"{self.topic}/pose": POSE} if np.isfinite(self.track.root_covariance).any() else {}
-        return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
+        return kinds | {f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"}
 
-    def messages(self, index: int, *, markers: bool) -> dict[str, Any]:
+    def messages(self, index: int) -> dict[str, Any]:
         """Topic -> message of a frame; frames are asked for in order."""
-        at = round(float(self.track.stamps[index]) * 1e9)
+        at = float(self.track.stamps[index])
+        header = header_at(at, self.root)
         messages: dict[str, Any] = {}
+        drawn = [new(_MARKER, header=header, action=_DELETE_ALL)]
         if self._displayed[index]:
             angles, rows, sure = next(self._rows)
             placed = [(parent, name, row) for (parent, name), row in zip(self._frames, rows.tolist(), strict=True)]
@@ -231,14 +225,8 @@ class _Human:
             messages[f"{self.topic}/joint_states"] = joint_message(at, self.person, self._joints, angles)
             if np.isfinite(sure).all():
                 messages[f"{self.topic}/pose"] = pose_message(at, self.root, rows[0].tolist(), sure)
-        if markers:
-            header = header_at(at, self.root)
-            drawn = (
-                _markers(self.track, self.body, index, header)
-                if self._displayed[index]
-                else [new(_MARKER, header=header, action=_DELETE_ALL)]
-            )
-            messages[f"{self.topic}/markers"] = new("visualization_msgs/msg/MarkerArray", markers=drawn)
+            drawn = _markers(self.track, self.body, index, header)
+        messages[f"{self.topic}/markers"] = new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
 
 
@@ -247,35 +235,32 @@ def root_on_parent(pose: FloatArray) -> list[float]:
     return [*(-pose[:3, :3].T @ pose[:3, 3]).tolist(), *quaternions(pose[:3, :3].T).tolist()]
 
 
-def transforms_message(nanoseconds: int, rows: Iterable[tuple[str, str, Sequence[float]]]) -> Any:  # noqa: ANN401
-    """TFMessage of parents, names, and place x, y, z and rotation x, y, z, w on the parent."""
+def transforms_message(stamp: float, rows: Iterable[tuple[str, str, Sequence[float]]]) -> Any:  # noqa: ANN401
+    """TFMessage of parents, names, and place x, y, z and rotation x, y, z, w on the parent, at a time [s]."""
     transforms = []
-    for parent, name, (x, y, z, qx, qy, qz, qw) in rows:
-        place = new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
-        turn = new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw)
+    for parent, name, row in rows:
+        place, turn = _geometry("Vector3", row[:3]), _geometry("Quaternion", row[3:])
         moved = new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
-        header = header_at(nanoseconds, parent)
-        transforms.append(
-            new("geometry_msgs/msg/TransformStamped", header=header, child_frame_id=name, transform=moved)
-        )
+        about: dict[str, Any] = {"header": header_at(stamp, parent), "child_frame_id": name}
+        transforms.append(new("geometry_msgs/msg/TransformStamped", transform=moved, **about))
     return new(TF, transforms=transforms)
 
 
-def joint_message(nanoseconds: int, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
-    """JointState of angles [rad]."""
+def joint_message(stamp: float, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
+    """JointState of angles [rad] at a time [s]."""
     return new(
         JOINTS,
-        header=header_at(nanoseconds, f"body_{person}"),
+        header=header_at(stamp, f"body_{person}"),
         name=[f"{name}_{person}" for name in joints],
         position=np.ascontiguousarray(angles, dtype=np.float64),
     )
 
 
-def pose_message(nanoseconds: int, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
-    """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers)."""
+def pose_message(stamp: float, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
+    """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers), at a time [s]."""
     uncertain = np.asarray(covariance, dtype=np.float64).ravel()
     pose = new("geometry_msgs/msg/PoseWithCovariance", pose=_pose(row), covariance=uncertain)
-    return new(POSE, header=header_at(nanoseconds, root), pose=pose)
+    return new(POSE, header=header_at(stamp, root), pose=pose)
 
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
@@ -287,7 +272,7 @@ def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  #
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
         rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
         result.append(_marker(header, "limbs", number, _CYLINDER, middle, turns[number], size, rgb, []))
-    points = [_point(position) for position in track.joints[index].tolist()]
+    points = [_geometry("Point", position) for position in track.joints[index].tolist()]
     still = np.array([0.0, 0.0, 0.0, 1.0])
     result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
     known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
@@ -319,7 +304,7 @@ def _marker(
         id=number,
         type=kind,
         pose=_pose([*place.tolist(), *turn.tolist()]),
-        scale=new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
+        scale=_geometry("Vector3", size),
         color=new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
         points=points,
     )
@@ -347,35 +332,25 @@ def _nothing(form: Nodetype, content: Any) -> Any:  # noqa: ANN401 - of rosbags
     return []
 
 
-def header_at(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
-    """A std_msgs/Header."""
-    seconds, rest = divmod(nanoseconds, 1_000_000_000)
-    return new(
-        "std_msgs/msg/Header",
-        stamp=new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest),
-        frame_id=frame,
-    )
+def header_at(stamp: float, frame: str) -> Any:  # noqa: ANN401
+    """A std_msgs/Header of a time [s]."""
+    seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
+    time = new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+    return new("std_msgs/msg/Header", stamp=time, frame_id=frame)
 
 
 def _pose(row: Sequence[float]) -> Any:  # noqa: ANN401
-    x, y, z, w = row[3:]
-    turn = new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
-    return new("geometry_msgs/msg/Pose", position=_point(row[:3]), orientation=turn)
+    place, turn = _geometry("Point", row[:3]), _geometry("Quaternion", row[3:])
+    return new("geometry_msgs/msg/Pose", position=place, orientation=turn)
 
 
-def _point(position: Sequence[float]) -> Any:  # noqa: ANN401
-    x, y, z = position
-    return new("geometry_msgs/msg/Point", x=x, y=y, z=z)
+def _geometry(kind: str, values: Sequence[float]) -> Any:  # noqa: ANN401
+    """A Point, Vector3 or Quaternion of its x, y, z and w."""
+    return new(f"geometry_msgs/msg/{kind}", **dict(zip("xyzw", map(float, values), strict=False)))
 
 
 def instant(
-    estimate: Estimate,
-    body: Body,
-    *,
-    root_frame: str,
-    person: str,
-    markers: bool = True,
-    turn: Turn | None = None,
+    estimate: Estimate, body: Body, *, root_frame: str, person: str, turn: Turn | None = None
 ) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
 
@@ -384,7 +359,6 @@ def instant(
         body: in its current sizes.
         root_frame: frame of the estimate; if it is turned, see `write_bag`.
         person: REP-155 id.
-        markers: also make the markers.
         turn: see `write_bag`.
 
     Raises:
@@ -392,7 +366,7 @@ def instant(
     """
     # Angles are not needed; if nobody was found, the names come from the body.
     track = Track.of([estimate], body=None if estimate.joints else body)
-    return _Human(track, body, person, root_frame, turn).messages(0, markers=markers)
+    return _Human(track, body, person, root_frame, turn).messages(0)
 
 
 def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition

@@ -11,6 +11,7 @@ import numpy as np
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from voodoo.drawing.surfaces import entity
 from voodoo.errors import VoodooError
 from voodoo.export import ros2
 from voodoo.live.follow import Step
@@ -79,10 +80,10 @@ class Recorder(Output):
         if not isinstance(item, DepthImage | ColorImage | PointCloud | LaserScan):
             return
         topic, made = _WRITTEN[type(item)]
-        name = item.sensor.strip("/").replace("/", "_").replace(" ", "_") or "sensor"
+        name = entity(item.sensor)
         frame = f"{name}_frame"
         self._write("/tf", transforms(self._root(), frame, item.stamp, item.root_from_sensor))
-        header = _header(item.stamp, frame)
+        header = ros2.header_at(item.stamp, frame)
         if isinstance(item, DepthImage | ColorImage) and self._cameras.get(item.sensor) != item.camera:
             self._cameras[item.sensor] = item.camera
             self._write(f"/{name}/{topic.partition('/')[0]}/camera_info", camera_info(header, item.camera))
@@ -113,7 +114,7 @@ class Recorder(Output):
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
     """A tf2_msgs/TFMessage of one transform (4, 4)."""
     row = [*parent_from_child[:3, 3].tolist(), *quaternions(parent_from_child[:3, :3]).tolist()]
-    return ros2.transforms_message(round(stamp * 1e9), [(parent, child, row)])
+    return ros2.transforms_message(stamp, [(parent, child, row)])
 
 
 def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
@@ -191,7 +192,3 @@ _WRITTEN: dict[type, tuple[str, Callable[[Any, Any], Any]]] = {
     PointCloud: ("points", _cloud),
     LaserScan: ("scan", _scan),
 }
-
-
-def _header(stamp: float, frame: str) -> Any:  # noqa: ANN401
-    return ros2.header_at(round(stamp * 1e9), frame)

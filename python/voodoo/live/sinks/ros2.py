@@ -179,13 +179,13 @@ class Ros2Sink(Output):
         placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
 
         def encode(numbers: list[float]) -> list[bytes]:
-            left = iter(numbers)
+            left, at = iter(numbers), STAMP_NS / 1e9
             rows = [(*pair, list(islice(left, 7))) for pair in placed]
-            messages = [transforms_message(STAMP_NS, rows)] if ids else []
+            messages = [transforms_message(at, rows)] if ids else []
             for person in ids:
-                messages.append(joint_message(STAMP_NS, person, joints, list(islice(left, len(joints)))))
-            messages += [pose_message(STAMP_NS, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
-            return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
+                messages.append(joint_message(at, person, joints, list(islice(left, len(joints)))))
+            messages += [pose_message(at, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
+            return [cdr(one) for one in (*messages, *tracked(at, ids, root_frame=root).values())]
 
         count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
         return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
