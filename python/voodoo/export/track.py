@@ -108,27 +108,25 @@ class Track:
 
     def __post_init__(self) -> None:
         """Check that the arrays are consistent, and that all frames with a pose status have a pose."""
-        frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
-        missing = {"covariance": (0, 3, 3), "angle_sigma": (0,), "root_covariance": (6, 6), "angles": (0,)}
-        for name, size in missing.items():
-            if not (self.angle_names if name == "angles" else getattr(self, name).size):
-                object.__setattr__(self, name, np.full((frames, *size), np.nan))
-        if len(self.status) != frames:
-            raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
-        for limb, words in self.limb_status.items():
+        frames, joints, angles = len(self.stamps), len(self.joint_names), len(self.angle_names)
+        limb_words = {f"limb_status[{limb}]": words for limb, words in self.limb_status.items()}
+        for name, words in {"status": self.status, **limb_words}.items():
             if len(words) != frames:
-                raise VoodooError(f"limb_status[{limb}]: expected {frames} entries, found {len(words)}")
-        expected = {
-            "angles": (frames, len(self.angle_names)),
-            "stamps": (frames,),
-            "residual": (frames,),
-            "joints": (frames, joints, 3),
-            "world_from_limb": (frames, limbs, 4, 4),
-            "covariance": (frames, joints if self.covariance.size else 0, 3, 3),
-            "root_covariance": (frames, 6, 6),
-            "angle_sigma": (frames, len(self.angle_names) if self.angle_sigma.size else 0),
+                raise VoodooError(f"{name}: expected {frames} entries, found {len(words)}")
+        rows: dict[str, tuple[int, ...]] = {
+            "angles": (angles,),
+            "stamps": (),
+            "residual": (),
+            "joints": (joints, 3),
+            "world_from_limb": (len(self.limb_names), 4, 4),
+            "covariance": (joints if self.covariance.size else 0, 3, 3),
+            "root_covariance": (6, 6),
+            "angle_sigma": (angles if self.angle_sigma.size else 0,),
         }
-        for name, shape in expected.items():
+        for name, row in rows.items():
+            shape = frames, *row
+            if (name in _UNKNOWN and not getattr(self, name).size) or (name == "angles" and not angles):
+                object.__setattr__(self, name, np.full(shape, np.nan))
             array = getattr(self, name)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
                 found = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
