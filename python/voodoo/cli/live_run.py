@@ -1,4 +1,4 @@
-"""Implementation of `voodoo live`: opens sources, tracks, and publishes until a signal. Not imported for its help."""
+"""Implementation of `voodoo live`: tracks and publishes until a signal. Not imported for its help."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import gc
 import json
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -26,7 +26,6 @@ from voodoo.live.follow import Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks import sink_of
-from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
 from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.model.body import Body
@@ -35,7 +34,6 @@ from voodoo.pipeline.start import starts_of
 from voodoo.recordings import sample_path
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording, SensorInfo
-from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
 from voodoo.whole import write_whole
@@ -50,37 +48,6 @@ _NO_SCREEN = "--save FILE.rrd writes a file"
 """Advice in the error of `Viewer` without a screen."""
 _SWITCH_S = 5e-4
 """Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
-
-
-def entered(
-    words: Sequence[str],
-    calibrations: Sequence[Path],
-    *,
-    options: Mapping[str, Any],
-    several: bool,
-    network: KeypointNetwork | None,
-    **how: Any,  # noqa: ANN401 - of source_of
-) -> Live:
-    """The sources of the command line.
-
-    Raises:
-        VoodooError: more calibrations than sources, or an invalid source.
-    """
-    if len(calibrations) > len(words):
-        raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
-    given = {
-        "frame": how["root_frame"],
-        "rate": None if how["rate"] == 1.0 else how["rate"],
-        "loop": how["loop"] or None,
-    }
-    given |= options
-    refuse_unused(words, {name: value for name, value in given.items() if value is not None})
-    places = [*calibrations, *[None] * (len(words) - len(calibrations))]
-    sources = [
-        source_of(word, options=options_for(word, options), calibration=place, **how)
-        for word, place in zip(words, places, strict=True)
-    ]
-    return Live(sources, on_message=print_message, eager=not several, network=network)
 
 
 def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
