@@ -10,7 +10,7 @@ from voodoo.export.ros2 import person_id
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown, upright_frame
+from voodoo.live.sinks.people import shown
 
 PORT = 8766
 """Foxglove's own default is that of `ws://`."""
@@ -52,13 +52,13 @@ class FoxgloveSink(Output):
         if not self._channels.are_wanted:
             return
         people, persons, numbers = shown(step, self._root()), [], []
-        if people is not None and people.present:
+        if people.present:
             names, parents, _, on_parents = people.frames
             about = names, parents, people.posed.body.limb_names, people.joints.shape[1]
             shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
             persons = [(person_id(people.numbers[index]), *about) for index in people.present]
             numbers = [part for index in people.present for part in (on_parents[index], shapes[index])]
-        self._channels.log(step.stamp, persons, numbers, upright_frame(step, self._root()))
+        self._channels.log(step.stamp, persons, numbers, people.frame)
 
     def close(self) -> None:
         """See Output."""

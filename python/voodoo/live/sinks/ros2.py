@@ -40,7 +40,7 @@ from voodoo.export.template import STAMP_NS, template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import shown, upright_frame
+from voodoo.live.sinks.people import shown
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody
@@ -110,11 +110,12 @@ class Ros2Sink(Output):
     def publish(self, step: Step) -> None:
         """See Output."""
         root = self._root()
-        people, frame = shown(step, root), upright_frame(step, root)
+        people = shown(step, root)
+        frame = people.frame
         observed: dict[int, Body] = {}
         about: tuple[Any, ...] = (), (), (), ()
         numbers: list[FloatArray] = []
-        if people is not None and (there := people.present):
+        if there := people.present:
             observed = {people.numbers[index]: people.bodies[index] for index in there}
             (joints, angles), (names, parents, _, rows), sigmas = people.angles, people.frames, people.covariances
             sure = [index for index in there if math.isfinite(sigmas[index, 0, 0])]

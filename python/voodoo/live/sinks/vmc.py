@@ -78,7 +78,7 @@ class VmcSink(Output):
         self._start = step.stamp if self._start is None else self._start
         people, numbers = shown(step, self._root()), np.empty(0)
         names: tuple[str, ...] = ()
-        if people is not None and people.present:
+        if people.present:
             first = min(people.present, key=people.numbers.__getitem__)
             names, numbers = bones_of(people.posed, first, self.name)
         for datagram in self._template_of(names).filled([np.array([step.stamp - self._start]), numbers], b""):
