@@ -8,7 +8,9 @@ left, z up when the person stands at rest (REP-103). The parent of `body_<id>` i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -108,7 +110,7 @@ def write_bag(
     person: str = "p1",
     turn: Turn | None = None,
 ) -> None:
-    """Write a new bag folder.
+    """Write a new bag folder, or the .mcap file of one.
 
     Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/tracked` and `/humans/persons/tracked` (hri_msgs/IdsList),
     `/humans/persons/<person>/body_id` and `anonymous`, and `/human_description_<person>` (std_msgs/String, URDF; these three once
@@ -121,7 +123,7 @@ def write_bag(
     has as a child of the root frame.
 
     Args:
-        path: the folder, which must not exist.
+        path: the folder, which must not exist, or a .mcap file.
         track: with limb poses.
         body: in the sizes it was tracked with.
         root_frame: frame of the track, e.g. "base_link".
@@ -139,12 +141,12 @@ def write_bag(
 def write_people_bag(
     path: str | Path, people: Mapping[str, tuple[Track, Body]], *, root_frame: str, turn: Turn | None = None
 ) -> None:
-    """Write a new bag folder of several people.
+    """Write a new bag folder of several people, or the .mcap file of one.
 
     As `write_bag`, with frames `body_<person>`, `torso_<person>`, ... and topics `/humans/bodies/<person>/...` for each of them.
 
     Args:
-        path: the folder, which must not exist.
+        path: the folder, which must not exist, or a .mcap file.
         people: REP-155 id, which begins with a letter -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
         turn: see `write_bag`.
@@ -158,7 +160,7 @@ def write_people_bag(
         if not name.isidentifier():
             raise VoodooError(f"person: expected a name, found {name!r}")
     humans = [_Human(track, body, name, root_frame, turn) for name, (track, body) in people.items()]
-    if path.exists():
+    if path.suffix != ".mcap" and path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
     kinds = {"/tf": TF} | dict.fromkeys(TRACKED, IDS)
     first: dict[str, Any] = {}
@@ -172,7 +174,7 @@ def write_people_bag(
     frames.sort()
     for stamp, number, index in frames:
         there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])
-    with appearing_whole(path) as place, Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    with bag(path) as writer:
         connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
         for stamp, number, index in frames:
             messages = first | humans[number].messages(index)
@@ -181,6 +183,18 @@ def write_people_bag(
             first = {}
             for name, message in messages.items():
                 writer.write(connect[name], round(stamp * 1e9), cdr(message))
+
+
+@contextmanager
+def bag(path: Path) -> Iterator[Writer]:
+    """Write a new bag: a folder, or for .mcap the only file of one; it appears when it is complete."""
+    with appearing_whole(path) as place:
+        folder = place.with_suffix("") if path.suffix == ".mcap" else place
+        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            yield writer
+        if folder != place:
+            next(folder.glob("*.mcap")).rename(place)
+            shutil.rmtree(folder)
 
 
 class _Human:
