@@ -43,18 +43,6 @@ def angle_sigmas_of(estimates: Sequence[Estimate], names: Sequence[str]) -> Floa
     return np.sqrt(found / free) if np.isfinite(found).any() else np.empty((len(estimates), 0))
 
 
-def covariances_of(estimates: Sequence[Estimate], joint_names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where unknown, and
-    (F, 0, 3, 3) if unknown in all frames."""
-    joints = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
-    root = np.full((len(estimates), 6, 6), np.nan)
-    for index, estimate in enumerate(estimates):
-        if len(estimate.joint_covariances) == len(joint_names):
-            joints[index] = estimate.joint_covariances
-        root[index] = estimate.root_covariance
-    return (joints if np.isfinite(joints).any() else np.empty((len(estimates), 0, 3, 3))), root
-
-
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
 FORMAT_VERSION = 3
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
@@ -200,17 +188,19 @@ class Track:
         limb_names: tuple[str, ...] = posed[0].limb_names if posed else () if body is None else body.limb_names
         joints = np.full((len(estimates), len(joint_names), 3), np.nan)
         poses = np.full((len(estimates), len(limb_names), 4, 4), np.nan)
+        covariance = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
         for index, estimate in enumerate(estimates):
             if str(estimate.status) != SEARCHING:
                 if estimate.joint_names != joint_names or estimate.limb_names != limb_names:
                     raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
                 joints[index], poses[index] = estimate.joint_positions, estimate.limb_poses
+            if len(estimate.joint_covariances) == len(joint_names):
+                covariance[index] = estimate.joint_covariances
         angle_names, angles = angles_of_estimates(estimates, body)
-        covariance, root_covariance = covariances_of(estimates, joint_names)
         support = [estimate.limb_status for estimate in estimates]
         return cls(
-            covariance=covariance,
-            root_covariance=root_covariance,
+            covariance=covariance if np.isfinite(covariance).any() else np.empty((len(estimates), 0, 3, 3)),
+            root_covariance=np.array([estimate.root_covariance for estimate in estimates]),
             angle_sigma=angle_sigmas_of(estimates, angle_names),
             angle_names=angle_names,
             angles=angles,
