@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import VoodooError, installed
+from voodoo.errors import VoodooError, installed, reading
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.skeleton import FloatArray, Skeleton
 from voodoo.export.template import template
@@ -58,13 +58,11 @@ class VmcSink(Output):
         self.name, self.receiver, self.waits = address, True, False
         self._root = root_frame
         host, port, _ = parts_of(address, host=None, port=PORT)
-        try:
+        with reading(address, "the name or address of a host", error=VoodooError):
             family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind, protocol)
             self._socket.setblocking(False)
             self._socket.connect(place)
-        except OSError as error:
-            raise VoodooError(f"{address}: expected the name or address of a host, found: {error.strerror}") from error
         self._start: float | None = None
         self._template_of = lru_cache(2)(self._make_template)
 
