@@ -8,9 +8,9 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from functools import partial
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,7 @@ _SAMPLED = 3
 """Number of parts in a sample."""
 
 
-class Spool:
+class Spool(AbstractContextManager["Spool"]):
     """Poses of one person or several in a hidden folder next to the first output; use it in a `with` block.
 
     An error of this package in the block removes them; after another one, or a crash, `recover` makes the outputs.
@@ -196,10 +196,6 @@ class Spool:
         self._hidden.close()
         return done, [*failed, VoodooError(kept)]
 
-    def __enter__(self) -> Spool:
-        """Enter the context."""
-        return self
-
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Remove the folder after an error of this package; keep it after another one.
 
@@ -339,10 +335,6 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
 
 def _free(path: Path, taken: set[Path]) -> Path:
     """A name that is not in use."""
-    found, number = path, 1
-    while found.exists() or found.resolve() in taken:
-        again = f"-{number}" if number > 1 else ""
-        known = path.suffix in FORMATS
-        name = f"{path.stem}.recovered{again}{path.suffix}" if known else f"{path.name}-recovered{again}"
-        found, number = path.with_name(name), number + 1
-    return found
+    start, end = (f"{path.stem}.recovered", path.suffix) if path.suffix in FORMATS else (f"{path.name}-recovered", "")
+    others = (path.with_name(f"{start}{again}{end}") for again in chain([""], (f"-{number}" for number in count(2))))
+    return next(one for one in chain([path], others) if not (one.exists() or one.resolve() in taken))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
@@ -89,7 +89,7 @@ _LEAST_FREE = 2**16
 _PICTURE = re.compile(r"frame_\d{6,}\.png")
 
 
-class PictureWriter:
+class PictureWriter(AbstractContextManager["PictureWriter"]):
     """Writes images of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
 
     What cannot be written does not end the block: `failure` holds the first error, and nothing more is written. A film or
@@ -151,10 +151,6 @@ class PictureWriter:
             self._count += 1
         except Exception as error:
             self.failure = error
-
-    def __enter__(self) -> PictureWriter:
-        """Enter the context; files are opened with the first image."""
-        return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Close the video and, without an error, check that it can be read."""

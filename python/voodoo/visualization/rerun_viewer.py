@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ _CHUNK_BYTES = 8_000_000
 _VISIBLE_M = 0.002
 
 
-class Viewer:
+class Viewer(AbstractContextManager["Viewer"]):
     """Writes the data of each step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
     Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
@@ -105,10 +105,6 @@ class Viewer:
         except (RuntimeError, OSError) as error:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
-
-    def __enter__(self) -> Viewer:
-        """Enter the context."""
-        return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Finish the file; after an error or failure, remove it."""
