@@ -359,7 +359,7 @@ def test_several_people_are_published_as_a_bag_has_them(root):
 
 def test_a_frame_is_written_in_as_few_messages_as_it_has_topics_and_encoded_once(monkeypatch):
     encoded = []
-    monkeypatch.setattr("voodoo.live.sinks.ros2.cdr", lambda message: encoded.append(message) or cdr(message))
+    monkeypatch.setattr("voodoo.export.ros2.cdr", lambda message: encoded.append(message) or cdr(message))
     node = FakeNode()
     output = Ros2Sink(root_frame=lambda: "odom", node=node)
     recording = open_recording(sample_path(), use=("depth",))

@@ -8,6 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 
@@ -133,20 +134,19 @@ def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
 
 
 def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
-    image = item.image
+    image: npt.NDArray[Any] = np.ascontiguousarray(item.image)
     if image.dtype.kind == "u" and item.meters_per_unit != 0.001:
         image = np.where(image > 0, image * np.float64(item.meters_per_unit), np.nan).astype(np.float32)
     elif image.dtype.kind == "f" and item.meters_per_unit != 1.0:
         image = (image * item.meters_per_unit).astype(np.float32)
-    return ros2.new(
-        "sensor_msgs/msg/Image",
-        header=header,
-        height=image.shape[0],
-        width=image.shape[1],
-        encoding="16UC1" if image.dtype.kind == "u" else "32FC1",
-        step=image.shape[1] * image.dtype.itemsize,
-        data=np.ascontiguousarray(image).view(np.uint8).ravel(),
-    )
+    encoding = "16UC1" if image.dtype.kind == "u" else "32FC1"
+    return _rows("sensor_msgs/msg/Image", header, image, encoding=encoding, step=image.shape[1] * image.itemsize)
+
+
+def _rows(kind: str, header: Any, rows: npt.NDArray[Any], **fields: Any) -> Any:  # noqa: ANN401
+    """A message of an array (H, W, ...): its size, its bytes, and other fields."""
+    size = {"height": rows.shape[0], "width": rows.shape[1]}
+    return ros2.new(kind, header=header, **size, data=rows.view(np.uint8).ravel(), **fields)
 
 
 def _color(header: Any, item: ColorImage) -> Any:  # noqa: ANN401
@@ -160,30 +160,14 @@ def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
         ros2.new("sensor_msgs/msg/PointField", name=name, offset=4 * index, datatype=7, count=1)
         for index, name in enumerate("xyz")
     ]
-    return ros2.new(
-        "sensor_msgs/msg/PointCloud2",
-        header=header,
-        height=1,
-        width=len(points),
-        fields=fields,
-        point_step=12,
-        row_step=12 * len(points),
-        data=points.view(np.uint8).ravel(),
-        is_dense=True,
-    )
+    about: dict[str, Any] = {"point_step": 12, "row_step": points.nbytes, "is_dense": True}
+    return _rows("sensor_msgs/msg/PointCloud2", header, points[None], fields=fields, **about)
 
 
 def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
-    return ros2.new(
-        "sensor_msgs/msg/LaserScan",
-        header=header,
-        angle_min=item.angle_min,
-        angle_max=item.angle_min + item.angle_increment * (len(item.ranges) - 1),
-        angle_increment=item.angle_increment,
-        range_min=item.range_min,
-        range_max=item.range_max,
-        ranges=item.ranges.astype(np.float32),
-    )
+    fields = {name: getattr(item, name) for name in ("angle_min", "angle_increment", "range_min", "range_max")}
+    fields["angle_max"] = item.angle_min + item.angle_increment * (len(item.ranges) - 1)
+    return ros2.new("sensor_msgs/msg/LaserScan", header=header, ranges=item.ranges.astype(np.float32), **fields)
 
 
 _WRITTEN: dict[type, tuple[str, Callable[[Any, Any], Any]]] = {
