@@ -13,6 +13,7 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo.errors import installed
+from voodoo.export.conventions import JOINT_COLOR, limb_color
 from voodoo.export.human_frames import human_frames, placed_names
 from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.template import STAMP_NS, template
@@ -24,9 +25,6 @@ from voodoo.whole import appearing_whole
 SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
 """Topics: foxglove.FrameTransforms and foxglove.SceneUpdate."""
-_LEFT, _RIGHT, _JOINT = (
-    dict(zip("rgba", one, strict=True)) for one in ((0.9, 0.6, 0.3, 0.6), (0.3, 0.6, 0.9, 0.6), (0.9, 0.1, 0.1, 0.6))
-)
 _JOINT_M = 0.04
 FoxglovePerson: TypeAlias = tuple[str, tuple[str, ...], tuple[int, ...], tuple[str, ...], int]
 """REP-155 id, names and parents of `HumanFrames`, names of limbs, and number of joints and sites."""
@@ -81,7 +79,7 @@ class Channels:
         """Messages of persons: transforms, if somebody is there, and the scene."""
         m = self._messages
         time = m.Timestamp(*divmod(STAMP_NS, 1_000_000_000))
-        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**_JOINT)
+        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**JOINT_COLOR)
         still = m.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
         before = m.SceneEntityDeletion(timestamp=time, type=m.SceneEntityDeletionType.All)
 
@@ -96,7 +94,7 @@ class Channels:
                 size=m.Vector3(**_xyz(row[7:])),
                 bottom_scale=row[10],
                 top_scale=row[11],
-                color=m.Color(**(_LEFT if limb.startswith("l_") else _RIGHT)),
+                color=m.Color(**limb_color(limb)),
             )
 
         def sphere(row: list[float]) -> Any:  # noqa: ANN401

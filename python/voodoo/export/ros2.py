@@ -24,8 +24,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
+from voodoo.export.conventions import JOINT_COLOR, Color, limb_color
 from voodoo.export.human_frames import human_frames, joint_angles, placed_names
-from voodoo.export.skeleton import FloatArray, skeleton
+from voodoo.export.skeleton import FloatArray, ellipsoids, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
@@ -53,6 +54,7 @@ TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _MARKER = "visualization_msgs/msg/Marker"
 _SPHERE, _CYLINDER, _SPHERES, _DELETE_ALL = 2, 3, 7, 3
+_SPREAD_COLOR: Color = {"r": 0.9, "g": 0.9, "b": 0.9, "a": 0.3}
 
 
 def person_id(number: int) -> str:
@@ -278,50 +280,26 @@ def pose_message(stamp: float, root: str, row: Sequence[float], covariance: npt.
 
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
-    result = []
+    result: list[Any] = []
+
+    def add(name: str, kind: int, row: Sequence[float], size: Sequence[float], rgba: Color, **more: Any) -> None:  # noqa: ANN401
+        color, scale = new("std_msgs/msg/ColorRGBA", **rgba), _geometry("Vector3", size)
+        about = {"header": header, "ns": name, "type": kind, "pose": _pose(row), "scale": scale, "color": color}
+        result.append(new(_MARKER, **about, **more))
+
     poses = track.world_from_limb[index]
     turns = quaternions(poses[:, :3, :3])
     for number, (limb, pose) in enumerate(zip(body.limbs, poses, strict=True)):
         middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
-        rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
-        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turns[number], size, rgb, []))
+        add("limbs", _CYLINDER, (*middle, *turns[number]), size, limb_color(limb.name), id=number)
     points = [_geometry("Point", position) for position in track.joints[index].tolist()]
-    still = np.array([0.0, 0.0, 0.0, 1.0])
-    result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
+    add("joints", _SPHERES, (*[0.0] * 6, 1.0), (0.04,) * 3, JOINT_COLOR, points=points)
     known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
-    variances, axes = np.linalg.eigh(track.covariance[index][known])
-    axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
-    sizes = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
-    for number, turn, size in zip(known.tolist(), quaternions(axes), sizes, strict=True):
-        place = track.joints[index, number]
-        result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))
+    sizes, axes = ellipsoids(track.covariance[index][known])
+    for number, turn, size in zip(known.tolist(), axes, 2.0 * sizes, strict=True):
+        add("uncertainty", _SPHERE, (*track.joints[index, number], *turn), size, _SPREAD_COLOR, id=number)
     return result
-
-
-def _marker(
-    header: Any,  # noqa: ANN401
-    namespace: str,
-    number: int,
-    kind: int,
-    place: FloatArray,
-    turn: FloatArray,
-    size: Sequence[float],
-    rgb: tuple[float, float, float],
-    points: list[Any],
-    opacity: float = 0.6,
-) -> Any:  # noqa: ANN401
-    return new(
-        _MARKER,
-        header=header,
-        ns=namespace,
-        id=number,
-        type=kind,
-        pose=_pose([*place.tolist(), *turn.tolist()]),
-        scale=_geometry("Vector3", size),
-        color=new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
-        points=points,
-    )
 
 
 def new(kind: str, **fields: Any) -> Any:  # noqa: ANN401

@@ -20,10 +20,10 @@ from voodoo.children import children
 from voodoo.drawing.ink import person_color
 from voodoo.drawing.surfaces import Log, bands, entity, limb_colors
 from voodoo.errors import VoodooError, installed
+from voodoo.export.skeleton import ellipsoids
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import limb_mesh
-from voodoo.model.rotations import quaternions
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.sensors.adapters import Memory, adapters_of
@@ -246,18 +246,10 @@ class Viewer(AbstractContextManager["Viewer"]):
         if not len(covariances):
             return
         known = np.isfinite(covariances).all(axis=(1, 2))
-        variances, axes = np.linalg.eigh(covariances[known])
-        axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
-        self._stream.log(
-            path,
-            self._rr.Ellipsoids3D(
-                centers=estimate.joint_positions[known],
-                half_sizes=np.sqrt(np.maximum(variances, 0.0)),
-                quaternions=quaternions(axes) if known.any() else None,
-                line_radii=0.001,
-                colors=(255, 255, 255),
-            ),
-        )
+        sizes, turns = ellipsoids(covariances[known])
+        how = {"half_sizes": sizes, "quaternions": turns if known.any() else None, "line_radii": 0.001}
+        centers = estimate.joint_positions[known]
+        self._stream.log(path, self._rr.Ellipsoids3D(centers=centers, colors=(255, 255, 255), **how))
 
     def _log_rays(self, front_end: FrontEnd[Any], estimate: Estimate) -> None:
         strips, colors, labels = [], [], []
