@@ -140,6 +140,8 @@ class PictureWriter(AbstractContextManager["PictureWriter"]):
                 self._place = self._appearing.enter_context(appearing_whole(self._path))
                 if self._is_film:
                     self._film = self._open(picture)
+                    self._appearing.push(lambda kind, *_: self._check() if kind is None else None)
+                    self._appearing.callback(self._film.release)
                 else:
                     self._place.mkdir()
             if self._film is not None:
@@ -154,13 +156,6 @@ class PictureWriter(AbstractContextManager["PictureWriter"]):
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Close the video and, without an error, check that it can be read."""
-        if self._film is not None:
-            try:
-                self._film.release()
-                if error is None and self.failure is None:
-                    self._check()
-            except Exception as failure:
-                self.failure = self.failure or failure
         problem = error or self.failure
         try:
             self._appearing.__exit__(None if problem is None else type(problem), problem, None)
