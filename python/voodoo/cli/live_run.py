@@ -61,7 +61,7 @@ def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float |
     """
     warm_up()
     with _prompt_threads(), deferred() as ended, live:
-        outputs, files = _outputs(live, wanted)
+        outputs = _outputs(live, wanted)
         session = Session(live, lambda frame: _follower(start, FirstFrame(live, frame)), outputs=outputs)
         try:
             _check_states(session, ended, duration)
@@ -73,7 +73,8 @@ def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float |
                     write_whole(wanted.report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
         others = [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
-        return [*(files.written if files is not None else ()), *others], ended.is_set(), session.with_pose
+        files = [path for output in outputs if isinstance(output, FileOutput) for path in output.written]
+        return [*files, *others], ended.is_set(), session.with_pose
 
 
 def _check_states(session: Session, ended: threading.Event, duration: float | None) -> None:
@@ -131,16 +132,14 @@ def _follower(start: ParsedTracking, first: FirstFrame) -> Follower:
     return Follower(start.tracker(first), settings=start.settings(first), starts=starts)
 
 
-def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | None]:
+def _outputs(live: Live, wanted: Outputs) -> list[Output]:
     # Addresses come first: one that is of no use leaves no file behind.
     addresses = list(wanted.to or ())
     if wanted.publish and ROS2 not in addresses:
         addresses.append(ROS2)
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
-    files = None
     if wanted.out:
-        files = FileOutput(wanted.out, root_frame=lambda: live.root_frame)
-        outputs.append(files)
+        outputs.append(FileOutput(wanted.out, root_frame=lambda: live.root_frame))
     if wanted.record is not None:
         outputs.append(Recorder(wanted.record, root_frame=lambda: live.root_frame))
         print_message(f"{wanted.record} stores pictures of people")
@@ -152,7 +151,7 @@ def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | No
         outputs.append(ShowOutput(viewer))
         if viewer.address:
             print_message(f"look at {viewer.address} in a browser")
-    return outputs, files
+    return outputs
 
 
 def _estimate_of(step: Step) -> Estimate | PeopleEstimate:

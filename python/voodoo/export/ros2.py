@@ -104,13 +104,7 @@ def keypoints_message(estimate: Estimate, image: DepthImage | ColorImage) -> Any
 
 
 def write_bag(
-    path: str | Path,
-    track: Track,
-    body: Body,
-    *,
-    root_frame: str,
-    person: str = "p1",
-    turn: Turn | None = None,
+    path: str | Path, track: Track, body: Body, *, root_frame: str, person: str = "p1", turn: Turn | None = None
 ) -> None:
     """Write a new bag folder, or the .mcap file of one.
 
