@@ -187,7 +187,7 @@ def track_command(
             files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
     turned = upright_words(files, turn, every=upright)
     if several:
-        count, rows = len(spool.persons), spool.states.total()
+        count, rows = len(spool.bodies), spool.states.total()
         found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
     else:
         found = states(spool.states.elements())

@@ -54,7 +54,7 @@ class Spool(AbstractContextManager["Spool"]):
     Attributes:
         frames: number of frames.
         states: number of poses of each status.
-        persons: numbers of the persons.
+        bodies: person number -> last body.
         paths: see above.
     """
 
@@ -76,12 +76,11 @@ class Spool(AbstractContextManager["Spool"]):
         self._together = together
         self._numbered = False
         self._waiting: list[PeopleEstimate | Track] = []
-        self._bodies: dict[int, Body] = {}
+        self.bodies: dict[int, Body] = {}
         self._bodies_at = -_BODIES_S
         self._parts: list[Path] = []
         self.frames = 0
         self.states: Counter[str] = Counter()
-        self.persons: set[int] = set()
 
     def add(self, estimate: Estimate | PeopleEstimate | Track, bodies: Mapping[int, Body]) -> None:
         """Take the poses of a frame, and the bodies in it; an estimate or a track is of person ONE.
@@ -92,10 +91,9 @@ class Spool(AbstractContextManager["Spool"]):
         self._numbered = isinstance(estimate, PeopleEstimate)
         estimate = estimate if isinstance(estimate, Track) else everybody(estimate)
         self._waiting.append(estimate)
-        self._bodies.update(bodies)
+        self.bodies.update(bodies)
         self.frames += 1
         self.states.update(estimate.status if isinstance(estimate, Track) else (str(one.status) for one in estimate))
-        self.persons.update(bodies)
         if len(self._waiting) >= self._together:
             self._put_away()
 
@@ -108,8 +106,8 @@ class Spool(AbstractContextManager["Spool"]):
         arrays = dict(self._last())
         needed = not all(map(is_table, self.paths))
         if needed and time.monotonic() - self._bodies_at >= _BODIES_S:
-            arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
-            arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
+            arrays[BODIES] = np.array([body.to_toml() for body in self.bodies.values()], dtype=np.str_)
+            arrays[BODY_OF] = np.array(list(self.bodies), dtype=np.int64)
         path = self._hidden.folder / f"{len(self._parts):08d}.npz"
         place = path.with_suffix(".part")
         with naming(path):
@@ -134,7 +132,7 @@ class Spool(AbstractContextManager["Spool"]):
         if tracks:
             return arrays_of(Track.joined(tracks))
         estimates = [one for one in self._waiting if isinstance(one, PeopleEstimate)]
-        return PeopleTrack.of(estimates, bodies=self._bodies).arrays()
+        return PeopleTrack.of(estimates, bodies=self.bodies).arrays()
 
     def _contents(self) -> Callable[[], Iterator[Arrays]]:
         last = [self._last()] if self._waiting else []
@@ -169,7 +167,7 @@ class Spool(AbstractContextManager["Spool"]):
         contents = self._contents()
         self._turn = turn
         turn = by_axes(self._root(), optical=self._optical) if turn is None else turn
-        how: Any = {"bodies": self._bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
+        how: Any = {"bodies": self.bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
         how |= {"numbered": self._numbered, "left_out": left_out or {}}
 
         def write(path: Path) -> list[Path]:

@@ -74,20 +74,20 @@ class Viewer(AbstractContextManager["Viewer"]):
             chunks.flush_tick, chunks.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, batcher_config=chunks)
         self._stream.send_recording_name(name)
-        self._server: Server | None = None
+        self.address = ""
         self._ends = ExitStack()
         self._place: Path | None = None
         self.failure: Exception | None = None
         if serve is not None:
-            self._server = Server(serve)
-            self._ends.callback(self._server.close)
-            self._stream.connect_grpc(self._server.data)
+            server = Server(serve)
+            self.address = server.address
+            self._ends.callback(server.close)
+            self._stream.connect_grpc(server.data)
         elif save is None:
             self._open()
         else:
             self._place = self._ends.enter_context(appearing_whole(Path(save)))
             self._stream.save(str(self._place))
-        self._whole = save is None
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
@@ -137,11 +137,6 @@ class Viewer(AbstractContextManager["Viewer"]):
             if self._place is not None:
                 check_disk(self._place.parent)  # Rerun does not tell that it could not write the end
 
-    @property
-    def address(self) -> str:
-        """See the class."""
-        return "" if self._server is None else self._server.address
-
     def log(
         self,
         estimate: Estimate | PeopleEstimate,
@@ -177,7 +172,7 @@ class Viewer(AbstractContextManager["Viewer"]):
                 self._log_rays(front_end, estimate)
             self._log_plots(estimate)
         memory = Memory() if front_end is None else front_end.memory
-        log = Log(self._rr, self._stream, posed, body, _MOST_POINTS, self._whole)
+        log = Log(self._rr, self._stream, posed, body, _MOST_POINTS, self._place is None)
         for item in () if recorded is None else recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.log(item, log, memory)
