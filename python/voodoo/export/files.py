@@ -79,22 +79,21 @@ def upright_words(paths: Sequence[Path], turn: Turn, *, every: bool = False) -> 
     return f"{', '.join(turned)}: turned upright {turn.words}" if turned and turn.words else ""
 
 
-def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple[list[Path], list[Exception]]:
-    """Write each of several outputs, whatever becomes of the others; returns the files, and what failed.
+def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple[list[Path], dict[Path, Exception]]:
+    """Write each of several outputs, whatever becomes of the others; returns the files, and output -> why it failed.
 
     Args:
         paths: of the outputs.
         write: writes one of them and returns its files.
     """
     done: list[Path] = []
-    failed: list[Exception] = []
+    failed: dict[Path, Exception] = {}
     for path in paths:
         try:
             done += write(path)
-        except (VoodooError, OSError) as error:
-            failed.append(error)
         except Exception as error:
-            failed.append(VoodooError(f"{path}: {reason(error)}"))
+            known = isinstance(error, VoodooError | OSError)
+            failed[path] = error if known else VoodooError(f"{path}: {reason(error)}")
     return done, failed
 
 

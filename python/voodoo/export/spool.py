@@ -163,21 +163,14 @@ class Spool(AbstractContextManager["Spool"]):
         if not self.frames:
             self._hidden.remove()
             raise NoPoseError("expected at least one frame to write, found none")
-        failing: list[Path] = []
         contents = self._contents()
         self._turn = turn
         turn = by_axes(self._root(), optical=self._optical) if turn is None else turn
         how: Any = {"bodies": self.bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
         how |= {"numbered": self._numbered, "left_out": left_out or {}}
-
-        def write(path: Path) -> list[Path]:
-            try:
-                return _write(path, contents, **how)
-            except OSError:
-                failing.extend([path] if path != STDOUT else [])
-                raise
-
-        done, failed = written(self.paths, write)
+        done, errors = written(self.paths, lambda path: _write(path, contents, **how))
+        failed = list(errors.values())
+        failing = [path for path in self._kept_for if isinstance(errors.get(path), OSError)]
         if not failing:
             self._hidden.remove()
             return done, failed
@@ -275,17 +268,13 @@ def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Pat
         if not (hidden / KEPT).is_file() or hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)():
             continue
         try:
-            lock = locked(hidden)
-        except OSError as error:
+            if (lock := locked(hidden)) is not None:
+                try:
+                    _recover_one(hidden, others, done, failed)
+                finally:
+                    os.close(lock)
+        except (VoodooError, OSError) as error:
             failed.append(error)
-            continue
-        if lock is not None:
-            try:
-                _recover_one(hidden, others, done, failed)
-            except (VoodooError, OSError) as error:
-                failed.append(error)
-            finally:
-                os.close(lock)
     return done, failed
 
 
@@ -326,7 +315,7 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
     how |= {"bodies": bodies, "left_out": {}}
     some, errors = written(free.values(), lambda path: _write(path, lambda: _stored(parts), **how))
     done += some
-    failed += errors
+    failed += errors.values()
     if not errors:
         removed(hidden)
 
