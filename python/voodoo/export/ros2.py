@@ -258,12 +258,8 @@ def transforms_message(stamp: float, rows: Iterable[tuple[str, str, Sequence[flo
 
 def joint_message(stamp: float, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
     """JointState of angles [rad] at a time [s]."""
-    return new(
-        JOINTS,
-        header=header_at(stamp, f"body_{person}"),
-        name=[f"{name}_{person}" for name in joints],
-        position=np.ascontiguousarray(angles, dtype=np.float64),
-    )
+    header, names = header_at(stamp, f"body_{person}"), [f"{name}_{person}" for name in joints]
+    return new(JOINTS, header=header, name=names, position=np.ascontiguousarray(angles, dtype=np.float64))
 
 
 def pose_message(stamp: float, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
