@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,7 @@ from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.sensors.adapters import Memory, adapters_of
 from voodoo.visualization.rerun_server import Server
+from voodoo.visualization.side_output import SideOutput
 from voodoo.whole import appearing_whole, check_disk
 
 _MOST_POINTS = 40_000
@@ -36,7 +36,7 @@ _CHUNK_BYTES = 8_000_000
 _VISIBLE_M = 0.002
 
 
-class Viewer(AbstractContextManager["Viewer"]):
+class Viewer(SideOutput):
     """Writes the data of each step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
     Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
@@ -62,6 +62,7 @@ class Viewer(AbstractContextManager["Viewer"]):
 
     def __init__(self, *, save: str | Path | None = None, name: str = "voodoo", serve: str | None = None) -> None:
         """Open the file or the viewer."""
+        super().__init__()
         self._rr = installed(
             "rerun", "the viewer needs Rerun, which is not installed: pip install 'voodoo-tracker[view]'"
         )
@@ -75,9 +76,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, batcher_config=chunks)
         self._stream.send_recording_name(name)
         self.address = ""
-        self._ends = ExitStack()
         self._place: Path | None = None
-        self.failure: Exception | None = None
         if serve is not None:
             server = Server(serve)
             self.address = server.address
@@ -88,6 +87,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         else:
             self._place = self._ends.enter_context(appearing_whole(Path(save)))
             self._stream.save(str(self._place))
+        self._ends.push(self._finish)
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
@@ -106,18 +106,19 @@ class Viewer(AbstractContextManager["Viewer"]):
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
 
-    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        """Finish the file; after an error or failure, remove it."""
-        if error is None and self.failure is None:
-            try:
-                self.close()
-            except Exception as failure:
-                self.failure = failure
-            return
-        self._stream.disconnect()
-        with suppress(OSError, RuntimeError):
-            raised = error or RuntimeError()
-            self._ends.__exit__(type(raised), raised, raised.__traceback__)
+    def _finish(self, failed: type[BaseException] | None, *_: object) -> None:
+        """Flush buffered data, unless something failed."""
+        try:
+            if failed is None:
+                self._stream.flush()
+        except RuntimeError as error:
+            if self._place is not None:  # a window may be closed before the end
+                check_disk(self._place.parent)
+                raise VoodooError(f"{self._place.name}: {str(error).strip() or type(error).__name__}") from error
+        finally:
+            self._stream.disconnect()
+        if self._place is not None and failed is None:
+            check_disk(self._place.parent)  # Rerun does not tell that it could not write the end
 
     def close(self) -> None:
         """Flush buffered data, and complete the file.
@@ -125,17 +126,7 @@ class Viewer(AbstractContextManager["Viewer"]):
         Raises:
             VoodooError, OSError: it could not be written.
         """
-        with self._ends:
-            try:
-                self._stream.flush()
-            except RuntimeError as error:
-                if self._place is not None:  # a window may be closed before the end
-                    check_disk(self._place.parent)
-                    raise VoodooError(f"{self._place.name}: {str(error).strip() or type(error).__name__}") from error
-            finally:
-                self._stream.disconnect()
-            if self._place is not None:
-                check_disk(self._place.parent)  # Rerun does not tell that it could not write the end
+        self._ends.close()
 
     def log(
         self,
