@@ -54,7 +54,7 @@ class VmcSink(Output):
         """Find the host."""
         missing = f"{address}: expected python-osc, found none; pip install 'voodoo-tracker[stream]'"
         self._bundle_of = installed("pythonosc.osc_bundle_builder", missing).OscBundleBuilder
-        self._message_of = installed("pythonosc.osc_message_builder", missing).OscMessageBuilder
+        self._message_of = installed("pythonosc.osc_message_builder", missing).build_msg
         self.name, self.receiver, self.waits = address, True, False
         self._root = root_frame
         host, port, _ = parts_of(address, host=None, port=PORT)
@@ -96,10 +96,7 @@ class VmcSink(Output):
     def _bundle(self, messages: list[tuple[str | float, ...]]) -> bytes:
         bundle = self._bundle_of(0)
         for path, *values in messages:
-            message = self._message_of(f"/VMC/Ext{path}")
-            for value in values:
-                message.add_arg(value)
-            bundle.add_content(message.build())
+            bundle.add_content(self._message_of(f"/VMC/Ext{path}", values))
         return bytes(bundle.build().dgram)
 
     def close(self) -> None:
