@@ -190,7 +190,7 @@ def track_command(
         count, rows = len(spool.bodies), spool.states.total()
         found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
     else:
-        found = states(spool.states.elements())
+        found = states(spool.states)
     message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
     if turned:
         print_message(turned)

@@ -219,10 +219,8 @@ class Viewer(SideOutput):
                 self._stream.log(place, mesh)
             pose = estimate.world_from_limb[limb.name]
             self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
-        self._stream.log(
-            f"{path}/joints",
-            rr.Points3D(estimate.joint_positions, radii=0.006, labels=list(estimate.joint_names), show_labels=False),
-        )
+        names, places = list(estimate.joint_names), estimate.joint_positions
+        self._stream.log(f"{path}/joints", rr.Points3D(places, radii=0.006, labels=names, show_labels=False))
         self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
