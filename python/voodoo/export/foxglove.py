@@ -80,27 +80,21 @@ class Channels:
         m = self._messages
         time = m.Timestamp(*divmod(STAMP_NS, 1_000_000_000))
         size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**JOINT_COLOR)
-        still = m.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
         before = m.SceneEntityDeletion(timestamp=time, type=m.SceneEntityDeletionType.All)
 
         def transform(parent: str, name: str, row: list[float]) -> Any:  # noqa: ANN401
             how = {"translation": m.Vector3(**_xyz(row)), "rotation": m.Quaternion(**_xyz(row[3:], "xyzw"))}
             return m.FrameTransform(timestamp=time, parent_frame_id=parent, child_frame_id=name, **how)
 
+        def pose(row: list[float]) -> Any:  # noqa: ANN401
+            return m.Pose(position=m.Vector3(**_xyz(row)), orientation=m.Quaternion(**_xyz(row[3:], "xyzw")))
+
         def cylinder(limb: str, row: list[float]) -> Any:  # noqa: ANN401
-            turn = m.Quaternion(**_xyz(row[3:7], "xyzw"))
-            return m.CylinderPrimitive(
-                pose=m.Pose(position=m.Vector3(**_xyz(row)), orientation=turn),
-                size=m.Vector3(**_xyz(row[7:])),
-                bottom_scale=row[10],
-                top_scale=row[11],
-                color=m.Color(**limb_color(limb)),
-            )
+            size, scales = m.Vector3(**_xyz(row[7:])), {"bottom_scale": row[10], "top_scale": row[11]}
+            return m.CylinderPrimitive(pose=pose(row), size=size, color=m.Color(**limb_color(limb)), **scales)
 
         def sphere(row: list[float]) -> Any:  # noqa: ANN401
-            return m.SpherePrimitive(
-                pose=m.Pose(position=m.Vector3(**_xyz(row)), orientation=still), size=size, color=red
-            )
+            return m.SpherePrimitive(pose=pose([*row, 0.0, 0.0, 0.0, 1.0]), size=size, color=red)
 
         def encode(numbers: list[float]) -> list[bytes]:
             left, transforms, entities = iter(numbers), [], []
