@@ -120,17 +120,11 @@ def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatAr
 
 def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
     """A sensor_msgs/CameraInfo."""
-    return ros2.new(
-        "sensor_msgs/msg/CameraInfo",
-        header=header,
-        height=camera.height,
-        width=camera.width,
-        distortion_model=camera.model,
-        d=np.array(camera.distortion, dtype=np.float64),
-        k=camera.matrix.ravel(),
-        r=np.eye(3).ravel(),
-        p=np.pad(camera.matrix, ((0, 0), (0, 1))).ravel(),
-    )
+    lens = {"distortion_model": camera.model, "d": np.array(camera.distortion, dtype=np.float64)}
+    about: dict[str, Any] = {"header": header, "height": camera.height, "width": camera.width, **lens}
+    matrices = {"k": camera.matrix, "r": np.eye(3), "p": np.pad(camera.matrix, ((0, 0), (0, 1)))}
+    flat = {name: matrix.ravel() for name, matrix in matrices.items()}
+    return ros2.new("sensor_msgs/msg/CameraInfo", **about, **flat)
 
 
 def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
