@@ -8,25 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from voodoo.errors import VoodooError
-from voodoo.live.assembly import LiveFrame
-from voodoo.live.follow import Follower, Step
-from voodoo.live.source import FAULTS, Arrival, Faults, Source, SourceEnded, SourceGone
+from voodoo.live.assembly import LiveFrame as LiveFrame
+from voodoo.live.follow import Follower as Follower
+from voodoo.live.follow import Step as Step
+from voodoo.live.source import FAULTS as FAULTS
+from voodoo.live.source import Arrival as Arrival
+from voodoo.live.source import Faults as Faults
+from voodoo.live.source import Source as Source
+from voodoo.live.source import SourceEnded as SourceEnded
+from voodoo.live.source import SourceGone as SourceGone
 from voodoo.live.sources.words import options_for, source_of
-from voodoo.live.stream import Live
+from voodoo.live.stream import Live as Live
 from voodoo.sensors.keypoints.networks import KeypointNetwork
-
-__all__ = [
-    "FAULTS",
-    "Arrival",
-    "Faults",
-    "Follower",
-    "Live",
-    "LiveFrame",
-    "Source",
-    "SourceEnded",
-    "SourceGone",
-    "Step",
-]
 
 
 def open(
