@@ -11,9 +11,9 @@ import pytest
 
 from live_rig import ByHand, Rig, depth_of, follower_of
 from voodoo.evaluation.metrics import JOINTS
-from voodoo.export.ros2 import cdr
+from voodoo.export.ros2 import cdr, header_at
 from voodoo.live import FAULTS
-from voodoo.live.recorder import _depth, _header, camera_info, transforms
+from voodoo.live.recorder import _depth, camera_info, transforms
 from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.recordings import open_recording, sample_path
 from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGE
@@ -80,11 +80,11 @@ class Bus:
         self.send(topic, TF, transforms("base_link", FRAME, stamp, pose))
 
     def calibrate(self, camera=None):
-        self.send(INFO, CAMERA_INFO, camera_info(_header(1.0, FRAME), camera or self.images[0].camera))
+        self.send(INFO, CAMERA_INFO, camera_info(header_at(1.0, FRAME), camera or self.images[0].camera))
 
     def message(self, *, stamp=None, **other):
         item = replace(self.images[self.at % len(self.images)], **other)
-        return _depth(_header(item.stamp + self.shift if stamp is None else stamp, FRAME), item)
+        return _depth(header_at(item.stamp + self.shift if stamp is None else stamp, FRAME), item)
 
     @property
     def stamp(self):
@@ -165,7 +165,7 @@ def no_calibration(bus):
 
 
 def bad_calibration(bus):
-    info = camera_info(_header(1.0, FRAME), bus.images[0].camera)
+    info = camera_info(header_at(1.0, FRAME), bus.images[0].camera)
     info.k[:] = 0.0
     bus.send(INFO, CAMERA_INFO, info)
     bus.bad()

@@ -12,11 +12,11 @@ import pytest
 
 import voodoo
 from live_rig import HandClock, Rig, depth_of, follower_of, wall
-from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, instant, keypoints_message, new
+from voodoo.export.ros2 import IDS, STORE, TRACKED, cdr, header_at, instant, keypoints_message, new
 from voodoo.export.upright import by_axes, by_floor
 from voodoo.live import Faults, Live, Step
 from voodoo.live.assembly import LiveFrame
-from voodoo.live.recorder import _cloud, _depth, _header, _scan, camera_info, transforms
+from voodoo.live.recorder import _cloud, _depth, _scan, camera_info, transforms
 from voodoo.live.ros2.dds import Offer, dds_name, ros_name
 from voodoo.live.ros2.feed import ROOT_PATIENCE_S, TF, RosFeed
 from voodoo.live.session import Output, Session
@@ -52,12 +52,12 @@ def send(feed, topic, kind, message):
 
 
 def depth_message(stamp, frame="camera"):
-    return _depth(_header(stamp, frame), wall(stamp))
+    return _depth(header_at(stamp, frame), wall(stamp))
 
 
 def test_transforms_that_change_are_interpolated_and_waited_for():
     feed, _, _ = feed_of(root_frame="base_link")
-    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    send(feed, INFO, CAMERA_INFO, camera_info(header_at(1.0, "camera"), wall(1.0).camera))
     for stamp, x in ((1.0, 0.0), (1.1, 0.1)):
         send(feed, "/tf", TF, transforms("base_link", "camera", stamp, moved(x)))
     (arrival,) = send(feed, DEPTH, IMAGE, depth_message(1.14))
@@ -82,7 +82,7 @@ def test_old_transforms_are_forgotten_and_those_that_hold_are_not():
 
 def test_transforms_follow_time_that_jumps_back():
     feed, _, faults = feed_of(root_frame="base_link")
-    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    send(feed, INFO, CAMERA_INFO, camera_info(header_at(1.0, "camera"), wall(1.0).camera))
     for stamp in (100.0, 100.1, 50.0, 50.1, 50.2):
         send(feed, "/tf", TF, transforms("base_link", "camera", stamp, moved(0.01 * (stamp - 50.0))))
     (arrival,) = send(feed, DEPTH, IMAGE, depth_message(50.15))
@@ -104,7 +104,7 @@ def test_transforms_follow_time_that_jumps_back():
 )
 def test_the_root_is_where_people_stand_still(frames, root):
     feed, _, _ = feed_of()
-    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    send(feed, INFO, CAMERA_INFO, camera_info(header_at(1.0, "camera"), wall(1.0).camera))
     assert send(feed, DEPTH, IMAGE, depth_message(1.0)) == [], "transforms may come"
     for parent, child in pairwise(frames):
         send(feed, "/tf_static", TF, transforms(parent, child, 0.0, moved(1.0)))
@@ -115,7 +115,7 @@ def test_the_root_is_where_people_stand_still(frames, root):
 
 def test_without_transforms_the_camera_is_the_root():
     feed, clock, _ = feed_of()
-    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    send(feed, INFO, CAMERA_INFO, camera_info(header_at(1.0, "camera"), wall(1.0).camera))
     assert send(feed, DEPTH, IMAGE, depth_message(1.0)) == []
     clock.at += ROOT_PATIENCE_S
     (arrival,) = send(feed, DEPTH, IMAGE, depth_message(2.0))
@@ -127,7 +127,7 @@ def test_without_transforms_the_camera_is_the_root():
     assert len(send(feed, DEPTH, IMAGE, depth_message(1.0))) == 1
     # And a calibration says where the camera is.
     feed, _, _ = feed_of(sensor_pose=("base_link", moved(3.0)))
-    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), wall(1.0).camera))
+    send(feed, INFO, CAMERA_INFO, camera_info(header_at(1.0, "camera"), wall(1.0).camera))
     (arrival,) = send(feed, DEPTH, IMAGE, depth_message(1.0))
     assert arrival.ready()
     assert (feed.root_frame, arrival.measure().root_from_sensor[0, 3]) == ("base_link", 3.0)
@@ -145,8 +145,8 @@ def test_every_type_becomes_its_measurement():
     feed, _, faults = feed_of(*topics, root_frame="camera")
     camera = wall(1.0).camera
     for info in {info_topic(topic) for topic in topics[:4]}:
-        send(feed, info, CAMERA_INFO, camera_info(_header(1.0, "camera"), camera))
-    header = _header(1.0, "camera")
+        send(feed, info, CAMERA_INFO, camera_info(header_at(1.0, "camera"), camera))
+    header = header_at(1.0, "camera")
     depth = wall(1.0)
     meters = np.where(depth.image > 2050, np.nan, depth.image / 1000.0).astype(np.float32)
     picture = np.random.default_rng(1).integers(0, 255, (24, 32, 3)).astype(np.uint8)
@@ -359,7 +359,7 @@ def test_several_people_are_published_as_a_bag_has_them(root):
 
 def test_a_frame_is_written_in_as_few_messages_as_it_has_topics_and_encoded_once(monkeypatch):
     encoded = []
-    monkeypatch.setattr("voodoo.live.sinks.ros2.cdr", lambda message: encoded.append(message) or cdr(message))
+    monkeypatch.setattr("voodoo.export.ros2.cdr", lambda message: encoded.append(message) or cdr(message))
     node = FakeNode()
     output = Ros2Sink(root_frame=lambda: "odom", node=node)
     recording = open_recording(sample_path(), use=("depth",))
@@ -384,10 +384,10 @@ def test_a_whole_recording_goes_through_the_bus():
     rig = Rig(follower_of())
     feed = RosFeed([DEPTH], rig.live.faults, rig.clock, root_frame="base_link")
     images = [depth_of(frame) for frame, _ in zip(recording, range(20), strict=False)]
-    send(feed, INFO, CAMERA_INFO, camera_info(_header(1.0, "camera"), images[0].camera))
+    send(feed, INFO, CAMERA_INFO, camera_info(header_at(1.0, "camera"), images[0].camera))
     send(feed, "/tf_static", TF, transforms("base_link", "camera", 0.0, images[0].root_from_sensor))
     for item in images:
-        for arrival in send(feed, DEPTH, IMAGE, _depth(_header(item.stamp, "camera"), item)):
+        for arrival in send(feed, DEPTH, IMAGE, _depth(header_at(item.stamp, "camera"), item)):
             rig.deliver(arrival)
         rig.wait(1 / 30, tick=1 / 30)
     assert [frame.stamp for frame in rig.frames] == pytest.approx([item.stamp for item in images], abs=1e-6)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from live_rig import wall
-from voodoo.export.ros2 import cdr
+from voodoo.export.ros2 import cdr, header_at
 from voodoo.live import Live, Source
-from voodoo.live.recorder import _depth, _header, camera_info, transforms
+from voodoo.live.recorder import _depth, camera_info, transforms
 from voodoo.live.ros2.feed import TF, RosFeed
 from voodoo.live.source import SourceEnded
 from voodoo.recordings.ros_topics import CAMERA_INFO, IMAGE
@@ -39,7 +39,7 @@ class Robot(Source):
     def open(self, clock, faults):
         self.feed = RosFeed([DEPTH], faults, clock, root_frame="odom")
         self.feed.take(
-            "/camera/depth/camera_info", CAMERA_INFO, cdr(camera_info(_header(0.0, "camera"), wall(0.0).camera))
+            "/camera/depth/camera_info", CAMERA_INFO, cdr(camera_info(header_at(0.0, "camera"), wall(0.0).camera))
         )
         self.began = time.time()
 
@@ -51,7 +51,7 @@ class Robot(Source):
         time.sleep(max(stamp + ON_THE_WAY_S - time.time(), 0.0))
         if kind == "tf":
             return self.feed.take("/tf", TF, cdr(transforms("odom", "camera", stamp, driven(after))))
-        return self.feed.take(DEPTH, IMAGE, cdr(_depth(_header(stamp, "camera"), wall(stamp))))
+        return self.feed.take(DEPTH, IMAGE, cdr(_depth(header_at(stamp, "camera"), wall(stamp))))
 
     def close(self):
         pass

@@ -32,7 +32,7 @@ def children(*, quiet: bool = False) -> Iterator[None]:
     values = {"PYTHONSAFEPATH": "1"}
     if quiet and not os.environ.get(_WANTED):
         values["XDG_CONFIG_HOME"] = str(_QUIET)
-    before = {name: os.environ.get(name) for name in values}
+    before = {name: os.environ[name] for name in values if name in os.environ}
     tools: Any = util
     flags = tools._args_from_interpreter_flags
     if sys.version_info < (3, 11):  # it does not know PYTHONSAFEPATH; multiprocessing sends the path of modules itself
@@ -42,8 +42,6 @@ def children(*, quiet: bool = False) -> Iterator[None]:
         yield
     finally:
         tools._args_from_interpreter_flags = flags
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        for name in values.keys() - before.keys():
+            os.environ.pop(name, None)
+        os.environ.update(before)

@@ -216,11 +216,7 @@ class Followed:
         """Store `people` and the number."""
         self._people = people
         self._number = number
-
-    @property
-    def _core(self) -> tuple[_core.People, int]:
-        """Identifier of the person in the compiled core."""
-        return self._people._core, self._number
+        self._core = people._core, number
 
     @property
     def body(self) -> Body:

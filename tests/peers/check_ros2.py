@@ -14,8 +14,8 @@ import pytest
 from live_camera import CAMERA, pictures
 
 import voodoo
-from voodoo.export.ros2 import STORE, cdr, new
-from voodoo.live.recorder import _cloud, _depth, _header, _scan, camera_info, transforms
+from voodoo.export.ros2 import STORE, cdr, header_at, new
+from voodoo.live.recorder import _cloud, _depth, _scan, camera_info, transforms
 from voodoo.live.ros2.dds import Node, Offer
 from voodoo.measurements import DepthImage, LaserScan, PointCloud
 
@@ -117,13 +117,13 @@ def test_a_peer_that_is_killed_and_restarted(images, tmp_path):
 
 def depth_message(stamp, image):
     item = DepthImage("d", stamp, image, 0.001, CAMERA, np.eye(4))
-    return _depth(_header(stamp, "camera"), item)
+    return _depth(header_at(stamp, "camera"), item)
 
 
 def compressed(stamp, image):
     done, data = cv2.imencode(".png", image)
     assert done
-    fields = {"header": _header(stamp, "camera"), "format": "16UC1; compressedDepth png"}
+    fields = {"header": header_at(stamp, "camera"), "format": "16UC1; compressedDepth png"}
     packed = np.concatenate([np.zeros(12, np.uint8), data.ravel()])
     return new("sensor_msgs/msg/CompressedImage", **fields, data=packed)
 
@@ -158,15 +158,15 @@ def test_all_types_arrive_and_transforms_are_interpolated():
             pose[0, 3] = 0.1 * number
             for child in ("camera", "laser"):
                 out["/tf"].write(cdr(transforms("base_link", child, stamp, pose)))
-            info = cdr(camera_info(_header(stamp, "camera"), CAMERA))
+            info = cdr(camera_info(header_at(stamp, "camera"), CAMERA))
             for name in ("/camera/depth/camera_info", "/packed/camera_info", "/packed/depth/camera_info"):
                 out[name].write(info)
             between = stamp - 0.05
             points = PointCloud("c", between, np.random.default_rng(number).normal(size=(500, 3)), np.eye(4))
-            out["/cloud"].write(cdr(_cloud(_header(between, "camera"), points)))
+            out["/cloud"].write(cdr(_cloud(header_at(between, "camera"), points)))
             ranges = np.full(10, 2.0 + number, np.float32)
             scan = LaserScan("s", between, ranges, -0.2, 0.05, 0.1, 30.0, np.eye(4))
-            out["/scan"].write(cdr(_scan(_header(between, "laser"), scan)))
+            out["/scan"].write(cdr(_scan(header_at(between, "laser"), scan)))
             noisy = pixels[number % 2] + np.uint16(number)
             out["/packed/depth/compressedDepth"].write(cdr(compressed(between, noisy)))
             out[TOPIC].write(cdr(depth_message(between, noisy)))

@@ -14,8 +14,8 @@ import time
 import numpy as np
 
 import voodoo
-from voodoo.export.ros2 import STORE, cdr
-from voodoo.live.recorder import _depth, _header, camera_info, transforms
+from voodoo.export.ros2 import STORE, cdr, header_at
+from voodoo.live.recorder import _depth, camera_info, transforms
 from voodoo.live.ros2.dds import Node
 from voodoo.measurements import DepthImage
 
@@ -38,8 +38,8 @@ class Robot:
     def send_image(self, number):
         now = time.time()
         item = DepthImage("depth", now, self.images[number % len(self.images)], 0.001, self.camera, np.eye(4))
-        self.infos_out.write(cdr(camera_info(_header(now, "camera"), self.camera)))
-        self.images_out.write(cdr(_depth(_header(now, "camera"), item)))
+        self.infos_out.write(cdr(camera_info(header_at(now, "camera"), self.camera)))
+        self.images_out.write(cdr(_depth(header_at(now, "camera"), item)))
         self.sent.append(now)
 
     def send_transform(self):

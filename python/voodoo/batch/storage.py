@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -139,17 +140,12 @@ def named(sources: Sequence[str], taken: dict[str, str]) -> list[tuple[str, str]
         taken: name -> source of earlier runs; their names are kept.
     """
     known = {source: name for name, source in taken.items() if source}
-    used = dict(taken)
-    pairs = []
+    used, pairs = set(taken), []
     for source in sources:
-        name = known.get(source)
-        if name is None:
-            base, number = name_of(source), 1
-            name = base
-            while name in used:
-                number += 1
-                name = f"{base}~{number}"
-        used[name] = source
+        base = name_of(source)
+        free = (name for name in chain([base], (f"{base}~{number}" for number in count(2))) if name not in used)
+        name = known.get(source) or next(free)
+        used.add(name)
         pairs.append((name, source))
     return pairs
 

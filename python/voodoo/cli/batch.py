@@ -88,13 +88,8 @@ def batch_command(
         if is_local(out):
             check_outputs([local_path(out)], map(local_path, filter(is_local, sources)))
         check_installed()
-        batch = Batch(
-            sources,
-            out if "://" in out else str(local_path(out).absolute()),
-            settings,
-            limit_s=time_limit,
-            report=pages,
-        )
+        place = out if "://" in out else str(local_path(out).absolute())
+        batch = Batch(sources, place, settings, limit_s=time_limit, report=pages)
         for note in batch.notes:
             print_message(note)
         batch.save()  # also of tables that it did not have

@@ -68,14 +68,14 @@ def print_written(files: Iterable[Path], *, aside: bool) -> None:
     (print_message if aside else typer.echo)(f"wrote {', '.join(map(str, files))}")
 
 
-def refuse_missing(failures: Iterable[Exception | None], done: str) -> None:
-    """Raise an error if outputs are missing, which tells what there is; None: one that is not missing.
+def refuse_missing(failures: Sequence[Exception], done: str) -> None:
+    """Raise an error if outputs are missing, which tells what there is.
 
     Raises:
         VoodooError: names what is missing and why.
     """
-    if found := [failure for failure in failures if failure is not None]:
-        raise VoodooError(f"not written: {'; '.join(map(reason, found))}. {done}")
+    if failures:
+        raise VoodooError(f"not written: {'; '.join(map(reason, failures))}. {done}")
 
 
 def progressing(items: Iterable[T], words: str, total: int) -> Iterator[T]:
@@ -125,13 +125,12 @@ def clear_errors() -> Iterator[None]:
             if not sys.warnoptions:
                 warnings.simplefilter("ignore", RuntimeWarning)
             yield
-    except VoodooError as error:
-        hint = getattr(error, "hint", "")
-        _fail(str(error), hint, code=NO_POSE if isinstance(error, NoPoseError) else FAILED)
-    except MemoryError:
-        _fail("expected enough memory for this recording, found too little")
-    except OSError as error:
-        _fail(reason(error))
+    except (VoodooError, OSError, MemoryError) as error:
+        little = isinstance(error, MemoryError)
+        print_message("expected enough memory for this recording, found too little" if little else reason(error))
+        if hint := getattr(error, "hint", ""):
+            typer.echo(hint, err=True)
+        raise typer.Exit(NO_POSE if isinstance(error, NoPoseError) else FAILED) from None
 
 
 def print_message(message: str) -> None:
@@ -164,10 +163,3 @@ def reporting(as_json: bool) -> Iterator[dict[str, Any] | None]:
     finally:
         if report:
             print_json(report)
-
-
-def _fail(message: str, hint: str = "", *, code: int = FAILED) -> None:
-    print_message(message)
-    if hint:
-        typer.echo(hint, err=True)
-    raise typer.Exit(code)

@@ -97,7 +97,7 @@ def ik_command(
             written, failed = spool.write(turn=turn)
     for name, count in compared.items():
         print_result(f"{name:<14} {1e3 * errors[name] / count:6.1f} mm mean error", spool.paths)
-    message = f"{spool.frames} frames, {states(spool.states.elements())}{wrote(written)}"
+    message = f"{spool.frames} frames, {states(spool.states)}{wrote(written)}"
     refuse_missing([*failed, *done.failures], message)
     print_interrupted(done.interrupted, f"the rest of {len(source)} frames is missing: {message}")
     print_result(message, spool.paths)

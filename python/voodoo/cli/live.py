@@ -58,10 +58,12 @@ def live_command(
     """
     from dataclasses import replace
 
-    from voodoo.cli.live_run import entered, run
+    from voodoo.cli.live_run import run
     from voodoo.cli.recover import recover_before
     from voodoo.cli.running import ParsedTracking
     from voodoo.export.files import STDOUT, check_target
+    from voodoo.live import open as open_live
+    from voodoo.live.sources.words import refuse_unused
     from voodoo.pipeline.inputs import keypoint_words
 
     refuse_both("--view", outputs.view or None, **{"--serve": outputs.serve})
@@ -79,8 +81,11 @@ def live_command(
     if folders:
         raise VoodooError(f"keypoints: expected a network, found a folder, for {', '.join(folders)}")
     words = replace(reading, frame=None, layout=reading.layout if network is None else None).words()
-    how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame, "options": words}
-    source = entered(sources, calibration or (), several=start.limit != 1, network=network, **how)
+    given = {"frame": reading.frame, "rate": None if rate == 1.0 else rate, "loop": loop or None, **words}
+    refuse_unused(sources, {name: value for name, value in given.items() if value is not None})
+    how: dict[str, Any] = {"rate": rate, "loop": loop, "root_frame": reading.frame}
+    how |= {"options": words, "calibrations": calibration or (), "network": network}
+    source = open_live(*sources, on_message=print_message, eager=start.limit == 1, **how)
     recover_before([*(outputs.out or ()), *([outputs.record] if outputs.record is not None else [])])
     written, ended, with_pose = run(source, start, outputs, duration=duration)
     for path in written:

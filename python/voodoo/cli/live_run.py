@@ -1,4 +1,4 @@
-"""Implementation of `voodoo live`: opens sources, tracks, and publishes until a signal. Not imported for its help."""
+"""Implementation of `voodoo live`: tracks and publishes until a signal. Not imported for its help."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import gc
 import json
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -26,7 +26,6 @@ from voodoo.live.follow import Follower, Step
 from voodoo.live.recorder import Recorder
 from voodoo.live.session import Output, Session
 from voodoo.live.sinks import sink_of
-from voodoo.live.sources.words import options_for, refuse_unused, source_of
 from voodoo.live.stream import Live
 from voodoo.measurements import FloatArray, RecordedFrame
 from voodoo.model.body import Body
@@ -35,7 +34,6 @@ from voodoo.pipeline.start import starts_of
 from voodoo.recordings import sample_path
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.recording import Recording, SensorInfo
-from voodoo.sensors.keypoints.networks import KeypointNetwork
 from voodoo.tracker import Tracker
 from voodoo.visualization.rerun_viewer import Viewer
 from voodoo.whole import write_whole
@@ -52,37 +50,6 @@ _SWITCH_S = 5e-4
 """Switch interval of Python threads: the default of 5 ms is as long as a whole step."""
 
 
-def entered(
-    words: Sequence[str],
-    calibrations: Sequence[Path],
-    *,
-    options: Mapping[str, Any],
-    several: bool,
-    network: KeypointNetwork | None,
-    **how: Any,  # noqa: ANN401 - of source_of
-) -> Live:
-    """The sources of the command line.
-
-    Raises:
-        VoodooError: more calibrations than sources, or an invalid source.
-    """
-    if len(calibrations) > len(words):
-        raise VoodooError(f"calibration: expected one for each source at most, found {len(calibrations)}")
-    given = {
-        "frame": how["root_frame"],
-        "rate": None if how["rate"] == 1.0 else how["rate"],
-        "loop": how["loop"] or None,
-    }
-    given |= options
-    refuse_unused(words, {name: value for name, value in given.items() if value is not None})
-    places = [*calibrations, *[None] * (len(words) - len(calibrations))]
-    sources = [
-        source_of(word, options=options_for(word, options), calibration=place, **how)
-        for word, place in zip(words, places, strict=True)
-    ]
-    return Live(sources, on_message=print_message, eager=not several, network=network)
-
-
 def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float | None) -> tuple[list[Path], bool, int]:
     """Track until the sources end, for `duration` [s], or until a signal; finish files and write the report.
 
@@ -94,7 +61,7 @@ def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float |
     """
     warm_up()
     with _prompt_threads(), deferred() as ended, live:
-        outputs, files = _outputs(live, wanted)
+        outputs = _outputs(live, wanted)
         session = Session(live, lambda frame: _follower(start, FirstFrame(live, frame)), outputs=outputs)
         try:
             _check_states(session, ended, duration)
@@ -106,7 +73,8 @@ def run(live: Live, start: ParsedTracking, wanted: Outputs, *, duration: float |
                     write_whole(wanted.report, json.dumps(session.report(), indent=2) + "\n")
         print_message(f"{session.line()}; {session.published} published")
         others = [path for path in (wanted.record, wanted.report) if path is not None and path.exists()]
-        return [*(files.written if files is not None else ()), *others], ended.is_set(), session.with_pose
+        files = [path for output in outputs if isinstance(output, FileOutput) for path in output.written]
+        return [*files, *others], ended.is_set(), session.with_pose
 
 
 def _check_states(session: Session, ended: threading.Event, duration: float | None) -> None:
@@ -164,16 +132,14 @@ def _follower(start: ParsedTracking, first: FirstFrame) -> Follower:
     return Follower(start.tracker(first), settings=start.settings(first), starts=starts)
 
 
-def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | None]:
+def _outputs(live: Live, wanted: Outputs) -> list[Output]:
     # Addresses come first: one that is of no use leaves no file behind.
     addresses = list(wanted.to or ())
     if wanted.publish and ROS2 not in addresses:
         addresses.append(ROS2)
     outputs = [sink_of(address, root_frame=lambda: live.root_frame, on_message=print_message) for address in addresses]
-    files = None
     if wanted.out:
-        files = FileOutput(wanted.out, root_frame=lambda: live.root_frame)
-        outputs.append(files)
+        outputs.append(FileOutput(wanted.out, root_frame=lambda: live.root_frame))
     if wanted.record is not None:
         outputs.append(Recorder(wanted.record, root_frame=lambda: live.root_frame))
         print_message(f"{wanted.record} stores pictures of people")
@@ -185,7 +151,7 @@ def _outputs(live: Live, wanted: Outputs) -> tuple[list[Output], FileOutput | No
         outputs.append(ShowOutput(viewer))
         if viewer.address:
             print_message(f"look at {viewer.address} in a browser")
-    return outputs, files
+    return outputs
 
 
 def _estimate_of(step: Step) -> Estimate | PeopleEstimate:

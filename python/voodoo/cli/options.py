@@ -134,12 +134,10 @@ def numbers_of(words: Sequence[str] | None) -> dict[str, float]:
     for word in words or ():
         name, _, value = word.partition("=")
         try:
-            number = float(value) if name in NUMBERS else None
+            numbers[name] = float(value if name in NUMBERS else "")
         except ValueError:
-            number = None
-        if number is None:
-            raise VoodooError(f"option: expected NAME=NUMBER with one of {', '.join(NUMBERS)}, found {word!r}")
-        numbers[name] = number
+            known = ", ".join(NUMBERS)
+            raise VoodooError(f"option: expected NAME=NUMBER with one of {known}, found {word!r}") from None
     return numbers
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import typer
@@ -37,7 +37,6 @@ from voodoo.visualization.image_writer import PictureWriter
 from voodoo.visualization.overlay import Overlay
 from voodoo.visualization.rerun_viewer import Viewer
 
-Target = TypeVar("Target", PictureWriter, Viewer)
 TOGETHER = 250
 """Frames whose poses a crash costs at most, and that are in memory."""
 
@@ -284,8 +283,10 @@ def run(
             for step in progressing(steps, source.name, len(source)):
                 seconds.append(step.seconds)
                 take(step)
-                _apart(viewer, show, step)
-                _apart(writer, draw, step)
+                if viewer is not None:
+                    viewer.attempt(show, viewer, step)
+                if writer is not None:
+                    writer.attempt(draw, writer, step)
                 if interrupted := ended.is_set():
                     break
         except KeyboardInterrupt:
@@ -305,12 +306,3 @@ def run(
     failures += [failure for _, failure in outputs if failure is not None]
     done = [path for path, failure in outputs if path is not None and failure is None]
     return Run(seconds, pictures, interrupted, done, failures)
-
-
-def _apart(output: Target | None, serve: Callable[[Target, TrackedFrame[Any]], None], step: TrackedFrame[Any]) -> None:
-    """Serve an output, unless there is none, or it has failed."""
-    if output is not None and output.failure is None:
-        try:
-            serve(output, step)
-        except Exception as error:
-            output.failure = error

@@ -129,26 +129,17 @@ def track_command(
     several, bare = start.limit != 1, start.beginning is not None
     markers = None if marker_map is None else MarkerMap.load(marker_map)
     numbers, others = options.numbers_of(reading.option), with_ or ()
-    about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers, "use": start.options["use"]}
-    asked = loader_options(recording, reading.loader, **about)
+    about: dict[str, Any] = {"markers": markers, "layout": layout, "numbers": numbers}
+    asked = loader_options(recording, reading.loader, **about, use=start.options["use"])
     if background is not None:
         asked["background"] = background
     # A number that no other recording accepts belongs to this one, whose loader may reject it.
-    taken = [loader_options(path, None, markers=None, layout=layout, numbers=numbers) for path in others]
+    taken = [loader_options(path, None, **{**about, "markers": None}) for path in others]
     asked |= {name: value for name, value in numbers.items() if not any(name in each for each in taken)}
     folders, network = keypoint_words(keypoints or (), layout)
-    source = join(
-        opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked),
-        keypoints=folders,
-        network=network,
-        layout=layout,
-        others=others,
-        offset=offset,
-        markers=markers,
-        numbers=numbers,
-        left_out=left_out,
-        bare=bare,
-    )
+    about |= {"left_out": left_out, "bare": bare}
+    first = opened(recording, replace(reading, layout=None, option=None), left_out=left_out, bare=bare, **asked)
+    source = join(first, keypoints=folders, network=network, others=others, offset=offset, **about)
     for words in source.assumed:
         print_message(words)
     for name, given in (("draw-regions", draw_regions), ("background", background)) if several else ():
@@ -187,10 +178,10 @@ def track_command(
             files, failed = spool.write(turn=turn, left_out=None if left_out is None else left_out.counts)
     turned = upright_words(files, turn, every=upright)
     if several:
-        count, rows = len(spool.persons), spool.states.total()
+        count, rows = len(spool.bodies), spool.states.total()
         found = f"{count} {'person' if count == 1 else 'persons'} in {rows} rows"
     else:
-        found = states(spool.states.elements())
+        found = states(spool.states)
     message = f"{spool.frames} frames, {found}{wrote([*files, *done.written])}"
     if turned:
         print_message(turned)

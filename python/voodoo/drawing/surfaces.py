@@ -215,15 +215,8 @@ class Log:
         rr, path, pose = self.rr, f"world/cameras/{entity(item.sensor)}", item.root_from_sensor
         camera = item.camera
         self.send(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
-        self.send(
-            f"{path}/picture",
-            rr.Pinhole(
-                image_from_camera=camera.matrix,
-                resolution=(camera.width, camera.height),
-                camera_xyz=rr.ViewCoordinates.RDF,
-                image_plane_distance=0.3,
-            ),
-        )
+        about = {"resolution": (camera.width, camera.height), "camera_xyz": rr.ViewCoordinates.RDF}
+        self.send(f"{path}/picture", rr.Pinhole(image_from_camera=camera.matrix, image_plane_distance=0.3, **about))
         return path
 
     def silhouettes(self, path: str, item: Pictured) -> None:

@@ -5,7 +5,7 @@ H-Anim needs no column: limbs have the names of its segments, and joints (`Bone.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,18 @@ Y_UP_RIGHT: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0,
 """(X, Y, Z) of OpenSim and ISB = (x, z, -y) of the standing frame: X forward, Y up, Z to the right."""
 Y_UP_LEFT: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """(X, Y, Z) of BVH and glTF = (y, z, x) of the standing frame: X to the left, Y up, Z forward."""
+
+
+Color: TypeAlias = dict[str, float]
+"""Red, green, blue and opacity: "r", "g", "b", "a"."""
+_LEFT: Color = {"r": 0.9, "g": 0.6, "b": 0.3, "a": 0.6}
+_RIGHT: Color = {"r": 0.3, "g": 0.6, "b": 0.9, "a": 0.6}
+JOINT_COLOR: Color = {"r": 0.9, "g": 0.1, "b": 0.1, "a": 0.6}
+
+
+def limb_color(limb: str) -> Color:
+    """The color of a limb in scenes of ROS and Foxglove: the person's left differs."""
+    return _LEFT if limb.startswith("l_") else _RIGHT
 
 
 class Names(NamedTuple):

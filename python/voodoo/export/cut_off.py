@@ -7,13 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from voodoo.errors import RecordingError, reading
-from voodoo.export.files import bag_folder
-from voodoo.export.ros2 import STORE
+from voodoo.export.ros2 import STORE, bag
 from voodoo.recordings.mcap_file import check_mcap, records, stored_records
-from voodoo.whole import appearing_whole, move_whole
+from voodoo.whole import move_whole
 
 _SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
 
@@ -38,16 +36,15 @@ def complete(source: Path, path: Path) -> None:
 def _write(source: Path, path: Path) -> None:
     kinds: dict[int, str] = {}
     topics: dict[int, Connection] = {}
-    with appearing_whole(path) as place, bag_folder(place) as folder:
-        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            for code, body in _sound(source):
-                one, other = struct.unpack_from("<HH", body)
-                if code == _SCHEMA:
-                    kinds[one] = _word(body, 2)
-                elif code == _CHANNEL:
-                    topics[one] = writer.add_connection(_word(body, 4), kinds[other], typestore=STORE)
-                elif code == _MESSAGE:
-                    writer.write(topics[one], struct.unpack_from("<Q", body, 6)[0], body[22:])
+    with bag(path) as writer:
+        for code, body in _sound(source):
+            one, other = struct.unpack_from("<HH", body)
+            if code == _SCHEMA:
+                kinds[one] = _word(body, 2)
+            elif code == _CHANNEL:
+                topics[one] = writer.add_connection(_word(body, 4), kinds[other], typestore=STORE)
+            elif code == _MESSAGE:
+                writer.write(topics[one], struct.unpack_from("<Q", body, 6)[0], body[22:])
 
 
 def _sound(source: Path) -> Iterator[tuple[int, bytes]]:

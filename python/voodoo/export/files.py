@@ -21,7 +21,6 @@ from voodoo.export.table import SUFFIXES
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, upright
 from voodoo.model.body import Body
-from voodoo.whole import appearing_whole
 
 ONE_PERSON: Mapping[str, Callable[[Path, Track, Body], None]] = {
     ".bvh": write_bvh,
@@ -80,34 +79,21 @@ def upright_words(paths: Sequence[Path], turn: Turn, *, every: bool = False) -> 
     return f"{', '.join(turned)}: turned upright {turn.words}" if turned and turn.words else ""
 
 
-@contextmanager
-def bag_folder(place: Path) -> Iterator[Path]:
-    """The folder to write a bag to: `place`, or for .mcap a temporary one, whose only file is moved to `place` at the end."""
-    if place.suffix != ".mcap":
-        yield place
-        return
-    bag = place.with_suffix("")
-    yield bag
-    next(bag.glob("*.mcap")).rename(place)
-    shutil.rmtree(bag)
-
-
-def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple[list[Path], list[Exception]]:
-    """Write each of several outputs, whatever becomes of the others; returns the files, and what failed.
+def written(paths: Iterable[Path], write: Callable[[Path], list[Path]]) -> tuple[list[Path], dict[Path, Exception]]:
+    """Write each of several outputs, whatever becomes of the others; returns the files, and output -> why it failed.
 
     Args:
         paths: of the outputs.
         write: writes one of them and returns its files.
     """
     done: list[Path] = []
-    failed: list[Exception] = []
+    failed: dict[Path, Exception] = {}
     for path in paths:
         try:
             done += write(path)
-        except (VoodooError, OSError) as error:
-            failed.append(error)
         except Exception as error:
-            failed.append(VoodooError(f"{path}: {reason(error)}"))
+            known = isinstance(error, VoodooError | OSError)
+            failed[path] = error if known else VoodooError(f"{path}: {reason(error)}")
     return done, failed
 
 
@@ -169,9 +155,6 @@ def save(
         )
         return [path]
     own = {person_id(one): track for one, track in tracks.items()}
-    if path.name.endswith(FOXGLOVE):
-        write_foxglove(path, own, root_frame=root_frame, turn=turn)
-    else:
-        with appearing_whole(path) as place, bag_folder(place) as folder:
-            write_people_bag(folder, own, root_frame=root_frame, turn=turn)
+    write = write_foxglove if path.name.endswith(FOXGLOVE) else write_people_bag
+    write(path, own, root_frame=root_frame, turn=turn)
     return [path]

@@ -7,12 +7,13 @@ from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 
 import voodoo._core as _core
 from voodoo.errors import installed
+from voodoo.export.conventions import JOINT_COLOR, limb_color
 from voodoo.export.human_frames import human_frames, placed_names
 from voodoo.export.skeleton import FloatArray, skeleton
 from voodoo.export.template import STAMP_NS, template
@@ -24,10 +25,9 @@ from voodoo.whole import appearing_whole
 SUFFIX = ".foxglove.mcap"
 TRANSFORMS, SCENE = "/tf", "/people"
 """Topics: foxglove.FrameTransforms and foxglove.SceneUpdate."""
-_LEFT, _RIGHT, _JOINT = (
-    dict(zip("rgba", one, strict=True)) for one in ((0.9, 0.6, 0.3, 0.6), (0.3, 0.6, 0.9, 0.6), (0.9, 0.1, 0.1, 0.6))
-)
 _JOINT_M = 0.04
+FoxglovePerson: TypeAlias = tuple[str, tuple[str, ...], tuple[int, ...], tuple[str, ...], int]
+"""REP-155 id, names and parents of `HumanFrames`, names of limbs, and number of joints and sites."""
 
 
 def library(wanted: object) -> ModuleType:
@@ -64,42 +64,37 @@ class Channels:
         """Whether somebody receives them."""
         return bool(self._transforms.has_sinks() or self._scene.has_sinks())
 
-    def log(self, stamp: float, people: Sequence[FoxgloveRow], root_frame: str) -> None:
-        """Write a frame of those who are there; `root_frame` has z up."""
+    def log(
+        self, stamp: float, people: Sequence[FoxglovePerson], numbers: Sequence[FloatArray], root_frame: str
+    ) -> None:
+        """Write a frame of those who are there, with `HumanFrames.on_parents` and `shapes_of` each; `root_frame` has z up."""
         at = round(stamp * 1e9)
-        made = self._template_of(tuple(one[:5] for one in people), root_frame)
-        numbers = [part for one in people for part in (one.on_parents, one.shapes)]
+        made = self._template_of(tuple(people), root_frame)
         *transforms, scene = made.filled(numbers, _timestamp(*divmod(at, 1_000_000_000)))
         for message in transforms:
             self._transforms.log(message, log_time=at)
         self._scene.log(scene, log_time=at)
 
-    def _make_template(self, people: Sequence[tuple[Any, ...]], root_frame: str) -> _core.Template:
-        """Messages of the first fields of rows: transforms, if somebody is there, and the scene."""
+    def _make_template(self, people: tuple[FoxglovePerson, ...], root_frame: str) -> _core.Template:
+        """Messages of persons: transforms, if somebody is there, and the scene."""
         m = self._messages
         time = m.Timestamp(*divmod(STAMP_NS, 1_000_000_000))
-        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**_JOINT)
-        still = m.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
+        size, red = m.Vector3(x=_JOINT_M, y=_JOINT_M, z=_JOINT_M), m.Color(**JOINT_COLOR)
         before = m.SceneEntityDeletion(timestamp=time, type=m.SceneEntityDeletionType.All)
 
         def transform(parent: str, name: str, row: list[float]) -> Any:  # noqa: ANN401
             how = {"translation": m.Vector3(**_xyz(row)), "rotation": m.Quaternion(**_xyz(row[3:], "xyzw"))}
             return m.FrameTransform(timestamp=time, parent_frame_id=parent, child_frame_id=name, **how)
 
+        def pose(row: list[float]) -> Any:  # noqa: ANN401
+            return m.Pose(position=m.Vector3(**_xyz(row)), orientation=m.Quaternion(**_xyz(row[3:], "xyzw")))
+
         def cylinder(limb: str, row: list[float]) -> Any:  # noqa: ANN401
-            turn = m.Quaternion(**_xyz(row[3:7], "xyzw"))
-            return m.CylinderPrimitive(
-                pose=m.Pose(position=m.Vector3(**_xyz(row)), orientation=turn),
-                size=m.Vector3(**_xyz(row[7:])),
-                bottom_scale=row[10],
-                top_scale=row[11],
-                color=m.Color(**(_LEFT if limb.startswith("l_") else _RIGHT)),
-            )
+            size, scales = m.Vector3(**_xyz(row[7:])), {"bottom_scale": row[10], "top_scale": row[11]}
+            return m.CylinderPrimitive(pose=pose(row), size=size, color=m.Color(**limb_color(limb)), **scales)
 
         def sphere(row: list[float]) -> Any:  # noqa: ANN401
-            return m.SpherePrimitive(
-                pose=m.Pose(position=m.Vector3(**_xyz(row)), orientation=still), size=size, color=red
-            )
+            return m.SpherePrimitive(pose=pose([*row, 0.0, 0.0, 0.0, 1.0]), size=size, color=red)
 
         def encode(numbers: list[float]) -> list[bytes]:
             left, transforms, entities = iter(numbers), [], []
@@ -115,19 +110,6 @@ class Channels:
 
         count = sum(7 * len(names) + 12 * len(limbs) + 3 * joints for _, names, _, limbs, joints in people)
         return template(encode, count, stamp=_timestamp(*divmod(STAMP_NS, 1_000_000_000)))
-
-
-class FoxgloveRow(NamedTuple):
-    """A person in a frame: REP-155 id, names and parents of `HumanFrames`, names of limbs, number of joints and sites, and the
-    numbers of `HumanFrames.on_parents` and `shapes_of`."""
-
-    person: str
-    names: tuple[str, ...]
-    parents: tuple[int, ...]
-    limbs: tuple[str, ...]
-    joints: int
-    on_parents: FloatArray
-    shapes: FloatArray
 
 
 def shapes_of(bodies: Sequence[Body], limb_poses: FloatArray, joints: FloatArray) -> FloatArray:
@@ -177,7 +159,7 @@ def write_foxglove(
     foxglove = library(path)
     context = foxglove.Context()
     channels = Channels(foxglove, context)
-    frames: dict[float, list[FoxgloveRow]] = {}
+    frames: dict[float, tuple[list[FoxglovePerson], list[FloatArray]]] = {}
     root = root_frame
     for person, (track, body) in people.items():
         track, root = upright(track, root_frame, turn)
@@ -186,7 +168,10 @@ def write_foxglove(
         about = person, placed.names, placed.parents, track.limb_names, len(track.joint_names)
         rows = zip(placed.on_parents, shapes_of([body], found.world_from_limb, found.joints), strict=True)
         for stamp, there in zip(track.stamps.tolist(), track.found.tolist(), strict=True):
-            frames.setdefault(stamp, []).extend([FoxgloveRow(*about, *next(rows))] if there else [])
+            persons, numbers = frames.setdefault(stamp, ([], []))
+            if there:
+                persons.append(about)
+                numbers.extend(next(rows))
     with appearing_whole(Path(path)) as place, foxglove.open_mcap(str(place), context=context):
-        for stamp, present in sorted(frames.items()):
-            channels.log(stamp, present, root)
+        for stamp in sorted(frames):
+            channels.log(stamp, *frames[stamp], root)

@@ -20,7 +20,7 @@ from voodoo.model.projection import limb_mesh
 from voodoo.model.rotations import quaternions
 from voodoo.whole import appearing_whole
 
-_FLOAT, _UINT, _UBYTE = 5126, 5125, 5121
+_COMPONENTS = {"<f4": 5126, "<u4": 5125, "u1": 5121}
 _VERTICES, _INDICES = 34962, 34963
 _COLORS = ((0.9, 0.6, 0.3), (0.3, 0.6, 0.9), (0.5, 0.8, 0.4), (0.8, 0.4, 0.7))
 
@@ -65,27 +65,25 @@ class _File:
         self._scene.setdefault(kind, []).append(item)
         return len(self._scene[kind]) - 1
 
-    def _array(self, values: npt.NDArray[Any], kind: str, component: int, target: int | None = None) -> int:
-        """Add an accessor; `kind` is glTF's word for the shape of an element."""
+    def _array(self, values: npt.ArrayLike, kind: str, target: int | None = None, *, of: str = "<f4") -> int:
+        """Add an accessor of numbers that are stored as `of`; `kind` is glTF's word for the shape of an element."""
+        values = np.ascontiguousarray(values, dtype=of)
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self._bytes), "byteLength": values.nbytes}
         self._bytes += values.tobytes() + b"\0" * (-values.nbytes % 4)
         accessor: dict[str, Any] = {
             "bufferView": self._add("bufferViews", view | ({"target": target} if target else {})),
-            "componentType": component,
+            "componentType": _COMPONENTS[of],
             "count": len(values),
             "type": kind,
         }
-        if kind in ("SCALAR", "VEC3") and component == _FLOAT:
+        if kind in ("SCALAR", "VEC3") and of == "<f4":
             rows = values.reshape(len(values), -1)
             accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
         return self._add("accessors", accessor)
 
-    def _floats(self, values: FloatArray, kind: str, target: int | None = None) -> int:
-        return self._array(np.ascontiguousarray(values, dtype="<f4"), kind, _FLOAT, target)
-
     def _animate(self, node: int, path: str, times: int, values: FloatArray, *, step: bool = False) -> None:
         kind = "VEC4" if path == "rotation" else "VEC3"
-        sampler = {"input": times, "output": self._floats(values, kind), "interpolation": "STEP" if step else "LINEAR"}
+        sampler = {"input": times, "output": self._array(values, kind), "interpolation": "STEP" if step else "LINEAR"}
         self._animation["samplers"].append(sampler)
         target = {"sampler": len(self._animation["samplers"]) - 1, "target": {"node": node, "path": path}}
         self._animation["channels"].append(target)
@@ -110,12 +108,12 @@ class _File:
         skin = {
             "joints": list(range(first, first + len(parts))),
             "skeleton": first,
-            "inverseBindMatrices": self._floats(inverse.reshape(-1, 16), "MAT4"),
+            "inverseBindMatrices": self._array(inverse.reshape(-1, 16), "MAT4"),
         }
         shown = {"name": f"{name}_mesh", "mesh": self._mesh(body, parts, color), "skin": self._add("skins", skin)}
         person = self._add("nodes", {"name": name, "children": [first]})
         self._scene["scenes"][0].setdefault("nodes", []).extend([person, self._add("nodes", shown)])
-        times = self._floats(track.stamps - start, "SCALAR")
+        times = self._array(track.stamps - start, "SCALAR")
         turns = quaternions(Y_UP_LEFT @ posed.local() @ Y_UP_LEFT.T)
         for index in range(len(parts)):
             # Of the two quaternions of a rotation the one near the previous, as readers interpolate.
@@ -128,7 +126,7 @@ class _File:
             # Before and after the person's own frames, readers hold the first and the last value.
             shown_at = np.r_[0.0, track.stamps - start] if track.stamps[0] > start else track.stamps - start
             sizes = np.r_[False, track.found] if track.stamps[0] > start else track.found
-            self._animate(person, "scale", self._floats(shown_at, "SCALAR"), np.tile(sizes[:, None], 3), step=True)
+            self._animate(person, "scale", self._array(shown_at, "SCALAR"), np.tile(sizes[:, None], 3), step=True)
 
     def _mesh(self, body: Body, bones: Sequence[Bone], color: tuple[float, ...]) -> int:
         """All limbs at rest as one mesh; each vertex follows its limb."""
@@ -145,12 +143,12 @@ class _File:
         joints[:, 0] = np.concatenate(owners)
         weights = np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (count, 1))
         attributes = {
-            "POSITION": self._floats(np.concatenate(places) @ Y_UP_LEFT.T, "VEC3", _VERTICES),
-            "NORMAL": self._floats(np.concatenate(normals) @ Y_UP_LEFT.T, "VEC3", _VERTICES),
-            "JOINTS_0": self._array(joints, "VEC4", _UBYTE, _VERTICES),
-            "WEIGHTS_0": self._floats(weights, "VEC4", _VERTICES),
+            "POSITION": self._array(np.concatenate(places) @ Y_UP_LEFT.T, "VEC3", _VERTICES),
+            "NORMAL": self._array(np.concatenate(normals) @ Y_UP_LEFT.T, "VEC3", _VERTICES),
+            "JOINTS_0": self._array(joints, "VEC4", _VERTICES, of="u1"),
+            "WEIGHTS_0": self._array(weights, "VEC4", _VERTICES),
         }
-        indices = self._array(np.concatenate(triangles).astype("<u4").reshape(-1), "SCALAR", _UINT, _INDICES)
+        indices = self._array(np.concatenate(triangles).reshape(-1), "SCALAR", _INDICES, of="<u4")
         surface = {"baseColorFactor": [*color, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.8}
         material = self._add("materials", {"pbrMetallicRoughness": surface})
         primitive = {"attributes": attributes, "indices": indices, "material": material}

@@ -12,11 +12,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo.errors import VoodooError
 from voodoo.export.conventions import Y_UP_LEFT, Y_UP_RIGHT, coordinates, names_of, plain
-from voodoo.export.skeleton import Bone, FloatArray, held, mean_interval, placed_on_parents, skeleton
+from voodoo.export.skeleton import FloatArray, held, mean_interval, placed_on_parents, skeleton
 from voodoo.export.table import cells
 from voodoo.export.track import Track
 from voodoo.model.body import Body
@@ -24,9 +23,12 @@ from voodoo.model.rotations import euler_angles, quaternions
 from voodoo.recordings.marker_trajectories import Z_UP_FROM_Y_UP
 from voodoo.whole import appearing_whole, write_whole
 
+_CENTIMETERS, _MILLIMETERS = 100.0, 1000.0
+"""Units of animation programs and of C3D, per meter."""
 
-def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.0) -> None:
-    """Write a track as BVH.
+
+def write_bvh(path: str | Path, track: Track, body: Body) -> None:
+    """Write a track as BVH, in centimeters.
 
     At rest, axes are X left, Y up, Z forward; with zero rotations the body stands at rest. Rotations are in the order Z, X, Y
     in degrees. Joints have the positions of the track: a joint whose position on its parent changes by more than 0.1 mm
@@ -38,7 +40,6 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
         path: .bvh file.
         track: with limb poses, in a frame whose z points up.
         body: with the sizes it was tracked with (`Tracker.body`).
-        scale: BVH units per meter; animation programs expect centimeters.
 
     Raises:
         VoodooError: the track has no limb poses, is of another body, or its stamps do not increase.
@@ -49,68 +50,51 @@ def write_bvh(path: str | Path, track: Track, body: Body, *, scale: float = 100.
     lines = ["HIERARCHY"]
     order: list[int] = []
     offsets, still, moving = placed_on_parents(posed, track.found)
-    _describe(parts, 0, "", (scale, still, moving), lines, order)
+    still[0] = 0.0
+
+    def describe(index: int, indent: str) -> None:
+        """Append the joint of a bone and, depth first, those of its children; `order` is that of the channels."""
+        order.append(index)
+        turns = "Zrotation Xrotation Yrotation"
+        channels = f"6 Xposition Yposition Zposition {turns}" if moving[index] else f"3 {turns}"
+        lines.append(f"{indent}{'JOINT' if index else 'ROOT'} {plain(parts[index].name)}")
+        lines.append(f"{indent}{{")
+        lines.append(f"{indent}\tOFFSET {_numbers(still[index])}")
+        lines.append(f"{indent}\tCHANNELS {channels}")
+        children = [child for child, other in enumerate(parts) if other.parent == index]
+        for child in children:
+            describe(child, indent + "\t")
+        if not children:
+            tip = _numbers(parts[index].tip - parts[index].head)
+            lines.extend(f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {tip}", "}"))
+        lines.append(f"{indent}}}")
+
+    describe(0, "")
     lines += ["MOTION", f"Frames: {len(track)}", f"Frame Time: {mean_interval(track.stamps):.9f}"]
     local = Y_UP_LEFT @ posed.local() @ Y_UP_LEFT.T
     angles = np.empty((len(track), len(parts), 3))
     for index in range(len(parts)):
         angles[:, index] = np.degrees(euler_angles(local[:, index], "ZXY"))
-    places = offsets @ Y_UP_LEFT.T * scale
+    places = offsets @ Y_UP_LEFT.T * _CENTIMETERS
     for shifts, turns in zip(places, angles, strict=True):
         row = [value for bone in order for value in (*(shifts[bone] if moving[bone] else ()), *turns[bone])]
         lines.append(" ".join(f"{value:.6f}" for value in row))
     write_whole(Path(path), "\n".join(lines) + "\n")
 
 
-def _describe(
-    parts: tuple[Bone, ...],
-    index: int,
-    indent: str,
-    sizes: tuple[float, FloatArray, npt.NDArray[np.bool_]],
-    lines: list[str],
-    order: list[int],
-) -> None:
-    """Append the joint of a bone and, depth first, those of its children; `order` is that of the channels.
-
-    `sizes`: BVH units per meter, offset (L, 3) of every joint, and which of them (L,) have position channels.
-    """
-    bone, (scale, offsets, moving) = parts[index], sizes
-    order.append(index)
-    root = bone.parent is None
-    start = np.zeros(3) if root else offsets[index]
-    turns = "Zrotation Xrotation Yrotation"
-    channels = f"6 Xposition Yposition Zposition {turns}" if root or moving[index] else f"3 {turns}"
-    lines += [
-        f"{indent}{'ROOT' if root else 'JOINT'} {plain(bone.name)}",
-        f"{indent}{{",
-        f"{indent}\tOFFSET {_numbers(start, scale)}",
-        f"{indent}\tCHANNELS {channels}",
-    ]
-    children = [child for child, other in enumerate(parts) if other.parent == index]
-    for child in children:
-        _describe(parts, child, indent + "\t", sizes, lines, order)
-    if not children:
-        lines += [
-            f"{indent}\tEnd Site",
-            f"{indent}\t{{",
-            f"{indent}\t\tOFFSET {_numbers(bone.tip - bone.head, scale)}",
-            f"{indent}\t}}",
-        ]
-    lines.append(f"{indent}}}")
+def _numbers(vector: FloatArray) -> str:
+    return " ".join(f"{value:.6f}" for value in Y_UP_LEFT @ vector * _CENTIMETERS)
 
 
-def _numbers(vector: FloatArray, scale: float) -> str:
-    return " ".join(f"{value:.6f}" for value in Y_UP_LEFT @ vector * scale)
+def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None) -> None:
+    """Write the joints and sites of a track as markers, in meters and OpenSim's axes: (X, Y, Z) = (y, z, x).
 
-
-def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = None, y_up: bool = True) -> None:
-    """Write the joints and sites of a track as markers, in meters; searching frames have empty cells.
+    Searching frames have empty cells.
 
     Args:
         path: .trc file.
         track: the track.
         names: joints and sites to write; None means all.
-        y_up: rotate from z up (REP-103) to OpenSim's Y up: (X, Y, Z) = (y, z, x); False keeps the axes.
 
     Raises:
         VoodooError: a name that is not in the track, none at all, or stamps that do not increase.
@@ -124,9 +108,7 @@ def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = N
         )
     path = Path(path)
     rate = round(1.0 / mean_interval(track.stamps), 6)
-    positions = track.joints[:, [track.joint_names.index(name) for name in chosen]]
-    if y_up:
-        positions = positions @ Z_UP_FROM_Y_UP
+    positions = track.joints[:, [track.joint_names.index(name) for name in chosen]] @ Z_UP_FROM_Y_UP
     numbers = range(1, len(chosen) + 1)
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
@@ -144,7 +126,6 @@ def write_trc(path: str | Path, track: Track, *, names: Sequence[str] | None = N
 
 _RESIDUAL = 3
 """Column of the library's points that tells a point that was not observed (-1); columns 0 to 2 are the position."""
-_MILLIMETERS = 1000.0
 
 
 def write_c3d(path: str | Path, track: Track) -> None:

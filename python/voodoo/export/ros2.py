@@ -8,7 +8,9 @@ left, z up when the person stands at rest (REP-103). The parent of `body_<id>` i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,8 +24,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import voodoo._core as _core
 from voodoo._core import Estimate
 from voodoo.errors import VoodooError
+from voodoo.export.conventions import JOINT_COLOR, Color, limb_color
 from voodoo.export.human_frames import human_frames, joint_angles, placed_names
-from voodoo.export.skeleton import FloatArray, skeleton
+from voodoo.export.skeleton import FloatArray, ellipsoids, skeleton
 from voodoo.export.track import Track
 from voodoo.export.upright import Turn, by_axes, upright
 from voodoo.export.urdf import urdf
@@ -51,6 +54,7 @@ TF, JOINTS = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 _MARKER = "visualization_msgs/msg/Marker"
 _SPHERE, _CYLINDER, _SPHERES, _DELETE_ALL = 2, 3, 7, 3
+_SPREAD_COLOR: Color = {"r": 0.9, "g": 0.9, "b": 0.9, "a": 0.3}
 
 
 def person_id(number: int) -> str:
@@ -70,7 +74,7 @@ def description(body: Body, person: str) -> dict[str, Any]:
 
 def tracked(stamp: float, persons: Sequence[str], *, root_frame: str) -> dict[str, Any]:
     """Topic of TRACKED -> message (hri_msgs/IdsList) of the ids of all persons who have transforms at a time [s]."""
-    return dict.fromkeys(TRACKED, new(IDS, header=header_at(round(stamp * 1e9), root_frame), ids=list(persons)))
+    return dict.fromkeys(TRACKED, new(IDS, header=header_at(stamp, root_frame), ids=list(persons)))
 
 
 _KEYPOINTS = ("", "vc7") + tuple(
@@ -96,20 +100,13 @@ def keypoints_message(estimate: Estimate, image: DepthImage | ColorImage) -> Any
         probability = sure.get(f"{side}_{_LIMB_TO.get(joint)}", sure[estimate.limb_names[0]])
         if ((at >= 0.0) & (at <= 1.0)).all():
             points[number] = new(_POINT, x=float(at[0]), y=float(at[1]), c=float(np.nan_to_num(probability)))
-    return new(SKELETON, header=header_at(round(image.stamp * 1e9), image.sensor), skeleton=points)
+    return new(SKELETON, header=header_at(image.stamp, image.sensor), skeleton=points)
 
 
 def write_bag(
-    path: str | Path,
-    track: Track,
-    body: Body,
-    *,
-    root_frame: str,
-    person: str = "p1",
-    markers: bool = True,
-    turn: Turn | None = None,
+    path: str | Path, track: Track, body: Body, *, root_frame: str, person: str = "p1", turn: Turn | None = None
 ) -> None:
-    """Write a new bag folder.
+    """Write a new bag folder, or the .mcap file of one.
 
     Topics: `/tf` (tf2_msgs/TFMessage), `/humans/bodies/tracked` and `/humans/persons/tracked` (hri_msgs/IdsList),
     `/humans/persons/<person>/body_id` and `anonymous`, and `/human_description_<person>` (std_msgs/String, URDF; these three once
@@ -122,12 +119,11 @@ def write_bag(
     has as a child of the root frame.
 
     Args:
-        path: the folder, which must not exist.
+        path: the folder, which must not exist, or a .mcap file.
         track: with limb poses.
         body: in the sizes it was tracked with.
         root_frame: frame of the track, e.g. "base_link".
         person: REP-155 id.
-        markers: also write the markers.
         turn: how the root frame is turned upright; None: a camera's optical frame, by its name, by its axes.
 
     Raises:
@@ -135,26 +131,20 @@ def write_bag(
             of another body.
         OSError: the bag cannot be written.
     """
-    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, markers=markers, turn=turn)
+    write_people_bag(path, {person: (track, body)}, root_frame=root_frame, turn=turn)
 
 
 def write_people_bag(
-    path: str | Path,
-    people: Mapping[str, tuple[Track, Body]],
-    *,
-    root_frame: str,
-    markers: bool = True,
-    turn: Turn | None = None,
+    path: str | Path, people: Mapping[str, tuple[Track, Body]], *, root_frame: str, turn: Turn | None = None
 ) -> None:
-    """Write a new bag folder of several people.
+    """Write a new bag folder of several people, or the .mcap file of one.
 
     As `write_bag`, with frames `body_<person>`, `torso_<person>`, ... and topics `/humans/bodies/<person>/...` for each of them.
 
     Args:
-        path: the folder, which must not exist.
+        path: the folder, which must not exist, or a .mcap file.
         people: REP-155 id, which begins with a letter -> track with limb poses, and body in the sizes it was tracked with.
         root_frame: frame of the tracks.
-        markers: also write the markers.
         turn: see `write_bag`.
 
     Raises:
@@ -166,29 +156,41 @@ def write_people_bag(
         if not name.isidentifier():
             raise VoodooError(f"person: expected a name, found {name!r}")
     humans = [_Human(track, body, name, root_frame, turn) for name, (track, body) in people.items()]
-    if path.exists():
+    if path.suffix != ".mcap" and path.exists():
         raise VoodooError(f"{path}: expected a folder that does not exist yet, found one")
     kinds = {"/tf": TF} | dict.fromkeys(TRACKED, IDS)
     first: dict[str, Any] = {}
     frames: list[tuple[float, int, int]] = []
     there: dict[float, list[str]] = {}
     for number, human in enumerate(humans):
-        kinds |= human.kinds(markers)
+        kinds |= human.kinds()
         first |= description(human.body, human.person)
         frames += [(float(stamp), number, index) for index, stamp in enumerate(human.track.stamps)]
     kinds |= {topic: message.__msgtype__ for topic, message in first.items()}
     frames.sort()
     for stamp, number, index in frames:
         there.setdefault(stamp, []).extend([humans[number].person] if humans[number].track.found[index] else [])
-    with appearing_whole(path) as place, Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    with bag(path) as writer:
         connect = {name: writer.add_connection(name, kind, typestore=STORE) for name, kind in kinds.items()}
         for stamp, number, index in frames:
-            messages = first | humans[number].messages(index, markers=markers)
+            messages = first | humans[number].messages(index)
             if stamp in there:
                 messages |= tracked(stamp, there.pop(stamp), root_frame=humans[number].root)
             first = {}
             for name, message in messages.items():
                 writer.write(connect[name], round(stamp * 1e9), cdr(message))
+
+
+@contextmanager
+def bag(path: Path) -> Iterator[Writer]:
+    """Write a new bag: a folder, or for .mcap the only file of one; it appears when it is complete."""
+    with appearing_whole(path) as place:
+        folder = place.with_suffix("") if path.suffix == ".mcap" else place
+        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            yield writer
+        if folder != place:
+            next(folder.glob("*.mcap")).rename(place)
+            shutil.rmtree(folder)
 
 
 class _Human:
@@ -214,16 +216,18 @@ class _Human:
             sure = _core.moved_covariances(known, frames.places[:, 0] - roots)
             self._rows = zip(angles, frames.on_parents, sure, strict=True)
 
-    def kinds(self, markers: bool) -> dict[str, str]:
+    def kinds(self) -> dict[str, str]:
         """Topics and types of the messages, without /tf."""
         kinds = {f"{self.topic}/joint_states": JOINTS}
         kinds |= {f"{self.topic}/pose": POSE} if np.isfinite(self.track.root_covariance).any() else {}
-        return kinds | ({f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"} if markers else {})
+        return kinds | {f"{self.topic}/markers": "visualization_msgs/msg/MarkerArray"}
 
-    def messages(self, index: int, *, markers: bool) -> dict[str, Any]:
+    def messages(self, index: int) -> dict[str, Any]:
         """Topic -> message of a frame; frames are asked for in order."""
-        at = round(float(self.track.stamps[index]) * 1e9)
+        at = float(self.track.stamps[index])
+        header = header_at(at, self.root)
         messages: dict[str, Any] = {}
+        drawn = [new(_MARKER, header=header, action=_DELETE_ALL)]
         if self._displayed[index]:
             angles, rows, sure = next(self._rows)
             placed = [(parent, name, row) for (parent, name), row in zip(self._frames, rows.tolist(), strict=True)]
@@ -231,14 +235,8 @@ class _Human:
             messages[f"{self.topic}/joint_states"] = joint_message(at, self.person, self._joints, angles)
             if np.isfinite(sure).all():
                 messages[f"{self.topic}/pose"] = pose_message(at, self.root, rows[0].tolist(), sure)
-        if markers:
-            header = header_at(at, self.root)
-            drawn = (
-                _markers(self.track, self.body, index, header)
-                if self._displayed[index]
-                else [new(_MARKER, header=header, action=_DELETE_ALL)]
-            )
-            messages[f"{self.topic}/markers"] = new("visualization_msgs/msg/MarkerArray", markers=drawn)
+            drawn = _markers(self.track, self.body, index, header)
+        messages[f"{self.topic}/markers"] = new("visualization_msgs/msg/MarkerArray", markers=drawn)
         return messages
 
 
@@ -247,82 +245,51 @@ def root_on_parent(pose: FloatArray) -> list[float]:
     return [*(-pose[:3, :3].T @ pose[:3, 3]).tolist(), *quaternions(pose[:3, :3].T).tolist()]
 
 
-def transforms_message(nanoseconds: int, rows: Iterable[tuple[str, str, Sequence[float]]]) -> Any:  # noqa: ANN401
-    """TFMessage of parents, names, and place x, y, z and rotation x, y, z, w on the parent."""
+def transforms_message(stamp: float, rows: Iterable[tuple[str, str, Sequence[float]]]) -> Any:  # noqa: ANN401
+    """TFMessage of parents, names, and place x, y, z and rotation x, y, z, w on the parent, at a time [s]."""
     transforms = []
-    for parent, name, (x, y, z, qx, qy, qz, qw) in rows:
-        place = new("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
-        turn = new("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw)
+    for parent, name, row in rows:
+        place, turn = _geometry("Vector3", row[:3]), _geometry("Quaternion", row[3:])
         moved = new("geometry_msgs/msg/Transform", translation=place, rotation=turn)
-        header = header_at(nanoseconds, parent)
-        transforms.append(
-            new("geometry_msgs/msg/TransformStamped", header=header, child_frame_id=name, transform=moved)
-        )
+        about: dict[str, Any] = {"header": header_at(stamp, parent), "child_frame_id": name}
+        transforms.append(new("geometry_msgs/msg/TransformStamped", transform=moved, **about))
     return new(TF, transforms=transforms)
 
 
-def joint_message(nanoseconds: int, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
-    """JointState of angles [rad]."""
-    return new(
-        JOINTS,
-        header=header_at(nanoseconds, f"body_{person}"),
-        name=[f"{name}_{person}" for name in joints],
-        position=np.ascontiguousarray(angles, dtype=np.float64),
-    )
+def joint_message(stamp: float, person: str, joints: Sequence[str], angles: npt.ArrayLike) -> Any:  # noqa: ANN401
+    """JointState of angles [rad] at a time [s]."""
+    header, names = header_at(stamp, f"body_{person}"), [f"{name}_{person}" for name in joints]
+    return new(JOINTS, header=header, name=names, position=np.ascontiguousarray(angles, dtype=np.float64))
 
 
-def pose_message(nanoseconds: int, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
-    """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers)."""
+def pose_message(stamp: float, root: str, row: Sequence[float], covariance: npt.ArrayLike) -> Any:  # noqa: ANN401
+    """PoseWithCovarianceStamped of a place x, y, z and rotation x, y, z, w with its covariance (36 numbers), at a time [s]."""
     uncertain = np.asarray(covariance, dtype=np.float64).ravel()
     pose = new("geometry_msgs/msg/PoseWithCovariance", pose=_pose(row), covariance=uncertain)
-    return new(POSE, header=header_at(nanoseconds, root), pose=pose)
+    return new(POSE, header=header_at(stamp, root), pose=pose)
 
 
 def _markers(track: Track, body: Body, index: int, header: Any) -> list[Any]:  # noqa: ANN401
-    result = []
+    result: list[Any] = []
+
+    def add(name: str, kind: int, row: Sequence[float], size: Sequence[float], rgba: Color, **more: Any) -> None:  # noqa: ANN401
+        color, scale = new("std_msgs/msg/ColorRGBA", **rgba), _geometry("Vector3", size)
+        about = {"header": header, "ns": name, "type": kind, "pose": _pose(row), "scale": scale, "color": color}
+        result.append(new(_MARKER, **about, **more))
+
     poses = track.world_from_limb[index]
     turns = quaternions(poses[:, :3, :3])
     for number, (limb, pose) in enumerate(zip(body.limbs, poses, strict=True)):
         middle = pose[:3, :3] @ np.array([0.0, 0.0, limb.shape.length / 2]) + pose[:3, 3]
         size = (limb.shape.a0 + limb.shape.a1, limb.shape.b0 + limb.shape.b1, limb.shape.length)
-        rgb = (0.9, 0.6, 0.3) if limb.name.startswith("l_") else (0.3, 0.6, 0.9)
-        result.append(_marker(header, "limbs", number, _CYLINDER, middle, turns[number], size, rgb, []))
-    points = [_point(position) for position in track.joints[index].tolist()]
-    still = np.array([0.0, 0.0, 0.0, 1.0])
-    result.append(_marker(header, "joints", 0, _SPHERES, np.zeros(3), still, (0.04,) * 3, (0.9, 0.1, 0.1), points))
+        add("limbs", _CYLINDER, (*middle, *turns[number]), size, limb_color(limb.name), id=number)
+    points = [_geometry("Point", position) for position in track.joints[index].tolist()]
+    add("joints", _SPHERES, (*[0.0] * 6, 1.0), (0.04,) * 3, JOINT_COLOR, points=points)
     known = np.isfinite(track.covariance[index]).all(axis=(1, 2)).nonzero()[0]
-    variances, axes = np.linalg.eigh(track.covariance[index][known])
-    axes[:, :, 0] *= np.sign(np.linalg.det(axes))[:, None]
-    sizes = (2.0 * np.sqrt(np.maximum(variances, 0.0))).tolist()
-    for number, turn, size in zip(known.tolist(), quaternions(axes), sizes, strict=True):
-        place = track.joints[index, number]
-        result.append(_marker(header, "uncertainty", number, _SPHERE, place, turn, size, (0.9, 0.9, 0.9), [], 0.3))
+    sizes, axes = ellipsoids(track.covariance[index][known])
+    for number, turn, size in zip(known.tolist(), axes, 2.0 * sizes, strict=True):
+        add("uncertainty", _SPHERE, (*track.joints[index, number], *turn), size, _SPREAD_COLOR, id=number)
     return result
-
-
-def _marker(
-    header: Any,  # noqa: ANN401
-    namespace: str,
-    number: int,
-    kind: int,
-    place: FloatArray,
-    turn: FloatArray,
-    size: Sequence[float],
-    rgb: tuple[float, float, float],
-    points: list[Any],
-    opacity: float = 0.6,
-) -> Any:  # noqa: ANN401
-    return new(
-        _MARKER,
-        header=header,
-        ns=namespace,
-        id=number,
-        type=kind,
-        pose=_pose([*place.tolist(), *turn.tolist()]),
-        scale=new("geometry_msgs/msg/Vector3", x=float(size[0]), y=float(size[1]), z=float(size[2])),
-        color=new("std_msgs/msg/ColorRGBA", r=rgb[0], g=rgb[1], b=rgb[2], a=opacity),
-        points=points,
-    )
 
 
 def new(kind: str, **fields: Any) -> Any:  # noqa: ANN401
@@ -347,35 +314,25 @@ def _nothing(form: Nodetype, content: Any) -> Any:  # noqa: ANN401 - of rosbags
     return []
 
 
-def header_at(nanoseconds: int, frame: str) -> Any:  # noqa: ANN401
-    """A std_msgs/Header."""
-    seconds, rest = divmod(nanoseconds, 1_000_000_000)
-    return new(
-        "std_msgs/msg/Header",
-        stamp=new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest),
-        frame_id=frame,
-    )
+def header_at(stamp: float, frame: str) -> Any:  # noqa: ANN401
+    """A std_msgs/Header of a time [s]."""
+    seconds, rest = divmod(round(stamp * 1e9), 1_000_000_000)
+    time = new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+    return new("std_msgs/msg/Header", stamp=time, frame_id=frame)
 
 
 def _pose(row: Sequence[float]) -> Any:  # noqa: ANN401
-    x, y, z, w = row[3:]
-    turn = new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
-    return new("geometry_msgs/msg/Pose", position=_point(row[:3]), orientation=turn)
+    place, turn = _geometry("Point", row[:3]), _geometry("Quaternion", row[3:])
+    return new("geometry_msgs/msg/Pose", position=place, orientation=turn)
 
 
-def _point(position: Sequence[float]) -> Any:  # noqa: ANN401
-    x, y, z = position
-    return new("geometry_msgs/msg/Point", x=x, y=y, z=z)
+def _geometry(kind: str, values: Sequence[float]) -> Any:  # noqa: ANN401
+    """A Point, Vector3 or Quaternion of its x, y, z and w."""
+    return new(f"geometry_msgs/msg/{kind}", **dict(zip("xyzw", map(float, values), strict=False)))
 
 
 def instant(
-    estimate: Estimate,
-    body: Body,
-    *,
-    root_frame: str,
-    person: str,
-    markers: bool = True,
-    turn: Turn | None = None,
+    estimate: Estimate, body: Body, *, root_frame: str, person: str, turn: Turn | None = None
 ) -> dict[str, Any]:
     """Topic -> message of one frame, as `write_bag` writes them: /tf, joint states and markers.
 
@@ -384,7 +341,6 @@ def instant(
         body: in its current sizes.
         root_frame: frame of the estimate; if it is turned, see `write_bag`.
         person: REP-155 id.
-        markers: also make the markers.
         turn: see `write_bag`.
 
     Raises:
@@ -392,7 +348,7 @@ def instant(
     """
     # Angles are not needed; if nobody was found, the names come from the body.
     track = Track.of([estimate], body=None if estimate.joints else body)
-    return _Human(track, body, person, root_frame, turn).messages(0, markers=markers)
+    return _Human(track, body, person, root_frame, turn).messages(0)
 
 
 def cdr(message: Any) -> bytes:  # noqa: ANN401 - its class is made from a message definition

@@ -19,6 +19,7 @@ import voodoo._core as _core
 from voodoo.errors import VoodooError
 from voodoo.export.track import Track
 from voodoo.model.body import Body
+from voodoo.model.rotations import quaternions
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 _MOVES_M = 1e-4
@@ -173,6 +174,13 @@ def placed_on_parents(
     moving = np.abs(known - still).max(axis=(0, 2)) > _MOVES_M
     places[:, 0], moving[0] = posed.heads[:, 0], True
     return places, still, moving
+
+
+def ellipsoids(covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Half-axes (N, 3) [m] and rotations x, y, z, w (N, 4) of the ellipsoids of one standard deviation of positions (N, 3, 3)."""
+    variances, axes = np.linalg.eigh(covariances)
+    axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
+    return np.sqrt(np.maximum(variances, 0.0)), quaternions(axes)
 
 
 def mean_interval(stamps: FloatArray) -> float:

@@ -8,9 +8,9 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from functools import partial
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,7 @@ _SAMPLED = 3
 """Number of parts in a sample."""
 
 
-class Spool:
+class Spool(AbstractContextManager["Spool"]):
     """Poses of one person or several in a hidden folder next to the first output; use it in a `with` block.
 
     An error of this package in the block removes them; after another one, or a crash, `recover` makes the outputs.
@@ -54,7 +54,7 @@ class Spool:
     Attributes:
         frames: number of frames.
         states: number of poses of each status.
-        persons: numbers of the persons.
+        bodies: person number -> last body.
         paths: see above.
     """
 
@@ -76,12 +76,11 @@ class Spool:
         self._together = together
         self._numbered = False
         self._waiting: list[PeopleEstimate | Track] = []
-        self._bodies: dict[int, Body] = {}
+        self.bodies: dict[int, Body] = {}
         self._bodies_at = -_BODIES_S
         self._parts: list[Path] = []
         self.frames = 0
         self.states: Counter[str] = Counter()
-        self.persons: set[int] = set()
 
     def add(self, estimate: Estimate | PeopleEstimate | Track, bodies: Mapping[int, Body]) -> None:
         """Take the poses of a frame, and the bodies in it; an estimate or a track is of person ONE.
@@ -92,10 +91,9 @@ class Spool:
         self._numbered = isinstance(estimate, PeopleEstimate)
         estimate = estimate if isinstance(estimate, Track) else everybody(estimate)
         self._waiting.append(estimate)
-        self._bodies.update(bodies)
+        self.bodies.update(bodies)
         self.frames += 1
         self.states.update(estimate.status if isinstance(estimate, Track) else (str(one.status) for one in estimate))
-        self.persons.update(bodies)
         if len(self._waiting) >= self._together:
             self._put_away()
 
@@ -108,8 +106,8 @@ class Spool:
         arrays = dict(self._last())
         needed = not all(map(is_table, self.paths))
         if needed and time.monotonic() - self._bodies_at >= _BODIES_S:
-            arrays[BODIES] = np.array([body.to_toml() for body in self._bodies.values()], dtype=np.str_)
-            arrays[BODY_OF] = np.array(list(self._bodies), dtype=np.int64)
+            arrays[BODIES] = np.array([body.to_toml() for body in self.bodies.values()], dtype=np.str_)
+            arrays[BODY_OF] = np.array(list(self.bodies), dtype=np.int64)
         path = self._hidden.folder / f"{len(self._parts):08d}.npz"
         place = path.with_suffix(".part")
         with naming(path):
@@ -134,7 +132,7 @@ class Spool:
         if tracks:
             return arrays_of(Track.joined(tracks))
         estimates = [one for one in self._waiting if isinstance(one, PeopleEstimate)]
-        return PeopleTrack.of(estimates, bodies=self._bodies).arrays()
+        return PeopleTrack.of(estimates, bodies=self.bodies).arrays()
 
     def _contents(self) -> Callable[[], Iterator[Arrays]]:
         last = [self._last()] if self._waiting else []
@@ -165,21 +163,14 @@ class Spool:
         if not self.frames:
             self._hidden.remove()
             raise NoPoseError("expected at least one frame to write, found none")
-        failing: list[Path] = []
         contents = self._contents()
         self._turn = turn
         turn = by_axes(self._root(), optical=self._optical) if turn is None else turn
-        how: Any = {"bodies": self._bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
+        how: Any = {"bodies": self.bodies, "root_frame": self._root(), "turn": turn, "upright": self._upright}
         how |= {"numbered": self._numbered, "left_out": left_out or {}}
-
-        def write(path: Path) -> list[Path]:
-            try:
-                return _write(path, contents, **how)
-            except OSError:
-                failing.extend([path] if path != STDOUT else [])
-                raise
-
-        done, failed = written(self.paths, write)
+        done, errors = written(self.paths, lambda path: _write(path, contents, **how))
+        failed = list(errors.values())
+        failing = [path for path in self._kept_for if isinstance(errors.get(path), OSError)]
         if not failing:
             self._hidden.remove()
             return done, failed
@@ -195,10 +186,6 @@ class Spool:
             return done, failed
         self._hidden.close()
         return done, [*failed, VoodooError(kept)]
-
-    def __enter__(self) -> Spool:
-        """Enter the context."""
-        return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Remove the folder after an error of this package; keep it after another one.
@@ -281,17 +268,13 @@ def recover(folder: str | Path, *, taken: Iterable[Path] = ()) -> tuple[list[Pat
         if not (hidden / KEPT).is_file() or hidden.stat().st_uid != getattr(os, "geteuid", lambda: 0)():
             continue
         try:
-            lock = locked(hidden)
-        except OSError as error:
+            if (lock := locked(hidden)) is not None:
+                try:
+                    _recover_one(hidden, others, done, failed)
+                finally:
+                    os.close(lock)
+        except (VoodooError, OSError) as error:
             failed.append(error)
-            continue
-        if lock is not None:
-            try:
-                _recover_one(hidden, others, done, failed)
-            except (VoodooError, OSError) as error:
-                failed.append(error)
-            finally:
-                os.close(lock)
     return done, failed
 
 
@@ -332,17 +315,13 @@ def _recover_one(hidden: Path, taken: set[Path], done: list[Path], failed: list[
     how |= {"bodies": bodies, "left_out": {}}
     some, errors = written(free.values(), lambda path: _write(path, lambda: _stored(parts), **how))
     done += some
-    failed += errors
+    failed += errors.values()
     if not errors:
         removed(hidden)
 
 
 def _free(path: Path, taken: set[Path]) -> Path:
     """A name that is not in use."""
-    found, number = path, 1
-    while found.exists() or found.resolve() in taken:
-        again = f"-{number}" if number > 1 else ""
-        known = path.suffix in FORMATS
-        name = f"{path.stem}.recovered{again}{path.suffix}" if known else f"{path.name}-recovered{again}"
-        found, number = path.with_name(name), number + 1
-    return found
+    start, end = (f"{path.stem}.recovered", path.suffix) if path.suffix in FORMATS else (f"{path.name}-recovered", "")
+    others = (path.with_name(f"{start}{again}{end}") for again in chain([""], (f"-{number}" for number in count(2))))
+    return next(one for one in chain([path], others) if not (one.exists() or one.resolve() in taken))

@@ -43,18 +43,6 @@ def angle_sigmas_of(estimates: Sequence[Estimate], names: Sequence[str]) -> Floa
     return np.sqrt(found / free) if np.isfinite(found).any() else np.empty((len(estimates), 0))
 
 
-def covariances_of(estimates: Sequence[Estimate], joint_names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    """Covariances (F, J, 3, 3) of the joints and (F, 6, 6) of the first limb's pose; NaN where unknown, and
-    (F, 0, 3, 3) if unknown in all frames."""
-    joints = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
-    root = np.full((len(estimates), 6, 6), np.nan)
-    for index, estimate in enumerate(estimates):
-        if len(estimate.joint_covariances) == len(joint_names):
-            joints[index] = estimate.joint_covariances
-        root[index] = estimate.root_covariance
-    return (joints if np.isfinite(joints).any() else np.empty((len(estimates), 0, 3, 3))), root
-
-
 _ARRAYS = ("stamps", "status", "residual", "joint_names", "joints", "limb_names", "world_from_limb")
 FORMAT_VERSION = 3
 """Version of the .npz format. It is increased if earlier readers would misread a file, not for additional arrays."""
@@ -108,27 +96,25 @@ class Track:
 
     def __post_init__(self) -> None:
         """Check that the arrays are consistent, and that all frames with a pose status have a pose."""
-        frames, joints, limbs = len(self.stamps), len(self.joint_names), len(self.limb_names)
-        missing = {"covariance": (0, 3, 3), "angle_sigma": (0,), "root_covariance": (6, 6), "angles": (0,)}
-        for name, size in missing.items():
-            if not (self.angle_names if name == "angles" else getattr(self, name).size):
-                object.__setattr__(self, name, np.full((frames, *size), np.nan))
-        if len(self.status) != frames:
-            raise VoodooError(f"status: expected {frames} entries, found {len(self.status)}")
-        for limb, words in self.limb_status.items():
+        frames, joints, angles = len(self.stamps), len(self.joint_names), len(self.angle_names)
+        limb_words = {f"limb_status[{limb}]": words for limb, words in self.limb_status.items()}
+        for name, words in {"status": self.status, **limb_words}.items():
             if len(words) != frames:
-                raise VoodooError(f"limb_status[{limb}]: expected {frames} entries, found {len(words)}")
-        expected = {
-            "angles": (frames, len(self.angle_names)),
-            "stamps": (frames,),
-            "residual": (frames,),
-            "joints": (frames, joints, 3),
-            "world_from_limb": (frames, limbs, 4, 4),
-            "covariance": (frames, joints if self.covariance.size else 0, 3, 3),
-            "root_covariance": (frames, 6, 6),
-            "angle_sigma": (frames, len(self.angle_names) if self.angle_sigma.size else 0),
+                raise VoodooError(f"{name}: expected {frames} entries, found {len(words)}")
+        rows: dict[str, tuple[int, ...]] = {
+            "angles": (angles,),
+            "stamps": (),
+            "residual": (),
+            "joints": (joints, 3),
+            "world_from_limb": (len(self.limb_names), 4, 4),
+            "covariance": (joints if self.covariance.size else 0, 3, 3),
+            "root_covariance": (6, 6),
+            "angle_sigma": (angles if self.angle_sigma.size else 0,),
         }
-        for name, shape in expected.items():
+        for name, row in rows.items():
+            shape = frames, *row
+            if (name in _UNKNOWN and not getattr(self, name).size) or (name == "angles" and not angles):
+                object.__setattr__(self, name, np.full(shape, np.nan))
             array = getattr(self, name)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
                 found = array.dtype if isinstance(array, np.ndarray) else type(array).__name__
@@ -202,17 +188,19 @@ class Track:
         limb_names: tuple[str, ...] = posed[0].limb_names if posed else () if body is None else body.limb_names
         joints = np.full((len(estimates), len(joint_names), 3), np.nan)
         poses = np.full((len(estimates), len(limb_names), 4, 4), np.nan)
+        covariance = np.full((len(estimates), len(joint_names), 3, 3), np.nan)
         for index, estimate in enumerate(estimates):
             if str(estimate.status) != SEARCHING:
                 if estimate.joint_names != joint_names or estimate.limb_names != limb_names:
                     raise VoodooError(f"estimate {index}: expected the joints and limbs of the first one, found others")
                 joints[index], poses[index] = estimate.joint_positions, estimate.limb_poses
+            if len(estimate.joint_covariances) == len(joint_names):
+                covariance[index] = estimate.joint_covariances
         angle_names, angles = angles_of_estimates(estimates, body)
-        covariance, root_covariance = covariances_of(estimates, joint_names)
         support = [estimate.limb_status for estimate in estimates]
         return cls(
-            covariance=covariance,
-            root_covariance=root_covariance,
+            covariance=covariance if np.isfinite(covariance).any() else np.empty((len(estimates), 0, 3, 3)),
+            root_covariance=np.array([estimate.root_covariance for estimate in estimates]),
             angle_sigma=angle_sigmas_of(estimates, angle_names),
             angle_names=angle_names,
             angles=angles,

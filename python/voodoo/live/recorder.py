@@ -8,9 +8,11 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from voodoo.drawing.surfaces import entity
 from voodoo.errors import VoodooError
 from voodoo.export import ros2
 from voodoo.live.follow import Step
@@ -79,10 +81,10 @@ class Recorder(Output):
         if not isinstance(item, DepthImage | ColorImage | PointCloud | LaserScan):
             return
         topic, made = _WRITTEN[type(item)]
-        name = item.sensor.strip("/").replace("/", "_").replace(" ", "_") or "sensor"
+        name = entity(item.sensor)
         frame = f"{name}_frame"
         self._write("/tf", transforms(self._root(), frame, item.stamp, item.root_from_sensor))
-        header = _header(item.stamp, frame)
+        header = ros2.header_at(item.stamp, frame)
         if isinstance(item, DepthImage | ColorImage) and self._cameras.get(item.sensor) != item.camera:
             self._cameras[item.sensor] = item.camera
             self._write(f"/{name}/{topic.partition('/')[0]}/camera_info", camera_info(header, item.camera))
@@ -113,39 +115,32 @@ class Recorder(Output):
 def transforms(parent: str, child: str, stamp: float, parent_from_child: FloatArray) -> Any:  # noqa: ANN401
     """A tf2_msgs/TFMessage of one transform (4, 4)."""
     row = [*parent_from_child[:3, 3].tolist(), *quaternions(parent_from_child[:3, :3]).tolist()]
-    return ros2.transforms_message(round(stamp * 1e9), [(parent, child, row)])
+    return ros2.transforms_message(stamp, [(parent, child, row)])
 
 
 def camera_info(header: Any, camera: Camera) -> Any:  # noqa: ANN401
     """A sensor_msgs/CameraInfo."""
-    return ros2.new(
-        "sensor_msgs/msg/CameraInfo",
-        header=header,
-        height=camera.height,
-        width=camera.width,
-        distortion_model=camera.model,
-        d=np.array(camera.distortion, dtype=np.float64),
-        k=camera.matrix.ravel(),
-        r=np.eye(3).ravel(),
-        p=np.pad(camera.matrix, ((0, 0), (0, 1))).ravel(),
-    )
+    lens = {"distortion_model": camera.model, "d": np.array(camera.distortion, dtype=np.float64)}
+    about: dict[str, Any] = {"header": header, "height": camera.height, "width": camera.width, **lens}
+    matrices = {"k": camera.matrix, "r": np.eye(3), "p": np.pad(camera.matrix, ((0, 0), (0, 1)))}
+    flat = {name: matrix.ravel() for name, matrix in matrices.items()}
+    return ros2.new("sensor_msgs/msg/CameraInfo", **about, **flat)
 
 
 def _depth(header: Any, item: DepthImage) -> Any:  # noqa: ANN401
-    image = item.image
+    image: npt.NDArray[Any] = np.ascontiguousarray(item.image)
     if image.dtype.kind == "u" and item.meters_per_unit != 0.001:
         image = np.where(image > 0, image * np.float64(item.meters_per_unit), np.nan).astype(np.float32)
     elif image.dtype.kind == "f" and item.meters_per_unit != 1.0:
         image = (image * item.meters_per_unit).astype(np.float32)
-    return ros2.new(
-        "sensor_msgs/msg/Image",
-        header=header,
-        height=image.shape[0],
-        width=image.shape[1],
-        encoding="16UC1" if image.dtype.kind == "u" else "32FC1",
-        step=image.shape[1] * image.dtype.itemsize,
-        data=np.ascontiguousarray(image).view(np.uint8).ravel(),
-    )
+    encoding = "16UC1" if image.dtype.kind == "u" else "32FC1"
+    return _rows("sensor_msgs/msg/Image", header, image, encoding=encoding, step=image.shape[1] * image.itemsize)
+
+
+def _rows(kind: str, header: Any, rows: npt.NDArray[Any], **fields: Any) -> Any:  # noqa: ANN401
+    """A message of an array (H, W, ...): its size, its bytes, and other fields."""
+    size = {"height": rows.shape[0], "width": rows.shape[1]}
+    return ros2.new(kind, header=header, **size, data=rows.view(np.uint8).ravel(), **fields)
 
 
 def _color(header: Any, item: ColorImage) -> Any:  # noqa: ANN401
@@ -159,30 +154,14 @@ def _cloud(header: Any, item: PointCloud) -> Any:  # noqa: ANN401
         ros2.new("sensor_msgs/msg/PointField", name=name, offset=4 * index, datatype=7, count=1)
         for index, name in enumerate("xyz")
     ]
-    return ros2.new(
-        "sensor_msgs/msg/PointCloud2",
-        header=header,
-        height=1,
-        width=len(points),
-        fields=fields,
-        point_step=12,
-        row_step=12 * len(points),
-        data=points.view(np.uint8).ravel(),
-        is_dense=True,
-    )
+    about: dict[str, Any] = {"point_step": 12, "row_step": points.nbytes, "is_dense": True}
+    return _rows("sensor_msgs/msg/PointCloud2", header, points[None], fields=fields, **about)
 
 
 def _scan(header: Any, item: LaserScan) -> Any:  # noqa: ANN401
-    return ros2.new(
-        "sensor_msgs/msg/LaserScan",
-        header=header,
-        angle_min=item.angle_min,
-        angle_max=item.angle_min + item.angle_increment * (len(item.ranges) - 1),
-        angle_increment=item.angle_increment,
-        range_min=item.range_min,
-        range_max=item.range_max,
-        ranges=item.ranges.astype(np.float32),
-    )
+    fields = {name: getattr(item, name) for name in ("angle_min", "angle_increment", "range_min", "range_max")}
+    fields["angle_max"] = item.angle_min + item.angle_increment * (len(item.ranges) - 1)
+    return ros2.new("sensor_msgs/msg/LaserScan", header=header, ranges=item.ranges.astype(np.float32), **fields)
 
 
 _WRITTEN: dict[type, tuple[str, Callable[[Any, Any], Any]]] = {
@@ -191,7 +170,3 @@ _WRITTEN: dict[type, tuple[str, Callable[[Any, Any], Any]]] = {
     PointCloud: ("points", _cloud),
     LaserScan: ("scan", _scan),
 }
-
-
-def _header(stamp: float, frame: str) -> Any:  # noqa: ANN401
-    return ros2.header_at(round(stamp * 1e9), frame)

@@ -166,7 +166,6 @@ class Session:
         self._times: deque[float] = deque(maxlen=512)
         self._began = live.clock.now()
         self._first: float | None = None
-        self._end = self._began
         self._error: BaseException | None = None
         log = live.faults.log
         self._swift = _Lane([output for output in outputs if not output.waits], log, self._count)
@@ -227,7 +226,7 @@ class Session:
         self.with_pose += any(one.joints for one in step.estimates.values())
         self._times.append(now)
         self._first = now if self._first is None else self._first
-        self._end, self._last = now, step
+        self._last = step
 
     def reset(self) -> None:
         """Forget everybody before the next frame, and search again."""
@@ -305,7 +304,7 @@ class Session:
 
     def report(self) -> dict[str, Any]:
         """Summary of the session for a JSON file."""
-        span = self._end - self._first if self._first is not None else 0.0
+        span = self._times[-1] - self._first if self._first is not None else 0.0
         rate = (self.published - 1) / span if self.published > 1 and span > 0.0 else 0.0
         return {
             "rate_hz": rate,

@@ -96,11 +96,7 @@ def _number(picture: Picture, person: Person, view: View) -> None:
 
 
 def _draw_solid(
-    layer: Picture,
-    shape: TaperedEllipticCylinder,
-    root_from_limb: FloatArray,
-    view: View,
-    color: tuple[int, int, int],
+    layer: Picture, shape: TaperedEllipticCylinder, root_from_limb: FloatArray, view: View, color: Color
 ) -> None:
     """Fill the triangles of a limb that face the viewer; the brightness grows with the cosine of the angle to the view."""
     vertices, triangles, normals = limb_mesh(shape)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from contextlib import ExitStack
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 from voodoo.drawing.ink import Picture
 from voodoo.errors import VoodooError, utf8_name
+from voodoo.visualization.side_output import SideOutput
 from voodoo.whole import appearing_whole, check_disk
 
 NOT_IN_BROWSERS = "is MPEG-4, which browsers do not play: H.264 needs pip install 'voodoo-tracker[film]'"
@@ -89,7 +89,7 @@ _LEAST_FREE = 2**16
 _PICTURE = re.compile(r"frame_\d{6,}\.png")
 
 
-class PictureWriter:
+class PictureWriter(SideOutput):
     """Writes images of one size to DIR/frame_000000.png, ... or into an .mp4; use it in a `with` block.
 
     What cannot be written does not end the block: `failure` holds the first error, and nothing more is written. A film or
@@ -112,15 +112,14 @@ class PictureWriter:
         if path.suffix.lower() in (".avi", ".mkv", ".mov", ".webm", ".gif", ".png", ".jpg"):
             raise VoodooError(f"{path}: expected a folder or a name that ends in .mp4, found {path.suffix!r}")
         utf8_name(path)
+        super().__init__()
         self._path = path
         self._rate_hz = rate_hz
         self._is_film = path.suffix.lower() == ".mp4"
         self._film: Film | None = None
         self.note = f"{path} {NOT_IN_BROWSERS}" if self._is_film and codec_for_browsers() is None else ""
         self._count = 0
-        self._appearing = ExitStack()
         self._place = path
-        self.failure: Exception | None = None
         folder = path.parent if self._is_film else path
         if folder.exists() and not folder.is_dir():
             raise VoodooError(f"{folder}: expected a folder, found a file")
@@ -133,44 +132,24 @@ class PictureWriter:
 
     def write(self, picture: Picture) -> None:
         """Add an image."""
-        if self.failure is not None:
-            return
-        try:
-            if not self._count:
-                self._place = self._appearing.enter_context(appearing_whole(self._path))
-                if self._is_film:
-                    self._film = self._open(picture)
-                else:
-                    self._place.mkdir()
-            if self._film is not None:
-                self._film.write(picture)  # OpenCV does not tell that the disk is full
-                if shutil.disk_usage(self._place.parent).free < _LEAST_FREE:
-                    check_disk(self._place.parent)
+        self.attempt(self._write, picture)
+
+    def _write(self, picture: Picture) -> None:
+        if not self._count:
+            self._place = self._ends.enter_context(appearing_whole(self._path))
+            if self._is_film:
+                self._film = self._open(picture)
+                self._ends.push(lambda kind, *_: self._check() if kind is None else None)
+                self._ends.callback(self._film.release)
             else:
-                _encode(self._place / f"frame_{self._count:06d}.png", picture)
-            self._count += 1
-        except Exception as error:
-            self.failure = error
-
-    def __enter__(self) -> PictureWriter:
-        """Enter the context; files are opened with the first image."""
-        return self
-
-    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        """Close the video and, without an error, check that it can be read."""
+                self._place.mkdir()
         if self._film is not None:
-            try:
-                self._film.release()
-                if error is None and self.failure is None:
-                    self._check()
-            except Exception as failure:
-                self.failure = self.failure or failure
-        problem = error or self.failure
-        try:
-            self._appearing.__exit__(None if problem is None else type(problem), problem, None)
-        except Exception as failure:
-            if error is None:
-                self.failure = failure  # which names the film
+            self._film.write(picture)  # OpenCV does not tell that the disk is full
+            if shutil.disk_usage(self._place.parent).free < _LEAST_FREE:
+                check_disk(self._place.parent)
+        else:
+            _encode(self._place / f"frame_{self._count:06d}.png", picture)
+        self._count += 1
 
     def _open(self, picture: Picture) -> Film:
         try:
@@ -180,6 +159,7 @@ class PictureWriter:
             raise
 
     def _check(self) -> None:
+        """Check that the film can be read."""
         made = cv2.VideoCapture(str(self._place))
         try:
             count = int(made.get(cv2.CAP_PROP_FRAME_COUNT)) if made.isOpened() else 0

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from typing import Any
 
 from voodoo.children import NEUTRAL_FOLDER, children
 from voodoo.errors import VoodooError
@@ -44,14 +45,8 @@ class Server:
         command = [sys.executable, "-m", "rerun", "--serve-web", "--bind", host, "--port", str(page + 1)]
         command += ["--web-viewer-port", str(page), "--server-memory-limit", _MEMORY]
         with children(quiet=True):
-            self._process = subprocess.Popen(
-                command,
-                cwd=NEUTRAL_FOLDER,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
-            )
+            silent: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+            self._process = subprocess.Popen(command, cwd=NEUTRAL_FOLDER, start_new_session=True, **silent)
         self.data = f"rerun+http://{_reached(host)}:{page + 1}/proxy"
         self.address = f"http://{_reached(host)}:{page}/?url={self.data.replace(':', '%3A').replace('/', '%2F')}"
         until = time.monotonic() + _PATIENCE_S

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from contextlib import ExitStack, suppress
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -20,14 +19,15 @@ from voodoo.children import children
 from voodoo.drawing.ink import person_color
 from voodoo.drawing.surfaces import Log, bands, entity, limb_colors
 from voodoo.errors import VoodooError, installed
+from voodoo.export.skeleton import ellipsoids
 from voodoo.measurements import RecordedFrame
 from voodoo.model.body import Body
 from voodoo.model.projection import limb_mesh
-from voodoo.model.rotations import quaternions
 from voodoo.people import ONE, PeopleEstimate
 from voodoo.pipeline.front_end import FrontEnd, nobody
 from voodoo.sensors.adapters import Memory, adapters_of
 from voodoo.visualization.rerun_server import Server
+from voodoo.visualization.side_output import SideOutput
 from voodoo.whole import appearing_whole, check_disk
 
 _MOST_POINTS = 40_000
@@ -36,7 +36,7 @@ _CHUNK_BYTES = 8_000_000
 _VISIBLE_M = 0.002
 
 
-class Viewer:
+class Viewer(SideOutput):
     """Writes the data of each step to a Rerun file, or to a viewer on this machine; use it in a `with` block.
 
     Entities: `world/body/limbs/<limb>`, `world/body/joints`, `world/body/uncertainty` (one standard
@@ -62,6 +62,7 @@ class Viewer:
 
     def __init__(self, *, save: str | Path | None = None, name: str = "voodoo", serve: str | None = None) -> None:
         """Open the file or the viewer."""
+        super().__init__()
         self._rr = installed(
             "rerun", "the viewer needs Rerun, which is not installed: pip install 'voodoo-tracker[view]'"
         )
@@ -74,20 +75,19 @@ class Viewer:
             chunks.flush_tick, chunks.flush_num_bytes = timedelta(seconds=60.0), _CHUNK_BYTES
         self._stream: Any = self._rr.RecordingStream("voodoo", recording_id=None, batcher_config=chunks)
         self._stream.send_recording_name(name)
-        self._server: Server | None = None
-        self._ends = ExitStack()
+        self.address = ""
         self._place: Path | None = None
-        self.failure: Exception | None = None
         if serve is not None:
-            self._server = Server(serve)
-            self._ends.callback(self._server.close)
-            self._stream.connect_grpc(self._server.data)
+            server = Server(serve)
+            self.address = server.address
+            self._ends.callback(server.close)
+            self._stream.connect_grpc(server.data)
         elif save is None:
             self._open()
         else:
             self._place = self._ends.enter_context(appearing_whole(Path(save)))
             self._stream.save(str(self._place))
-        self._whole = save is None
+        self._ends.push(self._finish)
         self._classes: tuple[str, ...] = ()
         self._stream.log("world", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._shapes: dict[str, TaperedEllipticCylinder] = {}
@@ -106,22 +106,19 @@ class Viewer:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
             raise VoodooError(f"view: the viewer did not start ({reason}); --save FILE.rrd writes a file") from error
 
-    def __enter__(self) -> Viewer:
-        """Enter the context."""
-        return self
-
-    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
-        """Finish the file; after an error or failure, remove it."""
-        if error is None and self.failure is None:
-            try:
-                self.close()
-            except Exception as failure:
-                self.failure = failure
-            return
-        self._stream.disconnect()
-        with suppress(OSError, RuntimeError):
-            raised = error or RuntimeError()
-            self._ends.__exit__(type(raised), raised, raised.__traceback__)
+    def _finish(self, failed: type[BaseException] | None, *_: object) -> None:
+        """Flush buffered data, unless something failed."""
+        try:
+            if failed is None:
+                self._stream.flush()
+        except RuntimeError as error:
+            if self._place is not None:  # a window may be closed before the end
+                check_disk(self._place.parent)
+                raise VoodooError(f"{self._place.name}: {str(error).strip() or type(error).__name__}") from error
+        finally:
+            self._stream.disconnect()
+        if self._place is not None and failed is None:
+            check_disk(self._place.parent)  # Rerun does not tell that it could not write the end
 
     def close(self) -> None:
         """Flush buffered data, and complete the file.
@@ -129,22 +126,7 @@ class Viewer:
         Raises:
             VoodooError, OSError: it could not be written.
         """
-        with self._ends:
-            try:
-                self._stream.flush()
-            except RuntimeError as error:
-                if self._place is not None:  # a window may be closed before the end
-                    check_disk(self._place.parent)
-                    raise VoodooError(f"{self._place.name}: {str(error).strip() or type(error).__name__}") from error
-            finally:
-                self._stream.disconnect()
-            if self._place is not None:
-                check_disk(self._place.parent)  # Rerun does not tell that it could not write the end
-
-    @property
-    def address(self) -> str:
-        """See the class."""
-        return "" if self._server is None else self._server.address
+        self._ends.close()
 
     def log(
         self,
@@ -181,7 +163,7 @@ class Viewer:
                 self._log_rays(front_end, estimate)
             self._log_plots(estimate)
         memory = Memory() if front_end is None else front_end.memory
-        log = Log(self._rr, self._stream, posed, body, _MOST_POINTS, self._whole)
+        log = Log(self._rr, self._stream, posed, body, _MOST_POINTS, self._place is None)
         for item in () if recorded is None else recorded.measurements:
             for adapter in adapters_of(item):
                 adapter.log(item, log, memory)
@@ -237,10 +219,8 @@ class Viewer:
                 self._stream.log(place, mesh)
             pose = estimate.world_from_limb[limb.name]
             self._stream.log(place, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
-        self._stream.log(
-            f"{path}/joints",
-            rr.Points3D(estimate.joint_positions, radii=0.006, labels=list(estimate.joint_names), show_labels=False),
-        )
+        names, places = list(estimate.joint_names), estimate.joint_positions
+        self._stream.log(f"{path}/joints", rr.Points3D(places, radii=0.006, labels=names, show_labels=False))
         self._log_spread(f"{path}/uncertainty", estimate)
         self._stream.log(f"{path}/bands", rr.LineStrips3D(bands(estimate, body), radii=0.004, colors=(255, 40, 40)))
 
@@ -250,18 +230,10 @@ class Viewer:
         if not len(covariances):
             return
         known = np.isfinite(covariances).all(axis=(1, 2))
-        variances, axes = np.linalg.eigh(covariances[known])
-        axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
-        self._stream.log(
-            path,
-            self._rr.Ellipsoids3D(
-                centers=estimate.joint_positions[known],
-                half_sizes=np.sqrt(np.maximum(variances, 0.0)),
-                quaternions=quaternions(axes) if known.any() else None,
-                line_radii=0.001,
-                colors=(255, 255, 255),
-            ),
-        )
+        sizes, turns = ellipsoids(covariances[known])
+        how = {"half_sizes": sizes, "quaternions": turns if known.any() else None, "line_radii": 0.001}
+        centers = estimate.joint_positions[known]
+        self._stream.log(path, self._rr.Ellipsoids3D(centers=centers, colors=(255, 255, 255), **how))
 
     def _log_rays(self, front_end: FrontEnd[Any], estimate: Estimate) -> None:
         strips, colors, labels = [], [], []

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from voodoo.errors import VoodooError
-from voodoo.export.foxglove import Channels, FoxgloveRow, library, shapes_of
+from voodoo.export.foxglove import Channels, library, shapes_of
 from voodoo.export.ros2 import person_id
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown, upright_frame
+from voodoo.live.sinks.people import shown
 
 PORT = 8766
 """Foxglove's own default is that of `ws://`."""
@@ -51,19 +51,14 @@ class FoxgloveSink(Output):
         """See Output."""
         if not self._channels.are_wanted:
             return
-        people, rows = shown(step, self._root()), []
-        if people is not None and people.present:
+        people, persons, numbers = shown(step, self._root()), [], []
+        if people.present:
             names, parents, _, on_parents = people.frames
-            limbs = people.posed.body.limb_names
+            about = names, parents, people.posed.body.limb_names, people.joints.shape[1]
             shapes = shapes_of(people.bodies, people.limb_poses, people.joints)
-            rows = [
-                FoxgloveRow(
-                    person_id(people.numbers[index]),
-                    *(names, parents, limbs, people.joints.shape[1], on_parents[index], shapes[index]),
-                )
-                for index in people.present
-            ]
-        self._channels.log(step.stamp, rows, upright_frame(step, self._root()))
+            persons = [(person_id(people.numbers[index]), *about) for index in people.present]
+            numbers = [part for index in people.present for part in (on_parents[index], shapes[index])]
+        self._channels.log(step.stamp, persons, numbers, people.frame)
 
     def close(self) -> None:
         """See Output."""

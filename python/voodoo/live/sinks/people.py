@@ -21,8 +21,7 @@ from voodoo.model.body import Body
 @dataclass(frozen=True, eq=False)
 class Shown:
     """Persons P of a step who have a pose: frame with z up of everything, and how the root frame was turned to it;
-    numbers; estimates in the root frame; bodies; joints (P, J, 3) [m]; limb poses (P, L, 4, 4); and a skeleton that has persons
-    in the place of frames."""
+    numbers; estimates in the root frame; bodies; joints (P, J, 3) [m]; and limb poses (P, L, 4, 4)."""
 
     frame: str
     turn: Turn
@@ -31,7 +30,13 @@ class Shown:
     bodies: Sequence[Body]
     joints: FloatArray
     limb_poses: FloatArray
-    posed: Skeleton
+
+    @cached_property
+    def posed(self) -> Skeleton:
+        """Their skeletons; persons are in the place of frames."""
+        first = self.estimates[0]
+        stamps = np.full(len(self.numbers), first.stamp)
+        return skeleton_of(self.bodies, stamps, self.limb_poses, tuple(first.joint_names), self.joints)
 
     @cached_property
     def present(self) -> list[int]:
@@ -62,32 +67,21 @@ _lock = Lock()
 """Sinks ask for the same step at the same time."""
 
 
-def shown(step: Step, root_frame: str) -> Shown | None:
-    """The persons of a step who have a pose; None without any."""
+def shown(step: Step, root_frame: str) -> Shown:
+    """The persons of a step who have a pose."""
     with _lock:
         return _shown(step, root_frame)
 
 
 @lru_cache(maxsize=2)
-def _shown(step: Step, root_frame: str) -> Shown | None:
-    there = [(number, one, places) for number, one in step.estimates.items() if len(places := one.joint_positions)]
-    if not there:
-        return None
-    numbers, estimates, positions = zip(*there, strict=True)
-    joints, poses = np.array(positions), np.array([one.limb_poses for one in estimates])
-    turn, frame = _turn(step, root_frame), upright_frame(step, root_frame)
-    if turn.words:
+def _shown(step: Step, root_frame: str) -> Shown:
+    turn = by_axes(root_frame) if step.turn is None else step.turn
+    positions = {number: places for number, one in step.estimates.items() if len(places := one.joint_positions)}
+    there = {number: step.estimates[number] for number in positions}
+    joints = np.array(list(positions.values()))
+    poses = np.array([one.limb_poses for one in there.values()])
+    if there and turn.words:
         joints, poses = joints @ turn.pose[:3, :3].T + turn.pose[:3, 3], turn.pose @ poses
-    bodies = [step.bodies[number] for number in numbers]
-    stamps = np.array([step.stamp] * len(numbers))
-    posed = skeleton_of(bodies, stamps, poses, tuple(estimates[0].joint_names), joints)
-    return Shown(frame, turn, numbers, estimates, bodies, joints, poses, posed)
-
-
-def upright_frame(step: Step, root_frame: str) -> str:
-    """Name of the frame with z up: the root frame, unless that is a camera's."""
-    return f"{root_frame}{SUFFIX}" if _turn(step, root_frame).words else root_frame
-
-
-def _turn(step: Step, root_frame: str) -> Turn:
-    return by_axes(root_frame) if step.turn is None else step.turn
+    bodies = [step.bodies[number] for number in there]
+    frame = f"{root_frame}{SUFFIX}" if turn.words else root_frame
+    return Shown(frame, turn, tuple(there), tuple(there.values()), bodies, joints, poses)

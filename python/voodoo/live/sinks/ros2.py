@@ -13,34 +13,13 @@ import numpy as np
 
 import voodoo._core as _core
 from voodoo.errors import VoodooError
+from voodoo.export import ros2
 from voodoo.export.human_frames import placed_names
-from voodoo.export.ros2 import (
-    BODIES,
-    BOOL,
-    IDS,
-    JOINTS,
-    POSE,
-    SKELETON,
-    STORE,
-    STRING,
-    TF,
-    TRACKED,
-    cdr,
-    description,
-    instant,
-    joint_message,
-    keypoints_message,
-    person_id,
-    pose_message,
-    root_on_parent,
-    tracked,
-    transforms_message,
-)
 from voodoo.export.template import STAMP_NS, template
 from voodoo.live.follow import Step
 from voodoo.live.ros2.dds import Node, Offer, Publication
 from voodoo.live.session import Output
-from voodoo.live.sinks.people import shown, upright_frame
+from voodoo.live.sinks.people import shown
 from voodoo.measurements import ColorImage, DepthImage, FloatArray
 from voodoo.model.body import Body
 from voodoo.pipeline.front_end import nobody
@@ -48,7 +27,7 @@ from voodoo.pipeline.front_end import nobody
 ADDRESS = "ros2://"
 RESET, FOLLOW = "/voodoo/reset", "/voodoo/follow"
 _PLACE = "geometry_msgs/msg/PointStamped"
-_ON_DEMAND = {"markers": "visualization_msgs/msg/MarkerArray", "skeleton2d": SKELETON}
+_ON_DEMAND = {"markers": "visualization_msgs/msg/MarkerArray", "skeleton2d": ros2.SKELETON}
 _LOOK_S = 0.5
 """How often sizes, subscribers of markers, and what is asked for are looked at."""
 _OTHER_SIZE = 0.01
@@ -100,29 +79,30 @@ class Ros2Sink(Output):
         self._template_of = lru_cache(8)(self._make_template)
         self._resets = self._node.subscribe(RESET, Offer("std_msgs/msg/Empty", reliable=False, latched=False))
         self._follows = self._node.subscribe(FOLLOW, Offer(_PLACE, reliable=False, latched=False))
-        self._publish_on("/tf", TF, 100)
-        for topic in TRACKED:
-            self._publish_on(topic, IDS, 1)
-        for name, kind in (("joint_states", JOINTS), ("pose", POSE), *_ON_DEMAND.items()):
+        self._publish_on("/tf", ros2.TF, 100)
+        for topic in ros2.TRACKED:
+            self._publish_on(topic, ros2.IDS, 1)
+        for name, kind in (("joint_states", ros2.JOINTS), ("pose", ros2.POSE), *_ON_DEMAND.items()):
             # Subscribers can discover these topics before the first pose.
-            self._publish_on(f"{BODIES}/{person_id(1)}/{name}", kind)
+            self._publish_on(f"{ros2.BODIES}/{ros2.person_id(1)}/{name}", kind)
 
     def publish(self, step: Step) -> None:
         """See Output."""
         root = self._root()
-        people, frame = shown(step, root), upright_frame(step, root)
+        people = shown(step, root)
+        frame = people.frame
         observed: dict[int, Body] = {}
         about: tuple[Any, ...] = (), (), (), ()
         numbers: list[FloatArray] = []
-        if people is not None and (there := people.present):
+        if there := people.present:
             observed = {people.numbers[index]: people.bodies[index] for index in there}
             (joints, angles), (names, parents, _, rows), sigmas = people.angles, people.frames, people.covariances
             sure = [index for index in there if math.isfinite(sigmas[index, 0, 0])]
-            about = tuple(person_id(people.numbers[index]) for index in sure), names, parents, joints
-            numbers = [np.array(root_on_parent(people.turn.pose))] if frame != root else []
+            about = tuple(ros2.person_id(people.numbers[index]) for index in sure), names, parents, joints
+            numbers = [np.array(ros2.root_on_parent(people.turn.pose))] if frame != root else []
             numbers += [rows[index] for index in there] + [angles[index] for index in there]
             numbers += [part for index in sure for part in (rows[index, 0], sigmas[index])]
-        publications, made = self._template_of(tuple(map(person_id, observed)), root, frame, *about)
+        publications, made = self._template_of(tuple(map(ros2.person_id, observed)), root, frame, *about)
         # Together: what follows takes longer, and the network wakes once.
         messages = made.filled(numbers, _stamp(round(step.stamp * 1e9)))
         for publication, message in zip(publications, messages, strict=True):
@@ -137,11 +117,11 @@ class Ros2Sink(Output):
         for number in displayed:
             if self._wanted[number]["markers"]:
                 estimate = step.estimates[number] if number in observed else nobody(step.stamp)
-                how: Any = {"root_frame": root, "person": person_id(number), "turn": step.turn}
+                how: Any = {"root_frame": root, "person": ros2.person_id(number), "turn": step.turn}
                 topic = _topic(number, "markers")
-                self._write({topic: instant(estimate, displayed[number], **how)[topic]})
+                self._write({topic: ros2.instant(estimate, displayed[number], **how)[topic]})
             if self._wanted[number]["skeleton2d"] and number in observed and image is not None:
-                self._write({_topic(number, "skeleton2d"): keypoints_message(step.estimates[number], image)})
+                self._write({_topic(number, "skeleton2d"): ros2.keypoints_message(step.estimates[number], image)})
         self._displayed = observed
 
     def _subscribers(self, number: int) -> dict[str, int]:
@@ -151,7 +131,7 @@ class Ros2Sink(Output):
         if self._resets.take() and self.on_reset is not None:
             self.on_reset()
         for raw in self._follows.take():
-            chosen: Any = STORE.deserialize_cdr(raw, _PLACE)
+            chosen: Any = ros2.STORE.deserialize_cdr(raw, _PLACE)
             if self.on_choice is not None:
                 self.on_choice(chosen.header.frame_id, np.array([chosen.point.x, chosen.point.y, chosen.point.z]))
 
@@ -159,7 +139,7 @@ class Ros2Sink(Output):
         for number, body in observed.items():
             size = float(body.core.sizes()[:, 0].sum())
             if abs(self._described.get(number, 0.0) - size) > _OTHER_SIZE * size:
-                self._write(description(body, person_id(number)))
+                self._write(ros2.description(body, ros2.person_id(number)))
                 self._described[number] = size
 
     def _make_template(
@@ -173,37 +153,39 @@ class Ros2Sink(Output):
         joints: tuple[str, ...],
     ) -> tuple[list[Publication], _core.Template]:
         """Topics, and the messages on them, of persons of whom some have a covariance."""
-        topics = [("/tf", TF)] * bool(ids) + [(f"{BODIES}/{person}/joint_states", JOINTS) for person in ids]
-        topics += [*((f"{BODIES}/{person}/pose", POSE) for person in sure), *((topic, IDS) for topic in TRACKED)]
+        topics = [("/tf", ros2.TF)] * bool(ids)
+        topics += [(f"{ros2.BODIES}/{person}/joint_states", ros2.JOINTS) for person in ids]
+        topics += [(f"{ros2.BODIES}/{person}/pose", ros2.POSE) for person in sure]
+        topics += [(topic, ros2.IDS) for topic in ros2.TRACKED]
         placed = [(root, frame)] * (frame != root) if ids else []
         placed += [pair for person in ids for pair in placed_names(names, parents, person, frame)]
 
         def encode(numbers: list[float]) -> list[bytes]:
-            left = iter(numbers)
+            left, at = iter(numbers), STAMP_NS / 1e9
             rows = [(*pair, list(islice(left, 7))) for pair in placed]
-            messages = [transforms_message(STAMP_NS, rows)] if ids else []
+            messages = [ros2.transforms_message(at, rows)] if ids else []
             for person in ids:
-                messages.append(joint_message(STAMP_NS, person, joints, list(islice(left, len(joints)))))
-            messages += [pose_message(STAMP_NS, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
-            return [cdr(one) for one in (*messages, *tracked(STAMP_NS / 1e9, ids, root_frame=root).values())]
+                messages.append(ros2.joint_message(at, person, joints, list(islice(left, len(joints)))))
+            messages += [ros2.pose_message(at, frame, list(islice(left, 7)), list(islice(left, 36))) for _ in sure]
+            return [ros2.cdr(one) for one in (*messages, *ros2.tracked(at, ids, root_frame=root).values())]
 
         count = 7 * len(placed) + len(ids) * len(joints) + 43 * len(sure)
         return [self._publish_on(*one) for one in topics], template(encode, count, stamp=_stamp(STAMP_NS))
 
     def _publish_on(self, topic: str, kind: str, depth: int = 10) -> Publication:
         if topic not in self._topics:
-            STORE.get_msgdef(kind)
-            latched = kind in (STRING, BOOL)
+            ros2.STORE.get_msgdef(kind)
+            latched = kind in (ros2.STRING, ros2.BOOL)
             self._topics[topic] = self._node.advertise(topic, kind, depth=1 if latched else depth, latched=latched)
         return self._topics[topic]
 
     def _write(self, messages: Mapping[str, Any]) -> None:
         for topic, message in messages.items():
-            self._publish_on(topic, message.__msgtype__).write(cdr(message))
+            self._publish_on(topic, message.__msgtype__).write(ros2.cdr(message))
 
 
 def _topic(number: int, name: str) -> str:
-    return f"{BODIES}/{person_id(number)}/{name}"
+    return f"{ros2.BODIES}/{ros2.person_id(number)}/{name}"
 
 
 def _stamp(nanoseconds: int) -> bytes:

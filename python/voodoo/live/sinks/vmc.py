@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 import voodoo._core as _core
-from voodoo.errors import VoodooError, installed
+from voodoo.errors import VoodooError, installed, reading
 from voodoo.export.conventions import NAMES, names_of
 from voodoo.export.skeleton import FloatArray, Skeleton
 from voodoo.export.template import template
@@ -54,17 +54,15 @@ class VmcSink(Output):
         """Find the host."""
         missing = f"{address}: expected python-osc, found none; pip install 'voodoo-tracker[stream]'"
         self._bundle_of = installed("pythonosc.osc_bundle_builder", missing).OscBundleBuilder
-        self._message_of = installed("pythonosc.osc_message_builder", missing).OscMessageBuilder
+        self._message_of = installed("pythonosc.osc_message_builder", missing).build_msg
         self.name, self.receiver, self.waits = address, True, False
         self._root = root_frame
         host, port, _ = parts_of(address, host=None, port=PORT)
-        try:
+        with reading(address, "the name or address of a host", error=VoodooError):
             family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind, protocol)
             self._socket.setblocking(False)
             self._socket.connect(place)
-        except OSError as error:
-            raise VoodooError(f"{address}: expected the name or address of a host, found: {error.strerror}") from error
         self._start: float | None = None
         self._template_of = lru_cache(2)(self._make_template)
 
@@ -78,7 +76,7 @@ class VmcSink(Output):
         self._start = step.stamp if self._start is None else self._start
         people, numbers = shown(step, self._root()), np.empty(0)
         names: tuple[str, ...] = ()
-        if people is not None and people.present:
+        if people.present:
             first = min(people.present, key=people.numbers.__getitem__)
             names, numbers = bones_of(people.posed, first, self.name)
         for datagram in self._template_of(names).filled([np.array([step.stamp - self._start]), numbers], b""):
@@ -98,10 +96,7 @@ class VmcSink(Output):
     def _bundle(self, messages: list[tuple[str | float, ...]]) -> bytes:
         bundle = self._bundle_of(0)
         for path, *values in messages:
-            message = self._message_of(f"/VMC/Ext{path}")
-            for value in values:
-                message.add_arg(value)
-            bundle.add_content(message.build())
+            bundle.add_content(self._message_of(f"/VMC/Ext{path}", values))
         return bytes(bundle.build().dgram)
 
     def close(self) -> None:

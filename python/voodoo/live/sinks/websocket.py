@@ -24,7 +24,7 @@ from voodoo.errors import VoodooError, installed
 from voodoo.live.follow import Step
 from voodoo.live.session import Output
 from voodoo.live.sinks import parts_of
-from voodoo.live.sinks.people import shown, upright_frame
+from voodoo.live.sinks.people import shown
 from voodoo.model.rotations import quaternions
 
 FORMAT, VERSION = "voodoo.people", 1
@@ -158,8 +158,8 @@ class WebSocketSink(Output):
 def message_of(step: Step, root_frame: str) -> str:
     """The message of a step as JSON, see docs/how-to/stream.md."""
     people = shown(step, root_frame)
-    if people is None:
-        return _core.with_values(_format(upright_frame(step, root_frame), (), (), ()), [], [repr(step.stamp)])
+    if not people.numbers:
+        return _core.with_values(_format(people.frame, (), (), ()), [], [repr(step.stamp)])
     limbs, count = people.posed.body.limb_tree, len(people.numbers)
     joint_names = tuple(people.estimates[0].joint_names)
     # Whole numbers of 10 um and of 1e-6 are written several times as fast as others.

@@ -75,7 +75,7 @@ class GrowingSource(Source):
 
     def _list_arrivals(self) -> list[Arrival]:
         now = self._clock.now()
-        for kind in ("rgb", "depth"):
+        for kind in ("rgb", "depth") if self._calibration.color is not None else ("depth",):
             new = sorted(name for name in self._listed(kind) if name not in self._names[kind])
             self._names[kind].update(new)
             self._waiting += [(kind, self._path / kind / name, now) for name in new]
@@ -86,8 +86,6 @@ class GrowingSource(Source):
     def _arrival(self, kind: str, path: Path, since: float, now: float) -> list[Arrival] | None:
         """The arrival of a file; none if it is unusable, None while it may still be being written."""
         color = self._calibration.color
-        if kind == "rgb" and color is None:
-            return []
         try:
             stamp = NameClock(None).of([path])[0]
             if kind == "rgb" and color is not None:

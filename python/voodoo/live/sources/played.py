@@ -36,8 +36,6 @@ class PlayedSource(Source):
         self.name, self.recording, self.root_frame = recording.name, recording, recording.root_frame
         self._rate, self._loop = rate, loop
         self._left_out = LeftOut() if left_out is None else left_out
-        self._next: RecordedFrame | None = None
-        self._shift = 0.0
         self._about = recording.info()
         self._driver = self._about.sensors[0].name if self._about.sensors else ""
 
