@@ -89,14 +89,13 @@ def numbers(what: str, values: npt.ArrayLike) -> FloatArray:
     return numbers_of(what, values, MeasurementError)
 
 
-def three(what: str, values: Vector) -> tuple[float, float, float]:
-    """Three numbers.
+def three(what: str, values: Vector) -> FloatArray:
+    """Three finite numbers.
 
     Raises:
         MeasurementError: it names `what`.
     """
-    x, y, z = numbers_of(what, values, MeasurementError, "three numbers", count=3).tolist()
-    return x, y, z
+    return numbers_of(what, values, MeasurementError, "three finite numbers", count=3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,7 +217,7 @@ class Target:
         Raises:
             MeasurementError: not three finite numbers, or a weight that is not above zero.
         """
-        x, y, z = three(f"target {site}: position", position)
+        x, y, z = three(f"target {site}: position", position).tolist()
         return cls(site, "position", (x, y, z, 0.0, 0.0, 0.0), weight, priority)
 
     @classmethod
@@ -228,12 +227,11 @@ class Target:
         Raises:
             MeasurementError: not three finite numbers, no direction, or a weight that is not above zero.
         """
-        o = np.array(three(f"target {site}: origin", origin))
-        n = np.array(three(f"target {site}: direction", direction))
+        o, n = three(f"target {site}: origin", origin), three(f"target {site}: direction", direction)
         length = float(np.linalg.norm(n))
         if not 1e-12 < length < math.inf:
             raise MeasurementError(f"target {site}: direction: expected a vector other than zero, found {direction!r}")
-        n /= length
+        n = n / length
         a, b, c, d, e, f = (float(value) for value in np.concatenate([n, np.cross(o, n)]))
         return cls(site, "line", (a, b, c, d, e, f), weight, priority)
 

@@ -13,7 +13,7 @@ from voodoo.errors import MeasurementError
 from voodoo.measurements import ByteImage, DepthImage, FloatArray
 from voodoo.model.projection import CameraView
 from voodoo.sensors.depth import depth_points
-from voodoo.sensors.silhouettes.masks import Mask, filled, known_place, without_specks
+from voodoo.sensors.silhouettes.masks import Mask, filled, known_places, without_specks
 
 _STEP = 0.03
 """Two neighbors whose depths differ by more than this fraction lie on different objects."""
@@ -80,7 +80,7 @@ def from_depth(
         MeasurementError: a position is not three finite numbers, or the scene has another size.
     """
     height, width = depth.image.shape
-    places = {site: known_place(site, position) for site, position in known.items()}
+    places = known_places(known)
     points, valid = depth_points(depth)
     solid = valid.copy()
     solid[valid] = points[:, 2] > _FLOOR_M if level else True
