@@ -21,6 +21,7 @@ from voodoo.sensors.skin.settings import SkinSettings
 
 Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two opposite corners [m], the lower one first."""
+Corner: TypeAlias = tuple[float, float, float] | FloatArray
 LEVEL_FRAMES = ("base_link", "base_footprint", "odom", "map")
 """Root frames whose z = 0 is the floor (REP-105)."""
 WHOLE_BODY = ("depth", "points", "keypoints", "markers")
@@ -130,9 +131,10 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
     return tuple(kind for kind in inputs() if kind != "skin")
 
 
-def within_boxes(places: FloatArray, boxes: Sequence[Box]) -> npt.NDArray[np.bool_]:
+def within_boxes(places: FloatArray, boxes: Sequence[tuple[Corner, Corner]]) -> npt.NDArray[np.bool_]:
     """Which positions (N, 3) [m] lie in one of the boxes."""
     inside = np.zeros(len(places), dtype=bool)
     for low, high in boxes:
-        inside |= ((places >= low) & (places <= high)).all(axis=1)
+        x, y, z = ((places[:, axis] >= low[axis]) & (places[:, axis] <= high[axis]) for axis in range(3))
+        inside |= x & y & z
     return inside

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from voodoo.measurements import FloatArray
 from voodoo.model.body import Body
+from voodoo.recordings.keypoint_layouts import of_both_sides
 from voodoo.sensors.settings import FrontEndSettings
 
 TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
@@ -20,20 +21,15 @@ TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
 BONES_M: dict[tuple[str, str], tuple[float, float]] = {
     ("l_shoulder", "r_shoulder"): (0.12, 0.60),
     ("l_hip", "r_hip"): (0.06, 0.45),
-    **{
-        (f"{s}_{a}", f"{s}_{b}"): limits
-        for s in "lr"
-        for a, b, limits in (
-            ("shoulder", "hip", (0.22, 0.85)),
-            ("shoulder", "elbow", (0.12, 0.50)),
-            ("elbow", "wrist", (0.10, 0.45)),
-            ("hip", "knee", (0.18, 0.70)),
-            ("knee", "ankle", (0.18, 0.65)),
-            ("wrist", "hand", (0.01, 0.25)),
-            ("ankle", "toe", (0.04, 0.35)),
-        )
-    },
-}
+} | of_both_sides({
+    ("shoulder", "hip"): (0.22, 0.85),
+    ("shoulder", "elbow"): (0.12, 0.50),
+    ("elbow", "wrist"): (0.10, 0.45),
+    ("hip", "knee"): (0.18, 0.70),
+    ("knee", "ankle"): (0.18, 0.65),
+    ("wrist", "hand"): (0.01, 0.25),
+    ("ankle", "toe"): (0.04, 0.35),
+})  # fmt: skip
 """Smallest and largest distance [m] of two sites, from a child of 1 m to a man of 2.1 m, with 5 cm of error at either end;
 parents first."""
 _ON_A_LINE_M = 0.04
@@ -145,19 +141,15 @@ _SHORTER, _LONGER = 0.6, 1.6
 _OF_STATURE: dict[tuple[str, str], float] = {
     ("l_shoulder", "r_shoulder"): 0.224,
     ("l_hip", "r_hip"): 0.104,
-    **{
-        (f"{s}_{a}", f"{s}_{b}"): fraction
-        for s in "lr"
-        for a, b, fraction in (
-            ("shoulder", "hip", 0.294),
-            ("shoulder", "elbow", 0.186),
-            ("elbow", "wrist", 0.146),
-            ("hip", "knee", 0.245),
-            ("knee", "ankle", 0.246),
-        )
-    },
+} | of_both_sides({
+    ("shoulder", "hip"): 0.294,
+    ("shoulder", "elbow"): 0.186,
+    ("elbow", "wrist"): 0.146,
+    ("hip", "knee"): 0.245,
+    ("knee", "ankle"): 0.246,
+}) | {
     ("l_shoulder", "skullbase"): 0.146,
     ("l_shoulder", "head_center"): 0.164,
     ("l_shoulder", "skull_tip"): 0.211,
-}
+}  # fmt: skip
 """Distances of sites of the default human, as fractions of the stature; parents first."""
