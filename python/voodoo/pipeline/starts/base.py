@@ -11,9 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from voodoo.measurements import FloatArray
+from voodoo.measurements import FloatArray, KeypointImage
 from voodoo.model.body import Body
 from voodoo.recordings.keypoint_layouts import of_both_sides
+from voodoo.sensors.keypoints.sites import SitePixel, site_pixels
 from voodoo.sensors.settings import FrontEndSettings
 
 TRUNK = ("l_shoulder", "r_shoulder", "l_hip", "r_hip", "vc7", "humanoid_root")
@@ -32,6 +33,10 @@ BONES_M: dict[tuple[str, str], tuple[float, float]] = {
 })  # fmt: skip
 """Smallest and largest distance [m] of two sites, from a child of 1 m to a man of 2.1 m, with 5 cm of error at either end;
 parents first."""
+TOGETHER_S = 0.05
+"""Images within this time belong to one instant: a walking person's wrist moves 10 cm in it."""
+LEAST_SITES = 6
+"""Sites that are needed for a first pose from keypoints."""
 _ON_A_LINE_M = 0.04
 
 
@@ -50,6 +55,13 @@ class StartFrame:
     measurements: Sequence[Any]
     body: Body
     settings: FrontEndSettings
+
+
+def seen_sites(item: KeypointImage, rows: FloatArray, frame: StartFrame) -> list[SitePixel]:
+    """The sites of the body at the keypoints (K, 3) of one person; [] if they are too few for a first pose."""
+    sites, _ = site_pixels(rows, layout=item.layout, min_confidence=frame.settings.min_confidence)
+    sites = [site for site in sites if site.site in frame.body.site_names]
+    return sites if len(sites) >= LEAST_SITES else []
 
 
 @dataclass(frozen=True, eq=False)
