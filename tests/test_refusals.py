@@ -76,7 +76,7 @@ def skin(image, camera=CAMERA):
         (
             lambda: sensor(camera=None),
             MeasurementError,
-            "camera: expected a Camera, the calibration of the image, found",
+            "camera: expected a voodoo.Camera, found",
         ),
         *(
             (
@@ -117,7 +117,7 @@ def skin(image, camera=CAMERA):
             "gate: expected 0 < radius <= widest and growth >= 0, found radius",
         ),
         (lambda: skin([[1]]), MeasurementError, "image: expected an array (H, W, 3) of uint8, found list"),
-        (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a Camera"),
+        (lambda: skin(np.zeros((24, 32, 3), np.uint8), None), MeasurementError, "camera: expected a voodoo.Camera"),
         (lambda: DepthFilter().apply([[1, 2]]), MeasurementError, "depth: expected an array (H, W), found list"),
         (
             lambda: DepthFilter().apply(np.zeros((2, 2), np.uint16), meters_per_unit=NAN),

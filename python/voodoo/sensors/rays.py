@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
 from voodoo._core import Frame
 from voodoo._core import SiteRay as SiteRay
@@ -35,11 +34,6 @@ class TriangulatedSite:
     position: FloatArray
     sigma: float
     trust: FloatArray
-
-    @property
-    def visible_in(self) -> npt.NDArray[np.bool_]:
-        """Which rays (N,) support it."""
-        return np.asarray(self.trust >= TRUSTED)
 
 
 def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> TriangulatedSite | None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Frame
-from voodoo.errors import MeasurementError
+from voodoo.errors import MeasurementError, of_kind
 from voodoo.measurements import DepthArray, FloatArray, KeypointImage
 from voodoo.model.camera import Camera
 from voodoo.model.joint import numbers_of
@@ -21,7 +21,7 @@ from voodoo.model.transforms import rigid
 from voodoo.recordings.keypoint_layouts import layout_of
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import PixelNoise, SensorModel
-from voodoo.sensors.pixels import checked_camera, ray_distance, world_rays
+from voodoo.sensors.pixels import ray_distance, world_rays
 from voodoo.sensors.rays import SiteRay, add_rays
 
 EDGE_M = 0.10
@@ -252,7 +252,7 @@ class KeypointSensor:
         if self.sites and (unknown := sorted(set(self.sites) - {part.site for part in parts})):
             known = [part.site for part in parts]
             raise MeasurementError(f"sites: expected some of {', '.join(known)}, found {', '.join(unknown)}")
-        checked_camera(self.camera)
+        of_kind("camera", self.camera, Camera, MeasurementError)
         rigid(self.world_from_sensor)
         check_confidence(self.min_confidence)
 

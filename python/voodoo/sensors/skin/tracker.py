@@ -10,12 +10,11 @@ import numpy.typing as npt
 
 import voodoo._core as _core
 from voodoo._core import Estimate
-from voodoo.errors import MeasurementError
+from voodoo.errors import MeasurementError, of_kind
 from voodoo.measurements import ByteImage, DepthImage, FloatArray
 from voodoo.model.camera import Camera
 from voodoo.model.transforms import rigid
 from voodoo.people import Followed
-from voodoo.sensors.pixels import checked_camera
 from voodoo.sensors.rays import SiteRay
 from voodoo.sensors.skin.settings import SkinSettings
 from voodoo.tracker import Tracker
@@ -158,7 +157,7 @@ class SkinTracker:
 
 
 def _check_image(image: ByteImage, camera: Camera) -> None:
-    checked_camera(camera)
+    of_kind("camera", camera, Camera, MeasurementError)
     if not isinstance(image, np.ndarray):
         raise MeasurementError(f"image: expected an array (H, W, 3) of uint8, found {type(image).__name__}")
     if image.shape != (camera.height, camera.width, 3) or image.dtype != np.uint8:
