@@ -14,7 +14,7 @@ from voodoo.export.track import Track
 from voodoo.model.joint import expectation
 from voodoo.pipeline.inputs import join
 from voodoo.pipeline.start import Init, start_tracker
-from voodoo.recordings import open_recording, sample_path
+from voodoo.recordings import ColorImage, open_recording, sample_path
 from voodoo.recordings.marker_files import MarkerMap
 from voodoo.recordings.marker_trajectories import read_trc
 from voodoo.recordings.pose2sim import Pose2SimRecording
@@ -39,7 +39,7 @@ def sensor(**changes):
 
 
 def skin(image, camera=CAMERA):
-    SkinTracker().observe(image, camera, HERE, {})
+    SkinTracker().observe(ColorImage("rgb", 0.0, lambda: image, camera, HERE), {})
 
 
 @pytest.mark.parametrize(
