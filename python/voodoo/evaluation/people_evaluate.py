@@ -22,7 +22,7 @@ from voodoo.evaluation.people import (
     together,
 )
 from voodoo.evaluation.score import RATIO, written
-from voodoo.evaluation.summary import write_table
+from voodoo.evaluation.summary import table_head, table_row, table_text
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
 from voodoo.model.body import Body
@@ -143,8 +143,7 @@ def people_markdown(scores: Sequence[PeopleScore]) -> str:
     """A table with a row per recording, and one for all together."""
     lines = [
         "## Several people, against exact truth\n",
-        _row([name for name, _ in _COLUMNS]),
-        "|" + "---|" * len(_COLUMNS),
+        *table_head(name for name, _ in _COLUMNS),
     ]
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
@@ -168,19 +167,15 @@ def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     table, text = folder / "people.csv", folder / "people.md"
     names = [*(item.name for item in fields(PeopleScore)), *DERIVED]
-    write_table(table, names, ([getattr(score, name) for name in names] for score in scores))
+    write_whole(table, table_text(names, ([getattr(score, name) for name in names] for score in scores)))
     write_whole(text, people_markdown(scores))
     return [table, text]
 
 
 def _line(score: PeopleScore) -> str:
     if score.failure:
-        return _row((score.name, score.failure.replace("|", "/"), *[""] * (len(_COLUMNS) - 2)))
-    return _row([cell(score) for _, cell in _COLUMNS])
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
+        return table_row((score.name, score.failure.replace("|", "/"), *[""] * (len(_COLUMNS) - 2)))
+    return table_row(cell(score) for _, cell in _COLUMNS)
 
 
 def _first_pose(score: PeopleScore) -> str:

@@ -20,6 +20,8 @@ from voodoo.evaluation.summary import (
     KINDS,
     Summary,
     summarize,
+    table_head,
+    table_row,
     write_frames,
     write_sequences,
     write_summary,
@@ -65,9 +67,8 @@ def markdown(scores: Sequence[Score], tables: Sequence[FrameTable | None] = ()) 
             written(score.within_10cm, (100.0, ".0f", " %")), written(score.depth_within_5cm, PERCENT),
             written(score.silhouette_iou, RATIO), ", ".join(score.lost_joints) or "none",
         ]  # fmt: skip
-        text.append("| " + " | ".join(cells) + " |")
-    text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
-    return "\n".join(text) + "\n"
+        text.append(table_row(cells))
+    return "\n".join([*text, *_failures(scores)]) + "\n"
 
 
 _BRIEF = (
@@ -100,8 +101,11 @@ def brief(scores: Sequence[Score]) -> str:
         if summary.sequences:
             text += _head(summary)
             text += _rows(summary, _BRIEF)
-    text += [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
-    return "\n".join(text)
+    return "\n".join([*text, *_failures(scores)])
+
+
+def _failures(scores: Sequence[Score]) -> list[str]:
+    return [f"\n{score.name}: {' '.join(score.failure.split())}" for score in scores if score.failure]
 
 
 def deviations_of(scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> dict[str, list[Deviations]]:
@@ -145,12 +149,10 @@ def write_reports(
 
 def _joint_table(scores: Sequence[Score]) -> list[str]:
     names = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
-    lines = ["| mean error, cm | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
+    lines = table_head(("mean error, cm", *names))
     for side, word in (("l", "left"), ("r", "right")):
-        means = [
-            metrics.mean_or_nan(np.array([score.joint_error_m[f"{side}_{name}"] for score in scores])) for name in names
-        ]
-        lines.append(f"| {word} | " + " | ".join(written(mean, (100.0, ".1f", "")) for mean in means) + " |")
+        errors = (np.array([score.joint_error_m[f"{side}_{name}"] for score in scores]) for name in names)
+        lines.append(table_row((word, *(written(metrics.mean_or_nan(each), (100.0, ".1f", "")) for each in errors))))
     return [*lines, ""]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from voodoo.evaluation import metrics
 from voodoo.evaluation.score import PERCENT, Form, FrameTable, Score
-from voodoo.whole import appearing_whole
+from voodoo.whole import write_whole
 
 CLASSES = (0, 1, 2)
 KINDS = {True: "exact truth", False: "reference skeleton", None: "no reference"}
@@ -96,10 +96,15 @@ def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     return text.getvalue()
 
 
-def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write `table_text`, which appears when it is complete."""
-    with appearing_whole(path) as part:
-        part.write_text(table_text(header, rows), encoding="utf-8")
+def table_row(cells: Iterable[str]) -> str:
+    """A row of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
+def table_head(names: Iterable[str]) -> list[str]:
+    """The first two rows of a table in Markdown."""
+    row = table_row(names)
+    return [row, "|" + "---|" * (row.count("|") - 1)]
 
 
 def cell(value: object) -> str:
@@ -119,7 +124,7 @@ def write_sequences(path: Path, scores: Sequence[Score]) -> None:
         + [score.selection, " ".join(score.lost_joints), score.path]
         for score in scores
     )
-    write_table(path, header, rows)
+    write_whole(path, table_text(header, rows))
 
 
 def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
@@ -136,25 +141,17 @@ def write_summary(path: Path, summaries: Sequence[Summary]) -> None:
         ]
         for one in summaries
     )
-    write_table(path, [*own, *ALL_ROWS], rows)
+    write_whole(path, table_text([*own, *ALL_ROWS], rows))
 
 
 def write_frames(path: Path, table: FrameTable) -> None:
     """A row for each frame of a recording."""
     header = ["stamp_s", "status", "mean_error_m", *(f"{name}_error_m" for name in metrics.JOINTS)]
-    header += ["lost_joints", "depth_within_5cm", "silhouette_iou", "step_s"]
+    numbers = ("depth_within_5cm", "silhouette_iou", "step_s")
     lost = [" ".join(np.array(metrics.JOINTS)[flags]) for flags in table.lost]
-    columns = (
-        table.stamps,
-        table.status,
-        table.errors,
-        lost,
-        table.depth_within_5cm,
-        table.silhouette_iou,
-        table.step_s,
-    )
+    columns = (table.stamps, table.status, table.errors, lost, *(getattr(table, name) for name in numbers))
     rows = (
         [repr(float(stamp)), status, metrics.mean_or_nan(errors), *errors, *last]
         for stamp, status, errors, *last in zip(*columns, strict=True)
     )
-    write_table(path, header, rows)
+    write_whole(path, table_text([*header, "lost_joints", *numbers], rows))
