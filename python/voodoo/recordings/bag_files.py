@@ -75,9 +75,7 @@ class Ros1File(Reader):
         start, end = self.start_time, self.end_time
         return ReaderMetadata(max(end - start, 0), start, end, self.message_count, None, None, None, None)
 
-    def messages(  # type: ignore[override]
-        self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
-    ) -> Iterator[Item]:
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:  # type: ignore[override]
         """See bag_file."""
         first = -1 if start is None else start
         entries = [(entry, one) for one in connections for entry in self.indexes[one.id] if first <= entry.time]
@@ -147,14 +145,12 @@ class BagFolder(DirectoryReader):
         if len(set(names)) != len(names):
             raise RecordingError(f"{yaml}: expected every file once, found {', '.join(sorted(names))[:300]}")
 
-    def messages(  # type: ignore[override]
-        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Iterator[Item]:
+    def messages(self, connections: Collection[Connection], start: int | None = None) -> Iterator[Item]:  # type: ignore[override]
         """Messages in the order of the files."""
         wanted = {(item.topic, item.msgtype): item for item in connections}
         for storage in self.storages:
             own = [item for item in storage.connections if (item.topic, item.msgtype) in wanted]
-            found: Iterator[Any] = storage.messages(own, start, stop) if own else iter(())
+            found: Iterator[Any] = storage.messages(own, start) if own else iter(())
             for item, time, data in found:
                 if self.metadata.compression_mode == "message" and isinstance(data, bytes):
                     unpack = partial(self._unpacking.unpack, data, "zstd")

@@ -153,11 +153,7 @@ class Bag:
             _unpack(path, folder, unpacked)
         self._folder = folder
         with self._naming():
-            self._survey()
-
-    def _survey(self) -> None:
-        """Find the bag and read its index."""
-        self.file = find_bag(self._folder) if self._folder.is_dir() else self._folder
+            self.file = find_bag(folder) if folder.is_dir() else folder
         self.is_ros2: bool = self.file.suffix != ".bag"
         self._types = MessageTypes(is_ros2=self.is_ros2)
         with self._open() as reader:
@@ -336,11 +332,8 @@ class Bag:
             return self._named(data)
         if self.realsense and connection.topic.endswith("/image/data"):
             data = data[: -realsense.EXTRA_BYTES]
-        read, where = (
-            partial(self._types.deserialize, data, connection.msgtype),
-            f"{self.path}, topic {connection.topic}",
-        )
-        return or_error(read, where, f"a {connection.msgtype} message")
+        read = partial(self._types.deserialize, data, connection.msgtype)
+        return or_error(read, f"{self.path}, topic {connection.topic}", f"a {connection.msgtype} message")
 
 
 class _Stopped(RecordingError):
