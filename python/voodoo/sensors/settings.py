@@ -15,7 +15,7 @@ from voodoo.model.joint import corners
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
-from voodoo.sensors.kinds import inputs, inputs_of
+from voodoo.sensors.kinds import KNOWN
 from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
 from voodoo.sensors.skin.settings import SkinSettings
 
@@ -30,7 +30,7 @@ WHOLE_BODY = ("depth", "points", "keypoints", "markers")
 
 def default_inputs() -> tuple[str, ...]:
     """Returns the default inputs: all but the two cues of color images."""
-    return tuple(kind for kind in inputs() if kind not in ("color", "skin"))
+    return tuple(kind for kind in KNOWN if kind not in ("color", "skin"))
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,9 @@ class FrontEndSettings:
         check_confidence(self.min_confidence)
         for box in self.exclude:
             corners("exclude", box, MeasurementError)
-        unknown = sorted(set(self.use) - set(inputs()))
+        unknown = sorted(set(self.use) - set(KNOWN))
         if unknown or not self.use:
-            raise MeasurementError(f"use: expected some of {', '.join(inputs())}, found {', '.join(unknown) or 'none'}")
+            raise MeasurementError(f"use: expected some of {', '.join(KNOWN)}, found {', '.join(unknown) or 'none'}")
 
     @property
     def clothes(self) -> bool:
@@ -120,7 +120,8 @@ class FrontEndSettings:
 
 def inputs_in(recording: Recording) -> set[str]:
     """The inputs that the sensors of a recording provide."""
-    return {kind for sensor in recording.info().sensors for kind in inputs_of(sensor.kind)}
+    recorded = {sensor.kind for sensor in recording.info().sensors}
+    return {kind for kind, name in KNOWN.items() if name in recorded}
 
 
 def inputs_for(recording: Recording) -> tuple[str, ...]:
@@ -128,7 +129,7 @@ def inputs_for(recording: Recording) -> tuple[str, ...]:
     has = inputs_in(recording)
     if has & set(WHOLE_BODY) or "color" not in has:
         return default_inputs()
-    return tuple(kind for kind in inputs() if kind != "skin")
+    return tuple(kind for kind in KNOWN if kind != "skin")
 
 
 def within_boxes(places: FloatArray, boxes: Sequence[tuple[Corner, Corner]]) -> npt.NDArray[np.bool_]:
