@@ -255,8 +255,7 @@ def standing_still(reference: FloatArray, stamps: FloatArray) -> BoolArray:
 
 def fraction_within(distances: FloatArray, limit: float) -> float:
     """Fraction of the known distances that are at most `limit`; NaN if none is known."""
-    known = distances[np.isfinite(distances)]
-    return float(np.mean(known <= limit)) if known.size else float("nan")
+    return mean_or_nan((distances[np.isfinite(distances)] <= limit).astype(np.float64))
 
 
 def mean_or_nan(values: FloatArray) -> float:
