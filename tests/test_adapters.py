@@ -24,7 +24,7 @@ from voodoo.names import INPUTS
 from voodoo.pipeline.front_end import FrontEnd, FrontEndSettings
 from voodoo.sensors import adapters
 from voodoo.sensors.adapters import Memory, adapter_of, adapters_of
-from voodoo.sensors.kinds import KNOWN
+from voodoo.sensors.settings import KNOWN
 from voodoo.visualization.overlay import Overlay
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"

@@ -262,3 +262,10 @@ def mean_or_nan(values: FloatArray) -> float:
     """Mean of the known values; NaN if none is known."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
+
+
+def weighted(scores: Sequence[object], name: str, weight: str) -> float:
+    """Mean of an attribute of scores where it is known, by another attribute as its weight; NaN without weight."""
+    parts = [(getattr(one, name), getattr(one, weight)) for one in scores if np.isfinite(getattr(one, name))]
+    total = sum(part[1] for part in parts)
+    return float(sum(value * number for value, number in parts) / total) if total else float("nan")

@@ -313,19 +313,13 @@ def together(scores: Sequence[PeopleScore]) -> PeopleScore:
     good = [one for one in scores if not one.failure]
     counted = [field.name for field in fields(PeopleScore) if field.default == 0]
     sums = {name: sum(getattr(one, name) for one in good) for name in counted}
-
-    def mean(name: str, weight: str) -> float:
-        parts = [(getattr(one, name), getattr(one, weight)) for one in good if np.isfinite(getattr(one, name))]
-        total = sum(part[1] for part in parts)
-        return float(sum(value * count for value, count in parts) / total) if total else float("nan")
-
     worst = [one.worst_first_pose_s for one in good if np.isfinite(one.worst_first_pose_s)]
     return PeopleScore(
         "together",
         Path(),
         **sums,
-        first_pose_s=mean("first_pose_s", "visits_matched"),
+        first_pose_s=metrics.weighted(good, "first_pose_s", "visits_matched"),
         worst_first_pose_s=max(worst, default=np.nan),
-        joint_error_m=mean("joint_error_m", "joints"),
-        step_s=mean("step_s", "seconds"),
+        joint_error_m=metrics.weighted(good, "joint_error_m", "joints"),
+        step_s=metrics.weighted(good, "step_s", "seconds"),
     )

@@ -66,7 +66,7 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
             lags = [score.best_lag for score in done if score.best_lag is not None]
             counts = [sum(score.tracking_class == value for score in done) for value in CLASSES]
             means = {name: metrics.mean_or_nan(np.array([getattr(s, name) for s in done] or [np.nan])) for name in ROWS}
-            means |= {f"{name}_together": _together(done, name, count) for name, count in TOGETHER.items()}
+            means |= {f"{name}_together": metrics.weighted(done, name, count) for name, count in TOGETHER.items()}
             summaries.append(
                 Summary(
                     kind=kind if done else "not tracked",
@@ -78,13 +78,6 @@ def summarize(scores: Sequence[Score]) -> list[Summary]:
                 )
             )
     return summaries
-
-
-def _together(scores: Sequence[Score], name: str, count: str) -> float:
-    """Fraction over all sequences, weighted by their totals; NaN if these are zero."""
-    counts = [(getattr(score, name), getattr(score, count)) for score in scores if getattr(score, count) > 0]
-    total = sum(number for _, number in counts)
-    return sum(fraction * number for fraction, number in counts) / total if total else math.nan
 
 
 def table_text(header: Sequence[str], rows: Iterable[Iterable[object]]) -> str:

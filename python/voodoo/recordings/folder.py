@@ -18,7 +18,7 @@ from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
 from voodoo.recordings.pictures import decode_color, decode_depth_png
 from voodoo.recordings.recording import Recording, SensorInfo, number_option, usable
-from voodoo.recordings.set_back import SetBack
+from voodoo.recordings.set_back import SetBack, out_of_order
 from voodoo.recordings.together import in_turn
 from voodoo.recordings.truth import read_beside
 from voodoo.stored import read_stored, read_stored_text
@@ -207,9 +207,7 @@ def _listing(
         moved = written if left_out is None else set_back.of(name, written)
         stamp = written if moved is None else moved
         if number and (moved is None or stamp <= rising[-1][0]):
-            reason = "with a repeated stamp" if stamp == rising[-1][0] else "with a stamp before the last one"
-            expected = f"{file}: expected a stamp after {rising[-1][0]:.6f}, found {stamp:.6f}"
-            leave_out(left_out, RecordingError(expected, reason=reason))
+            leave_out(left_out, out_of_order(file, stamp, rising[-1][0]))
         elif number:
             rising.append((stamp, file))
     return rising

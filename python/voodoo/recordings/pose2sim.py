@@ -20,12 +20,10 @@ from voodoo.recordings.order import in_order, matched, numbers_of
 from voodoo.recordings.recording import Recording, Reference, SensorInfo, number_option
 
 SITES = {
-    f"{side}{joint}": f"{side.lower()}_{site}"
+    f"{side}{joint.capitalize()}": f"{side.lower()}_{joint}"
     for side in "LR"
-    for joint, site in {
-        "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist", "Hip": "hip", "Knee": "knee", "Ankle": "ankle",
-    }.items()
-} | {"Neck": "skullbase", "Head": "skull_tip"}  # fmt: skip
+    for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+} | {"Neck": "skullbase", "Head": "skull_tip"}
 """Pose2Sim's marker names for BODY_25B (its neck is the upper neck) and our sites."""
 
 FRAME = "world"

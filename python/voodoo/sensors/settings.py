@@ -12,13 +12,16 @@ import numpy.typing as npt
 from voodoo.errors import MeasurementError
 from voodoo.measurements import ByteImage, FloatArray
 from voodoo.model.joint import corners
+from voodoo.names import INPUTS
 from voodoo.recordings.recording import Recording
 from voodoo.sensors.depth import DepthFilter
 from voodoo.sensors.keypoints.sites import check_confidence
-from voodoo.sensors.kinds import KNOWN
 from voodoo.sensors.model import PLANAR_LASER, POINTS_SHARING, PixelNoise, RangeNoise, SensorModel
 from voodoo.sensors.skin.settings import SkinSettings
 
+KNOWN: dict[str, str] = {kind: "color" if kind == "skin" else kind for kind in INPUTS}
+"""Kind of input -> kind of its sensors in recordings (see `SensorInfo`): INPUTS first, then others in the order in which their
+adapters were registered."""
 Box: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two opposite corners [m], the lower one first."""
 Corner: TypeAlias = tuple[float, float, float] | FloatArray
