@@ -150,8 +150,12 @@ class Options:
                 raise MeasurementError(f"{name}: expected {low:g} to {high:g}, found {value!r}")
         listed_bones(self.bones)
 
+    def of_images(self) -> tuple[list[Bone] | None, tuple[float, float]]:
+        """The options of the image criterion as the core takes them."""
+        return listed_bones(self.bones), (self.margin, self.thin)
+
     def parts(self) -> tuple[int, float, float, float, float, float]:
-        """The options as the core takes them."""
+        """The options of the steps as the core takes them."""
         return (self.steps, self.tolerance, self.still, self.gain, self.caution, self.largest_turn)
 
 
