@@ -11,16 +11,7 @@ import numpy as np
 
 from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
-from voodoo.evaluation.people import (
-    ABSENT_S,
-    IN_VIEW,
-    JOINTS_IN_VIEW,
-    MATCH_M,
-    PeopleScore,
-    motmetrics,
-    score,
-    together,
-)
+from voodoo.evaluation.people import RULES, PeopleScore, motmetrics, score, together
 from voodoo.evaluation.score import RATIO, written
 from voodoo.evaluation.summary import table_head, table_row, table_text
 from voodoo.export.people import PeopleTrack
@@ -148,14 +139,7 @@ def people_markdown(scores: Sequence[PeopleScore]) -> str:
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
         lines.append(_line(together(scores)))
-    lines.append(
-        f"\nA match is a root within {MATCH_M:g} m of a person with {IN_VIEW:g} or more of their pixels in view; who is less in "
-        f"view may be followed or not. MOTA, IDF1 and switches are those of py-motmetrics. First pose: from "
-        f"{JOINTS_IN_VIEW:g} in view on. Return: after more than {ABSENT_S:g} s out of view. A false body is a stretch of an id "
-        "that matches nobody; one that follows on a match of this id is left behind. Joints count from "
-        f"{JOINTS_IN_VIEW:g} in view on.\n"
-    )
-    return "\n".join(lines)
+    return "\n".join([*lines, f"\n{RULES}\n"])
 
 
 def write_people(folder: Path, scores: Sequence[PeopleScore]) -> list[Path]:

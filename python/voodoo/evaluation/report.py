@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,18 +13,7 @@ from voodoo.errors import installed
 from voodoo.evaluation import metrics
 from voodoo.evaluation.calibration import ARM, TRUNK, Deviations, calibrate, calibration_markdown, together
 from voodoo.evaluation.score import CM, LIMIT_EXACT_M, LIMIT_REFERENCE_M, PERCENT, RATIO, FrameTable, Score, written
-from voodoo.evaluation.summary import (
-    ALL_ROWS,
-    CLASSES,
-    KINDS,
-    Summary,
-    summarize,
-    table_head,
-    table_row,
-    write_frames,
-    write_sequences,
-    write_summary,
-)
+from voodoo.evaluation.summary import ALL_ROWS, CLASSES, KINDS, Summary, summarize, table_head, table_row, write_tables
 from voodoo.whole import appearing_whole, write_whole
 
 
@@ -126,17 +114,8 @@ def write_reports(
     Raises:
         OSError: a file cannot be written.
     """
-    (folder / "frames").mkdir(parents=True, exist_ok=True)
-    names: Counter[str] = Counter()
-    for score, table in zip(scores, tables, strict=True):
-        names[score.name] += 1
-        again = f"~{names[score.name]}" if names[score.name] > 1 else ""
-        if table is not None:
-            write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
-    files = [folder / name for name in ("sequences.csv", "summary.csv", "summary.md")]
-    write_sequences(files[0], scores)
-    write_summary(files[1], summarize(scores))
-    write_whole(files[2], markdown(scores, tables))
+    files = [*write_tables(folder, scores, tables), folder / "summary.md"]
+    write_whole(files[-1], markdown(scores, tables))
     if picture:
         files.append(folder / "errors.png")
         plot_errors(files[-1], scores)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -105,6 +106,25 @@ def cell(value: object) -> str:
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return ""
     return f"{value:.6f}" if isinstance(value, float) else str(value)
+
+
+def write_tables(folder: Path, scores: Sequence[Score], tables: Sequence[FrameTable | None]) -> list[Path]:
+    """Write sequences.csv and summary.csv, which are returned, and frames/NAME.csv, see `voodoo.evaluation.report.write_reports`.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    (folder / "frames").mkdir(parents=True, exist_ok=True)
+    names: Counter[str] = Counter()
+    for score, table in zip(scores, tables, strict=True):
+        names[score.name] += 1
+        again = f"~{names[score.name]}" if names[score.name] > 1 else ""
+        if table is not None:
+            write_frames(folder / "frames" / f"{score.name}{again}.csv", table)
+    files = [folder / "sequences.csv", folder / "summary.csv"]
+    write_sequences(files[0], scores)
+    write_summary(files[1], summarize(scores))
+    return files
 
 
 def write_sequences(path: Path, scores: Sequence[Score]) -> None:
