@@ -36,8 +36,8 @@ SAME_TIME_S = 0.01
 ROOT = "humanoid_root"
 RULES = (
     f"A match is a root within {MATCH_M:g} m of a person with {IN_VIEW:g} or more of their pixels in view; who is less in view "
-    f"may be followed or not. MOTA, IDF1 and switches are those of py-motmetrics. First pose: from {JOINTS_IN_VIEW:g} in view on. "
-    f"Return: after more than {ABSENT_S:g} s out of view. A false body is a stretch of an id that matches nobody; one that "
+    f"may be followed or not. MOTA, IDF1 and switches are those of py-motmetrics. First pose: from {JOINTS_IN_VIEW:g} in view "
+    f"on. Return: after more than {ABSENT_S:g} s out of view. A false body is a stretch of an id that matches nobody; one that "
     f"follows on a match of this id is left behind. Joints count from {JOINTS_IN_VIEW:g} in view on."
 )
 """Explains a table of scores."""
