@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from voodoo.errors import RecordingError
-from voodoo.measurements import ColorImage, DepthImage, Measurement, RecordedFrame
+from voodoo.measurements import ByteImage, ColorImage, DepthImage, Measurement, RecordedFrame
 from voodoo.recordings.camera_files import FolderCalibration, PlacedCamera, read_calibration
 from voodoo.recordings.left_out import LeftOut, leave_out
 from voodoo.recordings.order import numbers_of
@@ -234,23 +234,22 @@ def _stamp(text: str, where: str) -> float:
     return stamp
 
 
-def _read(file: Path) -> bytes:
-    return read_stored(file, "a readable picture")
-
-
 def depth_image(stamp: float, file: Path, calibration: FolderCalibration) -> DepthImage:
     """The image in a file of depth/."""
     place = calibration.depth
-    image = decode_depth_png(_read(file), file, (place.camera.width, place.camera.height))
+    content = read_stored(file, "a readable picture")
+    image = decode_depth_png(content, file, (place.camera.width, place.camera.height))
     image = np.ascontiguousarray(image[:, ::-1]) if place.mirrored else image
     return DepthImage("depth", stamp, image, 1.0 / calibration.depth_factor, place.camera, place.world_from_sensor)
 
 
 def color_image(stamp: float, file: Path, color: PlacedCamera) -> ColorImage:
     """The image in a file of rgb/, which is read when it is decoded."""
-    size = (color.camera.width, color.camera.height)
-    step = -1 if color.mirrored else 1
-    load = partial(lambda f, s: np.ascontiguousarray(decode_color(_read(f), f, s)[:, ::step]), file, size)
+
+    def load() -> ByteImage:
+        image = decode_color(read_stored(file, "a readable picture"), file, (color.camera.width, color.camera.height))
+        return np.ascontiguousarray(image[:, :: -1 if color.mirrored else 1])
+
     return ColorImage("rgb", stamp, load, color.camera, color.world_from_sensor)
 
 

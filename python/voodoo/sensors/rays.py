@@ -48,16 +48,11 @@ def place_of(rays: Sequence[SiteRay], *, scale: float = AGREE_M) -> Triangulated
     directions = np.array([ray.direction for ray in rays])
     planes = across(directions)
     information = np.array([1.0 / ray.sigma**2 for ray in rays])
-    best: tuple[float, FloatArray] | None = None
-    for pair in combinations(range(len(rays)), 2):
-        point = _meeting(origins[list(pair)], directions[list(pair)], planes[list(pair)])
-        if point is not None:
-            total = float(trust_at(point, origins, directions, scale=scale).sum())
-            if best is None or total > best[0]:
-                best = total, point
-    if best is None:
-        return None
-    found = met(origins, directions, information, best[1], scale=scale)
+    pairs = map(list, combinations(range(len(rays)), 2))
+    points = [_meeting(origins[pair], directions[pair], planes[pair]) for pair in pairs]
+    known = [point for point in points if point is not None]
+    best = max(known, key=lambda point: trust_at(point, origins, directions, scale=scale).sum(), default=None)
+    found = None if best is None else met(origins, directions, information, best, scale=scale)
     if found is None:
         return None
     point, trust = found
