@@ -202,14 +202,12 @@ def tracking_class(errors: FloatArray, stamps: FloatArray, *, limit: float) -> t
         frame, None if nothing is known; and a mask (F, J) of lost joints.
     """
     known = np.isfinite(errors)
-    lost = np.zeros(errors.shape, dtype=bool)
-    at_end = False
-    for joint in range(errors.shape[1]):
-        lost[:, joint] = lost_frames(errors[:, joint] > limit, known[:, joint], stamps)
-        observed = np.flatnonzero(known[:, joint])
-        at_end |= len(observed) > 0 and bool(lost[observed[-1], joint])
+    lost = np.column_stack(
+        [lost_frames(*of_joint, stamps) for of_joint in zip((errors > limit).T, known.T, strict=True)]
+    )
     if not known.any():
         return None, lost
+    at_end = any(gone[seen][-1] for gone, seen in zip(lost.T, known.T, strict=True) if seen.any())
     return (0 if at_end else 1 if lost.any() else 2), lost
 
 

@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+import voodoo._core as _core
 from voodoo.errors import MeasurementError
 from voodoo.model.joint import numbers_of, short
 
@@ -258,3 +259,24 @@ def target_parts(targets: Targets) -> list[TargetParts]:
     if not isinstance(targets, Sequence) or not all(isinstance(target, Target) for target in targets):
         raise MeasurementError(f"targets: expected site -> position (3,), or a list of Target, found {short(targets)}")
     return [target.parts() for target in targets]
+
+
+def solved(
+    chain: _core.Chain,
+    starts: FloatArray,
+    goals: Sequence[TargetParts],
+    positions: FloatArray | None,
+    world_from_base: npt.ArrayLike | None,
+    views: Sequence[_core.View],
+    others: Mapping[str, npt.ArrayLike] | None,
+    options: Options,
+    rest: Sequence[tuple[int, float]],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, tuple[float, ...]]:
+    """What the core finds from starts (N, n): angles, sites, numbers, poses and residuals; see `voodoo.ik.solve`.
+
+    Raises:
+        BodyError: a site or limb that is not on the chain, or one of `others` that is on it.
+        MeasurementError: an invalid number.
+    """
+    base, known = base_pose(world_from_base), listed_poses(others)
+    return chain.solve(base, starts, goals, positions, *options.of_images(), views, known, options.parts(), rest)

@@ -120,12 +120,8 @@ def checked_rows(keypoints: npt.ArrayLike, layout: str) -> FloatArray:
 @lru_cache(maxsize=32)
 def compiled(layout: str) -> _core.KeypointLayout:
     """The core's object for a layout."""
-    return _core.KeypointLayout(
-        [
-            (part.site, list(part.weights.items()), part.spread, behind_surface(part.site))
-            for part in layout_of(layout).parts
-        ]
-    )
+    parts = layout_of(layout).parts
+    return _core.KeypointLayout([(p.site, list(p.weights.items()), p.spread, behind_surface(p.site)) for p in parts])
 
 
 def check_confidence(least: object) -> None:
@@ -313,17 +309,16 @@ class KeypointSensor:
             MeasurementError: wrong shapes, or an unknown layout.
         """
         pose = rigid(self.world_from_sensor)
-        if depth is not None and depth.shape != (self.camera.height, self.camera.width):
-            expected = (self.camera.height, self.camera.width)
-            raise MeasurementError(f"depth: expected the camera's shape {expected}, found {depth.shape}")
-        camera = self.camera
+        shape = (self.camera.height, self.camera.width)
+        if depth is not None and depth.shape != shape:
+            raise MeasurementError(f"depth: expected the camera's shape {shape}, found {depth.shape}")
         found, places, unseen, dropped = compiled(self.layout).observe(
             checked_rows(keypoints, self.layout),
             predicted,
             stamp=stamp,
             source=self.source,
             world_from_sensor=pose,
-            camera=camera,
+            camera=self.camera,
             noise=self.noise.pixels,
             place_sigma=POINT_SIGMA_M,
             least=self.min_confidence,
