@@ -11,7 +11,7 @@ import numpy as np
 
 from voodoo.errors import installed
 from voodoo.evaluation import metrics
-from voodoo.evaluation.calibration import ARM, TRUNK, Deviations, calibrate, calibration_markdown, together
+from voodoo.evaluation.calibration import Deviations, by_sigma, calibrate, calibration_markdown, groups
 from voodoo.evaluation.score import CM, LIMIT_EXACT_M, LIMIT_REFERENCE_M, PERCENT, RATIO, FrameTable, Score, written
 from voodoo.evaluation.summary import ALL_ROWS, CLASSES, KINDS, Summary, summarize, table_head, table_row, write_tables
 from voodoo.whole import appearing_whole, write_whole
@@ -186,32 +186,25 @@ def plot_errors(path: Path, scores: Sequence[Score]) -> None:
 
 def plot_calibration(path: Path, found: Sequence[Deviations]) -> None:
     """Plot the cumulative distribution of normalized errors, and error over standard deviation."""
-    errors, sigma, measured, known = together(found)
+    grouped = groups(found)
     figure = new_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)
     steps = np.linspace(0.0, 4.0, 81)
     normal = [math.erf(step / math.sqrt(2.0)) for step in steps]
     left.plot(steps, normal, color="#333333", linestyle="--", linewidth=1.0, label="normal distribution")
-    groups = (
-        ("shoulders and hips", np.broadcast_to(TRUNK, known.shape), "#7a8ca3"),
-        ("measured limbs", ~TRUNK & measured, "#4c8c6b"),
-        ("other limbs", ~TRUNK & ~measured, "#c8553d"),
-    )
-    for name, chosen, color in groups:
-        own = known & chosen
-        if own.any():
-            ratios = np.sort((np.abs(errors[own]) / sigma[own]).ravel())
+    colors = {"shoulders and hips": "#7a8ca3", "ends of measured limbs": "#4c8c6b", "ends of other limbs": "#c8553d"}
+    for name, color in colors.items():
+        errors, sigma = grouped[name]
+        if errors.size:
+            ratios = np.sort((np.abs(errors) / sigma).ravel())
             left.plot(steps, np.searchsorted(ratios, steps, side="right") / ratios.size, color=color, label=name)
     left.set_xlabel("standard deviations")
     left.set_ylabel("share of errors within")
     left.legend(frameon=False, fontsize=8)
-    for name, chosen, color in (("arms", ARM, "#c87f3d"), ("legs", ~ARM, "#3d6fc8")):
-        own = known & chosen
-        if own.any():
-            order = np.argsort(sigma[own].ravel(), kind="stable")
-            bins = np.array_split(order, 20)
-            x = [100 * float(np.sqrt(np.mean(sigma[own].ravel()[part] ** 2))) for part in bins if part.size]
-            y = [100 * float(np.sqrt(np.mean(errors[own].ravel()[part] ** 2))) for part in bins if part.size]
+    for name, color in (("arms", "#c87f3d"), ("legs", "#3d6fc8")):
+        bins = [part for part in by_sigma(*grouped[name], parts=20) if part[0].size]
+        y, x = ([100 * float(np.sqrt(np.mean(part[each] ** 2))) for part in bins] for each in (0, 1))
+        if bins:
             right.plot(x, y, "o-", color=color, label=name, markersize=4)
     reach = [0.5, 20.0]
     right.plot(reach, reach, color="#333333", linestyle="--", linewidth=1.0)

@@ -82,8 +82,7 @@ class Pose2SimRecording(Recording):
         placed = read_camera_toml(calibration_of(path), meters_per_unit=scale)
         folders = keypoint_folders(path)
         chosen = cameras_of(path, placed, folders, ("a folder keypoints/*_json", "cameras"), cameras)
-        self.cameras = tuple(camera for camera, _ in chosen)
-        self._folders = tuple(folder for _, folder in chosen)
+        self.cameras, self._folders = zip(*chosen, strict=True)
         self._files, self._notes = _rows_of(path, self._folders)
         self._stamps = np.arange(len(self._files)) / self.rate
         self._check(layout)

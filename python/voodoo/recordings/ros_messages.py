@@ -76,6 +76,13 @@ def is_depth(topic: str, message: Message) -> bool:
     return "compressedDepth" in topic + message.format or words in DEPTH_ENCODINGS or gray[24:] == b"\x10\x00"
 
 
+def channels_of(topic: str, message: Message) -> int:
+    """Number of channels of an image or compressed image, for which it is the most there may be; 0: it is no picture."""
+    if hasattr(message, "format"):
+        return 0 if is_depth(topic, message) else max(COLOR_CHANNELS.values())
+    return COLOR_CHANNELS.get(message.encoding, 0)
+
+
 def has_distances(message: Message) -> bool:
     """Whether a compressed depth image is not a JPEG, whose values of 8 bits are no distances."""
     return message.data[:3].tobytes() != b"\xff\xd8\xff"

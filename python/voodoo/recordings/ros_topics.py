@@ -13,12 +13,12 @@ from voodoo.recordings import realsense
 from voodoo.recordings.order import natural
 from voodoo.recordings.ros_bag import Bag
 from voodoo.recordings.ros_messages import (
-    COLOR_CHANNELS,
     DEPTH_ENCODINGS,
     NO_DISTANCES,
     Message,
     base_topic,
     camera_of,
+    channels_of,
     has_distances,
     is_depth,
     stamp_of,
@@ -193,15 +193,7 @@ class TopicFinder:
 
     def _pictures(self, names: list[str], *, channels: int) -> list[str]:
         """Topics with images of at least a number of channels."""
-        usable = []
-        for name in names:
-            message = self._message(name)
-            if self._topics[name].type == COMPRESSED:
-                if not is_depth(name, message):
-                    usable.append(name)
-            elif COLOR_CHANNELS.get(message.encoding, 0) >= channels:
-                usable.append(name)
-        return usable
+        return [name for name in names if channels_of(name, self._message(name)) >= channels]
 
     def _same_as_depth(self, source: TopicSource, sources: list[TopicSource]) -> bool:
         """Whether a cloud has the same data as a depth image, which would then have twice its weight."""
