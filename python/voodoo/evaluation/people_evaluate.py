@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from voodoo.config import Config
 from voodoo.errors import RecordingError, VoodooError
 from voodoo.evaluation.people import RULES, PeopleScore, motmetrics, score, together
 from voodoo.evaluation.score import RATIO, written
 from voodoo.evaluation.summary import table_head, table_row, table_text
 from voodoo.export.people import PeopleTrack
 from voodoo.export.table import Arrays, opened_result
-from voodoo.model.body import Body
-from voodoo.names import Automatic, HumanModel
+from voodoo.names import Automatic
 from voodoo.people import People
 from voodoo.pipeline.run import track
+from voodoo.pipeline.start import start_people
 from voodoo.recordings.loaders import open_recording
 from voodoo.recordings.people_truth import PeopleTruth
 from voodoo.recordings.recording import Recording
@@ -92,27 +91,25 @@ def judge(recording: Recording, people: People, *, settings: FrontEndSettings | 
 def evaluate_people(
     path: Path,
     *,
-    config: Config | None = None,
     options: Mapping[str, Any] | None = None,
-    model: HumanModel | None = None,
     use: Sequence[str] | None = None,
     init: Automatic | None = None,
+    **how: Any,  # noqa: ANN401 - of start_people
 ) -> tuple[PeopleScore, None]:
     """Track all persons in a recording and evaluate the result; without a table of frames.
 
     Args:
         path: of a recording with truth_people.csv beside it.
-        config: None means the defaults.
         options: see open_recording.
-        model: model of the human; None: that of `voodoo.People`.
         use: kinds of inputs; None: all.
         init: of no effect, since persons are always searched for.
+        **how: config and model, see start_people.
 
     Raises:
         VoodooError: it cannot be read, or a frame was refused.
     """
     recording = open_recording(path, **(options or {}))
-    people = People(None if model is None else Body.human(model=model), config=config)
+    people = start_people(recording, use=use, **how)
     return judge(recording, people, settings=FrontEndSettings.of(recording, use=use)), None
 
 

@@ -57,7 +57,7 @@ class Ros1File(Reader):
         """Read nothing yet."""
         super().__init__(path)
         self._unpacking = unpacking
-        self._last: tuple[int, bytes | Exception] = (-1, b"")
+        self._last: tuple[int, bytes | RecordingError] = (-1, b"")
         self._size, self._indexed = path.stat().st_size, 0
 
     def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
@@ -88,12 +88,10 @@ class Ros1File(Reader):
 
     def _message(self, entry: IndexData) -> bytes:
         if self._last[0] != entry.chunk_pos:
-            try:
-                self._last = entry.chunk_pos, self._content(entry.chunk_pos)
-            except Exception as error:  # told for each of its messages
-                self._last = entry.chunk_pos, error
+            read, sound = partial(self._content, entry.chunk_pos), f"a sound chunk at byte {entry.chunk_pos}"
+            self._last = entry.chunk_pos, or_error(read, self.path, sound)
         content = self._last[1]
-        if isinstance(content, Exception):
+        if isinstance(content, RecordingError):  # told for each of its messages
             raise content
         chunk = io.BytesIO(content)
         chunk.seek(entry.offset)

@@ -141,10 +141,8 @@ def met(
         matrix = (weights[:, None, None] * planes).sum(axis=0) + prior * np.eye(3)
         if not prior and float(np.linalg.eigvalsh(matrix)[0]) <= 0.0:
             return None
-        moved = np.linalg.solve(matrix, weights @ offsets + prior * start)
-        done = float(np.linalg.norm(moved - point)) < _MOVED_M
-        point = moved
-        if done:
+        before, point = point, np.linalg.solve(matrix, weights @ offsets + prior * start)
+        if float(np.linalg.norm(point - before)) < _MOVED_M:
             break
     return point, trust_at(point, origins, directions, scale=scale)
 
