@@ -129,10 +129,7 @@ DERIVED = ("mota", "idf1", "false_a_minute")
 
 def people_markdown(scores: Sequence[PeopleScore]) -> str:
     """A table with a row per recording, and one for all together."""
-    lines = [
-        "## Several people, against exact truth\n",
-        *table_head(name for name, _ in _COLUMNS),
-    ]
+    lines = ["## Several people, against exact truth\n", *table_head(name for name, _ in _COLUMNS)]
     lines += [_line(score) for score in scores]
     if len([score for score in scores if not score.failure]) > 1:
         lines.append(_line(together(scores)))

@@ -64,10 +64,6 @@ class RegionSilhouettes:
         frame = Frame(pictures[0].stamp)
         for item in pictures:
             lens = _lens_of(item.camera)
-            frame.add_color(
-                np.ascontiguousarray(lens.apply(item.image)),
-                camera=lens.camera,
-                world_from_sensor=item.root_from_sensor,
-                source=item.sensor,
-            )
+            seen = np.ascontiguousarray(lens.apply(item.image))
+            frame.add_color(seen, camera=lens.camera, world_from_sensor=item.root_from_sensor, source=item.sensor)
         return frame
