@@ -147,7 +147,7 @@ def skin(image, camera=CAMERA):
             for rate in ("30", 0.0, None)
             for words in ("expected images per second > 0, found ",)
         ),
-        (lambda: read_trc("nowhere.trc"), RecordingError, "nowhere.trc: expected a .trc file, found none"),
+        (lambda: read_trc("nowhere.trc"), RecordingError, "nowhere.trc: expected a .trc file, found no such file"),
     ],
 )
 def test_a_wrong_argument(call, error, words):
