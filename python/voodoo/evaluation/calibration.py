@@ -38,8 +38,7 @@ class Deviations:
 
 def sigma_of(estimate: Estimate) -> FloatArray:
     """Standard deviations (12, 3) [m] of metrics.JOINTS; NaN where unknown."""
-    unknown = np.full(3, np.nan)
-    return np.array([estimate.joint_sigma.get(name, unknown) for name in metrics.JOINTS], dtype=np.float64)
+    return np.array([estimate.joint_sigma.get(name, (np.nan,) * 3) for name in metrics.JOINTS], dtype=np.float64)
 
 
 @dataclass(frozen=True)

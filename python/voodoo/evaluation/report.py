@@ -68,12 +68,11 @@ _BRIEF = (
 
 def _head(summary: Summary) -> list[str]:
     """The heading of a table, and its first row."""
-    zero, one, two = summary.classes
     return [
         f"## Against {summary.kind}: {summary.sequences} sequence{'s' * (summary.sequences > 1)}\n",
         "| | |",
         "|---|---|",
-        f"| class 0 / 1 / 2 (K06 Table I) | {zero} / {one} / {two} |",
+        f"| class 0 / 1 / 2 (K06 Table I) | {' / '.join(map(str, summary.classes))} |",
     ]
 
 

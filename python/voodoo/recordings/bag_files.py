@@ -121,8 +121,7 @@ class BagFolder(DirectoryReader):
         """Read nothing yet."""
         super().__init__(path)
         self._folder, self._unpacking = path, unpacking
-        plugins: Any = {"mcap": partial(McapFile, unpacking=unpacking), "sqlite3": SqliteFile}
-        self.STORAGE_PLUGINS = plugins
+        self.STORAGE_PLUGINS: Any = {"mcap": partial(McapFile, unpacking=unpacking), "sqlite3": SqliteFile}
 
     def open(self) -> None:
         """Check metadata.yaml and the size of the files, and read the index of each."""

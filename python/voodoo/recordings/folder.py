@@ -96,9 +96,8 @@ class FolderRecording(Recording):
         self.path = path
         self.name = path.resolve().name
         self._left_out = left_out
-        clock = FrameClock(
-            None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
-        )
+        rate = None if rate is None else number_option(path, "rate", rate, "images per second > 0", most=1e4)
+        clock = FrameClock(rate)
         set_back = SetBack()
         self._depth = _listing(path, "depth", DEPTH_SUFFIXES, clock, left_out, set_back)
         if not self._depth:

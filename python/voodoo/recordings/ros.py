@@ -192,9 +192,8 @@ class RosRecording(Recording):
         if given or not self._bag.realsense or all(item.name != units for item in self._bag.topics):
             return otherwise
         with reading(f"{self.path}, topic {units}", "a readable message"):
-            return number_option(
-                self.path, str(units), float(f"{self._bag.first(str(units)).data:.7g}"), "a length > 0", most=1e3
-            )
+            found = float(f"{self._bag.first(str(units)).data:.7g}")
+            return number_option(self.path, str(units), found, "a length > 0", most=1e3)
 
     def _read_transforms(self, asked: str | None, sources: Sequence[TopicSource]) -> str:
         """Fill the transform tree and choose the root frame."""

@@ -215,9 +215,8 @@ def scan_fields(message: Message, source: str) -> dict[str, Any]:
     Raises:
         RecordingError: angles or limits that are not finite, or a zero increment.
     """
-    numbers = {
-        name: float(getattr(message, name)) for name in ("angle_min", "angle_increment", "range_min", "range_max")
-    }
+    names = ("angle_min", "angle_increment", "range_min", "range_max")
+    numbers = {name: float(getattr(message, name)) for name in names}
     finite = all(math.isfinite(value) for name, value in numbers.items() if name != "range_max")
     if not finite or math.isnan(numbers["range_max"]) or numbers["angle_increment"] == 0.0:
         raise RecordingError(f"{source}: expected finite angles and limits and an increment, found {numbers}")
