@@ -6,6 +6,7 @@ import pytest
 from voodoo import Camera, MeasurementError
 from voodoo.sensors.gating import SiteGate
 from voodoo.sensors.model import (
+    PAPER_WEIGHTS,
     POINTS_SHARING,
     TIME_OF_FLIGHT,
     PixelNoise,
@@ -17,9 +18,6 @@ from voodoo.sensors.pixels import ray_distance, world_rays
 
 LENS = Camera(640, 480, 500.0, 510.0, 320.5, 239.0, (-0.2, 0.05, 1e-3, -2e-3, 0.0))
 FISHEYE = Camera(640, 480, 300.0, 300.0, 320.0, 240.0, (0.05, -0.01, 0.002, 0.0), "equidistant")
-
-# K06 section V: a 3-D point, the ray of the face tracker, the ray of a hand tracker
-PAPER_WEIGHTS = {"point": 1.0, "face": 30.0, "hand": 20.0}
 
 
 def test_weight_is_the_inverse_variance_relative_to_the_reference():

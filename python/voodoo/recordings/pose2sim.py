@@ -71,9 +71,7 @@ class Pose2SimRecording(Recording):
         left_out: LeftOut | None = None,
     ) -> None:
         """Read calibration, the names of the keypoint files and the reference; see the class."""
-        self.path = path
-        self.name = path.name
-        self.root_frame = FRAME
+        self.path, self.name, self.root_frame = path, path.name, FRAME
         self._left_out = left_out
         with naming(path, MeasurementError, error=RecordingError):
             layout_of(layout or "body25b")

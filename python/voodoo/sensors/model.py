@@ -26,6 +26,8 @@ import numpy.typing as npt
 from voodoo.errors import MeasurementError
 
 N = TypeVar("N", float, npt.NDArray[np.float64])
+PAPER_WEIGHTS: dict[str, float] = {"point": 1.0, "face": 30.0, "hand": 20.0}
+"""Weights of K06 section V: a 3-D point, the ray of the face tracker, the ray of a hand tracker."""
 
 POINTS_SHARING = 25.0
 """Neighboring pixels of a depth image that share one error."""
